@@ -4,11 +4,12 @@ A rotation of space by a small angle about the axis ``e`` changes the centreline
 
     dr = e x r,   dq = 1/2 (0, e) q,   dn = e x n,
 
-and a rotation of the cross-sections about a body axis changes ``dq = 1/2 q (0, e)`` alone.  The continuous symmetries
-of a rod problem are those combinations of these that leave its functional as it is: a hemitropic rod between clamps
-aligned with ``e3`` is unchanged by a rotation of space together with the opposite one of the cross-sections,
-``q -> a q conj(a)``; a ring by all motions of space.  A generator gives the phase condition that picks one member of a
-family of equivalent equilibria, and the reason for the zero eigenvalue of a state that breaks the symmetry.
+and a rotation of the cross-sections about a body axis changes ``dq = 1/2 q (0, e)``, and ``dv = v x e`` of strains that
+are unknowns, as the tangent stays where it is.  The continuous symmetries of a rod problem are those combinations of
+these that leave its functional as it is: a hemitropic rod between clamps aligned with ``e3`` is unchanged by a rotation
+of space together with the opposite one of the cross-sections, ``q -> a q conj(a)``; a ring by all motions of space.  A
+generator gives the phase condition that picks one member of a family of equivalent equilibria, and the reason for the
+zero eigenvalue of a state that breaks the symmetry.
 """
 
 from __future__ import annotations

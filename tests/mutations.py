@@ -369,6 +369,42 @@ FAULTS = {
     "ends-of-folds-counted": Fault(
         "rodfem/codim2/curve.py", ", dx=dx / size, rest=a.rest)", ", dx=dx / size)", "tests/codim2/test_locus.py"
     ),
+    "special-points-of-small-loads-are-one": Fault(
+        "rodfem/codim2/locus.py", "unit(x, y, one=one)", "unit(x, y, one=1.0)", "tests/codim2/test_locus.py"
+    ),
+    "loci-of-small-loads-start-everywhere": Fault(
+        "rodfem/report/loci.py", "one=natural.get(name, 1.0)", "one=1.0", "tests/codim2/test_locus.py"
+    ),
+    "moments-without-a-natural-size": Fault(
+        "rodfem/output/files.py", '"length", "force", "moment")', '"length", "force")', FILES
+    ),
+    "mirrors-asked-of-a-molecule-in-metres": Fault(
+        "rodfem/deflation/discrete_symmetries.py",
+        "amplitude * units.of_field(block)",
+        "amplitude",
+        "tests/deflation/test_deflation.py",
+    ),
+    "deflated-steps-in-newtons": Fault(
+        "rodfem/deflation/deflated_newton.py",
+        "system.in_units(step, -1).norm() / (1.0 + system.in_units(x, -1).norm())",
+        "step.norm() / (1.0 + x.norm())",
+        "tests/deflation/test_deflation.py",
+    ),
+    "sections-that-turn-without-their-shear": Fault(
+        "rodfem/fem/symmetries.py", "    out += _of_strains(fields)\n", "", "tests/fem/test_symmetries.py"
+    ),
+    "factors-begin-with-entries-of-energies": Fault(
+        "rodfem/fem/system.py",
+        "self.sizes * self.scene.units.energy**-0.5",
+        "self.sizes * 1.0",
+        "tests/problem/test_units.py",
+    ),
+    "scales-start-from-one": Fault(
+        "rodfem/linalg/chain.c",
+        "memcpy(s, c->natural, c->n * sizeof(double));",
+        "for (int i = 0; i < c->n; i++) s[i] = 1.0;",
+        "tests/problem/test_units.py",
+    ),
     "quaternions-of-one-sign": Fault(
         "rodfem/deflation/group_orbit.py",
         "for each in (y, *same_rotations(self.system, y)):",

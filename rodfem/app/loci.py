@@ -75,7 +75,7 @@ class _Loci:
         """Nothing is followed yet."""
         self.solvers, self.output, self.report, self.known = solvers, output, report, known
         self.name, *self.interval = asked
-        self.load = sorted(plan.over(solvers[0].system.scene))
+        self.load, self.units = sorted(plan.over(solvers[0].system.scene)), solvers[0].units
         self.adapted = plan.accuracy is not None
         self.comm = solvers[0].system.comm
         self.saved: list[dict] = []
@@ -87,7 +87,7 @@ class _Loci:
             if not (special.kind.counted or special.kind.line) or special.connects_to is not None:
                 continue
             which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
-            if any(found.passes(special) for found in near):
+            if any(found.passes(special, self.units) for found in near):
                 self.report.say(f"\nThe {which} is on a locus above")
                 continue
             if self.adapted:
@@ -107,7 +107,7 @@ class _Loci:
 
         file = self.output / f"locus-{len(self.saved) + 1}.json"
         found = Locus.read(file) if self.known and file.exists() else None
-        if found is None or not found.starts_at(special):
+        if found is None or not found.starts_at(special, self.units):
             bounds = (self.load[0], self.load[1]), (self.interval[0], self.interval[1])
             found = locus(self.solvers[special.point.mesh], special, self.name, bounds)
         self.report.say(found.text())

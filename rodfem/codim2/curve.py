@@ -17,6 +17,7 @@ from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.roots import zero_between
+from rodfem.tolerances import unit
 
 LOCATED = 1e-8
 """Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
@@ -31,7 +32,7 @@ CERTAIN = 10.0
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
 """The end of a curve of flutter: its double eigenvalue vanishes."""
 CLOSED = 1e-9
-"""Difference of ordinates that a closed curve may end with, where they do not change along it: absolute."""
+"""Difference of ordinates that a closed curve may end with, over their size, where they do not change along it."""
 
 
 @dataclass
@@ -266,7 +267,8 @@ class Tracer:
         if not size or not 0 < part @ whole <= size**2 or self._cosine(b, start.dp, start.dx) < 0.5:
             return False
         aside = abs(part[0] * whole[1] - part[1] * whole[0]) / size
-        return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + CLOSED
+        still = CLOSED * unit(start.ordinate, one=self.criterion.solver.units.ordinate)
+        return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + still
 
 
 def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:

@@ -39,14 +39,14 @@ from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number
 from rodfem.output.files import mesh_of, save_json
+from rodfem.problem.units import Units
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.tolerances import SAME_SPECIAL, unit
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
-SAME = 1e-6
-"""Loads of special points that differ by less than this, relative, may be one and the same point of a curve."""
 BESIDE = 1e-3
 """Distance of a load beside a divergence load at which the unstable eigenvalues are counted, over the bounds."""
 CUSP = 1e-3
@@ -141,11 +141,12 @@ class Locus:
     units: tuple[str, str] = ("", "")
     note: str = ""
 
-    def passes(self, special: SpecialPoint) -> bool:
-        """Whether the curve passes the line of its start again at another special point of that scene."""
-        here = np.array([special.point.load, special.point.ordinate])
-        near = SAME * np.maximum(1.0, abs(here))
-        return self.kind == special.kind and any((abs(here - there) <= near).all() for there in self.crossings)
+    def passes(self, special: SpecialPoint, units: Units) -> bool:
+        """Whether the curve passes the line of its start again at another special point.
+
+        The scene, that of both, has the natural sizes ``units``.
+        """
+        return self.kind == special.kind and any(_same(special, there, units) for there in self.crossings)
 
     def data(self) -> dict[str, Any]:
         """Plain lists, numbers and strings for a file; what was not computed is None."""
@@ -193,11 +194,9 @@ class Locus:
             **tables,
         )
 
-    def starts_at(self, special: SpecialPoint) -> bool:
-        """Whether the curve was started from a special point."""
-        here = np.array([special.point.load, special.point.ordinate])
-        near = SAME * np.maximum(1.0, abs(here))
-        return self.kind == special.kind and bool((abs(here - self.crossings[0]) <= near).all())
+    def starts_at(self, special: SpecialPoint, units: Units) -> bool:
+        """Whether the curve was started from a special point of its scene, which has the natural sizes ``units``."""
+        return self.kind == special.kind and _same(special, self.crossings[0], units)
 
     def save(self, path: Path) -> None:
         """Write :meth:`data` as JSON, whole or not at all; call it on one rank."""
@@ -221,6 +220,12 @@ class Locus:
             lines.append(f"  {pair[0]:<24} {pair[1]:<24} {self.ordinate[i] + 0.0:<14.8f} {index:<6} {note}".rstrip())
         lines.append(f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}")
         return "\n".join([*lines, *filter(None, [self.note])])
+
+
+def _same(special: SpecialPoint, place: tuple[float, float], units: Units) -> bool:
+    """Whether a special point of a scene of these natural sizes has the load and the ordinate of a ``place``."""
+    here = (special.point.load, place[0], units.load), (special.point.ordinate, place[1], units.ordinate)
+    return all(abs(x - y) <= SAME_SPECIAL * unit(x, y, one=one) for x, y, one in here)
 
 
 class Curve(NamedTuple):

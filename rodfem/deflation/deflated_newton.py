@@ -37,7 +37,8 @@ POLE = 1e-12
 MOST = 60
 """Deflated Newton steps of one try."""
 NEAR = 1e-4
-"""Plain Newton steps below this end the deflated iteration: the plain one takes over."""
+"""Plain Newton steps below this, in the metric and relative in natural sizes, end the deflated iteration: the plain one
+takes over."""
 FLOW = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 """Reciprocal time steps of the gradient flow, over the rod's lowest bending eigenvalue."""
 
@@ -87,7 +88,7 @@ class DeflatedNewton:
             if not isfinite(size):
                 return MOST
             # the plain step measures the distance from a solution of F = 0: plain Newton converges from here
-            if max(size, step.norm() / (1.0 + x.norm())) < NEAR:
+            if max(size, system.in_units(step, -1).norm() / (1.0 + system.in_units(x, -1).norm())) < NEAR:
                 return number
             factor = self.rescaling(x, step)
             factor *= min(1.0, LARGEST / max(abs(factor) * size, TINY))

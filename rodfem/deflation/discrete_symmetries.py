@@ -113,20 +113,19 @@ def _misfit(system: System, values: np.ndarray) -> np.ndarray:
 def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) -> PETSc.Vec:
     """Add to a state smooth changes of all fields that no symmetry leaves alone; clamps are kept.
 
-    The state ``like`` of the ``system`` is changed by about ``amplitude``, in radian and lengths of the rod; ``seed``
-    is that of the random numbers.
+    The state ``like`` of the ``system`` is changed by about ``amplitude``, in radian and in natural sizes of the rod;
+    ``seed`` is that of the random numbers.
     """
-    f, named = system.fields, system.at(like).named
+    f, named, units = system.fields, system.at(like).named, system.scene.units
     rng = np.random.default_rng(seed)
     a, b = system.scene.interval
     for block in f.blocks:
-        x = (f.coordinates(block.degree) - a) / (b - a)
+        x, size = (f.coordinates(block.degree) - a) / (b - a), amplitude * units.of_field(block)
         for i in range(block.size):
-            named[block.name][:, :, i] += amplitude * sum(
-                c * np.sin(k * np.pi * x + p) for k, (c, p) in enumerate(rng.uniform(0.3, 1.0, (3, 2)), start=1)
-            )
+            waves = enumerate(rng.uniform(0.3, 1.0, (3, 2)), start=1)
+            named[block.name][:, :, i] += size * sum(c * np.sin(k * np.pi * x + p) for k, (c, p) in waves)
     for i in f.forces:
-        named[f"n{i + 1}"] += amplitude * rng.uniform(0.3, 1.0)
+        named[f"n{i + 1}"] += amplitude * units.force * rng.uniform(0.3, 1.0)
     return system.vector(f.filled(named))
 
 
@@ -155,7 +154,8 @@ def mirrors(system: System, x: PETSc.Vec, among: Sequence[Mirror] | None = None)
 
 
 def _work(system: System, x: PETSc.Vec, y: PETSc.Vec) -> tuple[float, float]:
-    """``F(x) . (y - x)`` and the product of the norms."""
+    """``F(x) . (y - x)``, and the product of the norms in natural sizes."""
     equations, change = system.new_vector(), y - x
     system.at(x).residual(equations)
-    return float(equations.dot(change)), float(equations.norm() * change.norm())
+    scale = system.in_units(equations, 1).norm() * system.in_units(change, -1).norm()
+    return float(equations.dot(change)), float(scale)

@@ -158,6 +158,7 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
                 out.append(
                     Elementary(target, ((0.0,) * 3,) * 3, tuple(x * length for x in axis), f"translation along e{i}")
                 )
+    out += _of_strains(fields)
     for name in sorted(name for name, group in groups.items() if group.motion is Motion.MIXED):
         count = len(fields.groups[groups[name]])
         for i in range(count):
@@ -166,6 +167,20 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
                 turned[i, j], turned[j, i] = 1.0, -1.0
                 out.append(Elementary(name, tuple(map(tuple, turned)), (0.0,) * count, ""))
     return tuple(out)
+
+
+def _of_strains(fields: Fields) -> list[Elementary]:
+    """Changes of the strains that are unknowns by turnings of the cross-sections of a rod in space, about each axis.
+
+    A strain that the rod constrains is zero, a stretch one.
+    """
+    free = list(fields.scene.free_strains)
+    if not free or fields.scene.normal is not None:
+        return []
+    turned, constrained = np.array([cross(axis) for axis in AXES])[:, free], np.array([0.0, 0.0, 1.0])
+    constrained[free] = 0.0
+    changed = [(x[:, free], x @ constrained) for x in turned]
+    return [Elementary("v", tuple(map(tuple, A)), tuple(c), "") for A, c in changed if A.any() or c.any()]
 
 
 def rigid_motions(parts: tuple[Elementary, ...]) -> dict[str, Symmetry]:

@@ -324,10 +324,15 @@ class System:
         """Natural size of each unknown."""
         return self.vector(self.fields.sizes, [self.scene.units.moment] * len(self.drifts))
 
+    @cached_property
+    def balanced(self) -> PETSc.Vec:
+        """Sizes of the unknowns over the root of that of energies: the second variation is of order one with them."""
+        return self.sizes * self.scene.units.energy**-0.5
+
     @property
     def natural_sizes(self) -> Sizes | None:
-        """What returns :attr:`sizes` for factors of a matrix; None where all of them are one."""
-        return None if self.scene.units.ordinary else lambda: self.sizes
+        """What returns :attr:`balanced` sizes for factors of a matrix; None where all of them are one."""
+        return None if self.scene.units.ordinary else lambda: self.balanced
 
     def matrix_in_units(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Second variation at fixed load for unknowns in units of their natural sizes."""

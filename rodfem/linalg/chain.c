@@ -47,6 +47,7 @@ typedef struct chain {
     int *unknowns, *target;  /* of all fronts; places of the entries in their fronts, row and column in turn */
     int *source;             /* places of the entries among the values of the matrix */
     int *starts, *indices, *places; /* pattern of the matrix, and places of its entries among the values given */
+    double *natural;         /* sizes of the unknowns, powers of two, from which the scale starts */
     double *scale, *work, *dense, *schur, *forward, *back;
     char *of_border;
     int *place, *left, *right;      /* place of an unknown in the front at hand; unknowns of the Schur complement */
@@ -90,7 +91,7 @@ void chain_free(chain *c)
 {
     if (!c) return;
     free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices); free(c->places);
-    free(c->scale); free(c->work); free(c->of_border); free(c->dense); free(c->schur); free(c->forward); free(c->back);
+    free(c->natural); free(c->scale); free(c->work); free(c->of_border); free(c->dense); free(c->schur); free(c->forward); free(c->back);
     free(c->place); free(c->left); free(c->right);
     free(c->order.data); free(c->panel.data); free(c->pivot.data);
     free(c);
@@ -129,18 +130,20 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *places
     c->starts = malloc((n + 1) * sizeof(int));
     c->indices = malloc((starts[n] + 1) * sizeof(int));
     c->places = malloc((starts[n] + 1) * sizeof(int));
+    c->natural = malloc((n + 1) * sizeof(double));
     c->scale = malloc((n + 1) * sizeof(double));
     c->work = malloc((n + 1) * sizeof(double));
     c->of_border = calloc(n + 1, 1);
     c->place = malloc((n + 1) * sizeof(int));
     c->left = malloc((n + 1) * sizeof(int));
     c->right = malloc((n + 1) * sizeof(int));
-    if (!c->front || !c->starts || !c->indices || !c->places || !c->scale || !c->work || !c->of_border || !c->place
+    if (!c->front || !c->starts || !c->indices || !c->places || !c->natural || !c->scale || !c->work || !c->of_border || !c->place
         || !c->left || !c->right) goto failed;
     memcpy(c->starts, starts, (n + 1) * sizeof(int));
     memcpy(c->indices, indices, starts[n] * sizeof(int));
     memcpy(c->places, places, starts[n] * sizeof(int));
     for (int i = 0; i < n; i++) owner[i] = -1;
+    for (int i = 0; i < n; i++) c->natural[i] = 1.0;
     for (int k = 0; k < starts[n]; k++) below[indices[k] + 2]++;
     for (int i = 0; i < n; i++) below[i + 2] += below[i + 1];
     for (int i = 0; i < n; i++)
@@ -224,7 +227,22 @@ failed:
     return NULL;
 }
 
-#define NOTHING 1e-30 /* an entry smaller than this, over the largest one, is zero to the equilibration */
+#define NOTHING 1e-30 /* an entry smaller than this, over the largest one off the border, is zero to the equilibration */
+
+/* Natural sizes of the unknowns, as powers of two: the scale of the next matrix starts from them.  Where a stiffness is
+   many orders below the constraints beside it the largest entries of all rows are those of constraints, which tell
+   nothing of it.  */
+void chain_sizes(chain *c, const double *sizes)
+{
+    for (int i = 0; i < c->n; i++) c->natural[i] = ldexp(1.0, ilogb(sizes[i]));
+    c->scaled = 0;
+}
+
+/* Size of the k-th entry of the matrix, in row i, for unknowns in units of their natural sizes.  */
+static double in_units(const chain *c, const double *values, int i, int k)
+{
+    return fabs(values[c->places[k]]) * c->natural[i] * c->natural[c->indices[k]];
+}
 
 static double lowered(double scale, double size, int by) /* scale / size^(1/by), in powers of two */
 {
@@ -242,7 +260,7 @@ static void equilibrate_border(chain *c, const double *values, double least)
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
             double a = fabs(values[c->places[k]]);
-            if (c->of_border[i] == c->of_border[j] || a < least) continue;
+            if (c->of_border[i] == c->of_border[j] || in_units(c, values, i, k) < least) continue;
             if (c->of_border[j]) size[j] += a * s[i];
             else if (!c->symmetric) size[i] += a * s[j];
         }
@@ -261,7 +279,7 @@ static int measure(chain *c, const double *values, double least)
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
             double a = fabs(values[c->places[k]]);
-            if (a < least) continue;
+            if (in_units(c, values, i, k) < least) continue;
             a *= mine * s[j];
             if (a > most) most = a;
             if (c->of_border[j]) { if (!c->of_border[i]) size[j] += a; continue; }
@@ -280,7 +298,7 @@ static void equilibrate(chain *c, const double *values, double least)
 {
     double *s = c->scale;
     if (c->scaled && measure(c, values, least)) return;
-    for (int i = 0; i < c->n; i++) s[i] = 1.0;
+    memcpy(s, c->natural, c->n * sizeof(double));
     for (int sweep = 0;; sweep++) {
         equilibrate_border(c, values, least);
         int serves = measure(c, values, least);
@@ -445,11 +463,12 @@ static int eliminate_general(chain *c, double *a, int m, int full, int *rows, in
 int chain_factor(chain *c, const double *values)
 {
     double most = 0, sum = 0;
-    for (int k = 0; k < c->starts[c->n]; k++) {
-        double a = fabs(values[c->places[k]]);
-        sum += a;
-        if (a > most) most = a;
-    }
+    for (int i = 0; i < c->n; i++)
+        for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
+            double a = in_units(c, values, i, k);
+            sum += a;
+            if (a > most && !(c->of_border[i] && c->of_border[c->indices[k]])) most = a;
+        }
     if (!isfinite(sum)) return 3;
     c->order.used = c->panel.used = c->pivot.used = 0;
     c->negative = c->zero = 0;

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.compiled import module
-from rodfem.linalg.factorization import AlongRod, GaveUpError, Mumps
+from rodfem.linalg.factorization import AlongRod, GaveUpError, Mumps, Sizes
 from rodfem.linalg.matrices import Entries
 
 DECLARATIONS = """
@@ -26,6 +26,7 @@ typedef struct chain chain;
 chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence, int groups,
                  const int *begin, int symmetric, int open, int largest);
 void chain_free(chain *c);
+void chain_sizes(chain *c, const double *sizes);
 int chain_factor(chain *c, const double *values);
 int chain_forward(chain *c, int k, const double *b, double *rest);
 void chain_back(chain *c, int k, const double *rest, double *x);
@@ -160,6 +161,11 @@ class Elimination:
                 "The matrix could not be factored along the rod: it has entries that are no numbers."
             )
 
+    def measure(self, sizes: np.ndarray) -> None:
+        """Let the scale of the next matrix start from the natural ``sizes`` (n,) of the unknowns."""
+        sizes = np.ascontiguousarray(sizes, dtype=float)
+        self.lib.chain_sizes(self._chain, self._pointer(sizes))
+
     def forward(self, right: np.ndarray) -> np.ndarray:
         """Eliminate from ``right`` (n, k); the right-hand sides (rest, k) of what an open chain leaves.
 
@@ -244,9 +250,12 @@ class Chain(AlongRod):
     all others.  ``regular`` is false where the last one was exactly singular; ``elimination`` has its factors.
     """
 
-    def __init__(self, kind: str, border: int, resort: Mumps | None = None) -> None:
-        """Keep the number of scalars, and the last ``resort``, for when there is a matrix of this ``kind``."""
-        super().__init__(resort)
+    def __init__(self, kind: str, border: int, resort: Mumps | None = None, sizes: Sizes | None = None) -> None:
+        """Keep the number of scalars, and the last ``resort``, for when there is a matrix of this ``kind``.
+
+        ``sizes`` returns the natural sizes of the unknowns, None where they are one.
+        """
+        super().__init__(resort, sizes)
         self.kind, self.border = kind, border
         self._matrix: PETSc.Mat | None = None
 
@@ -262,6 +271,8 @@ class Chain(AlongRod):
             entries, n = Entries(matrix), matrix.size[0]
             pattern = entries.starts, entries.columns
             self.elimination = Elimination(self.kind, *pattern, sequence(*pattern, np.arange(n - self.border, n)))
+            if self.sizes is not None:
+                self.elimination.measure(self.sizes().array_r.real)
             self._matrix, self._entries = matrix, entries  # last: there may be no memory for the fronts
 
     def adopt(self, *, regular: bool) -> None:

@@ -236,9 +236,10 @@ class AlongRod(ByColumns):
     ``times`` is the number of those matrices; ``regular`` as for all :class:`Factors`.
     """
 
-    def __init__(self, resort: Mumps | None) -> None:
-        """Keep the last ``resort``; None: :class:`GaveUpError` is raised instead."""
+    def __init__(self, resort: Mumps | None, sizes: Sizes | None) -> None:
+        """Keep the last ``resort``, or None: :class:`GaveUpError` is raised instead; and the ``sizes`` of unknowns."""
         self.resort, self.resorted, self.times, self.regular = resort, False, 0, False
+        self.sizes = sizes
 
     @abstractmethod
     def eliminate(self, matrix: PETSc.Mat) -> None:

@@ -49,6 +49,7 @@ class Piece:
         self.interface = np.unique(found[found >= 0])
         unknowns = interface[self.interface]
         others = unknowns[(unknowns < begin) | (unknowns >= end)]
+        self._own, self._others = own - begin, number[others]
         local = np.full(self._ranges[-1], -1)
         local[begin:end] = np.arange(end - begin)
         local[others] = end - begin + np.arange(len(others))
@@ -84,6 +85,14 @@ class Piece:
         self._counts = [len(part) for part in parts], [len(row) for row, _ in got]
         row, column = (np.concatenate(part) for part in zip(*got, strict=True))
         return row, column
+
+    def sizes(self, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sizes of the unknowns of this piece, and of those of the interface; collective.
+
+        ``own`` (n,) are those of the unknowns of this rank.
+        """
+        shared = np.concatenate(self.comm.allgather(own[self._own]))
+        return np.append(own, shared[self._others]), shared
 
     def values(self) -> np.ndarray:
         """Values now: those of this rank's rows, then those received; collective."""

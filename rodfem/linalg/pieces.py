@@ -29,7 +29,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.chain import Elimination, sequence
-from rodfem.linalg.factorization import AlongRod, Mumps
+from rodfem.linalg.factorization import AlongRod, Mumps, Sizes
 from rodfem.linalg.piece import Piece
 
 
@@ -40,9 +40,12 @@ class Pieces(AlongRod):
     where their processors are not: inertia and determinant are rank 0's.
     """
 
-    def __init__(self, kind: str, scalars: int, resort: Mumps | None = None) -> None:
-        """Share the last ``scalars`` unknowns of matrices of this ``kind``; keep the last ``resort``."""
-        super().__init__(resort)
+    def __init__(self, kind: str, scalars: int, resort: Mumps | None = None, sizes: Sizes | None = None) -> None:
+        """Share the last ``scalars`` unknowns of matrices of this ``kind``; keep the last ``resort``.
+
+        ``sizes`` returns the natural sizes of the unknowns, None where they are one.
+        """
+        super().__init__(resort, sizes)
         self.kind, self.scalars = kind, scalars
         self._matrix: PETSc.Mat | None = None
         self._inertia, self._determinant = (0, 0), -inf
@@ -76,6 +79,10 @@ class Pieces(AlongRod):
         pattern = piece.starts, piece.columns
         order = sequence(*pattern, piece.border)
         self.elimination = Elimination(self.kind, *pattern, order, places=piece.places, is_open=True)
+        self._shared_sizes = np.ones(piece.shared)
+        if self.sizes is not None:
+            own, self._shared_sizes = piece.sizes(self.sizes().array_r.real)
+            self.elimination.measure(own)
         self.joint = dense_elimination(self.kind, piece.shared)
 
     def _join(self, complements: tuple[np.ndarray, ...]) -> None:
@@ -84,6 +91,8 @@ class Pieces(AlongRod):
         self._mine = places[self.comm.rank]
         if self.joint.rows != len(joint):
             self.joint = dense_elimination(self.kind, len(joint))
+        if self.sizes is not None:
+            self.joint.measure(np.append(np.ones(len(joint) - self.piece.shared), self._shared_sizes))
         self.joint.factor(joint.ravel())
 
     def solve_columns(self, right: np.ndarray) -> np.ndarray:

@@ -42,10 +42,10 @@ def factors_of(
     Those of another matrix, of 0 unknowns, are MUMPS's, which is the last resort of the others.  ``controls`` are its
     ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or ``rodfem_cholesky_``, or with another
     ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.  ``sizes`` are those of the
-    unknowns for MUMPS, where they are not one; elimination along the rod finds its own scale.
+    unknowns, where they are not one.
     """
     prefix = prefix or f"rodfem_{kind}_"
     mumps = Mumps(kind, controls, thresholds, prefix, sizes)
     if not unknowns or package(prefix) == MUMPS:
         return mumps
-    return (Chain if comm.size == 1 else Pieces)(kind, scalars, mumps)
+    return (Chain if comm.size == 1 else Pieces)(kind, scalars, mumps, sizes)

@@ -105,7 +105,7 @@ def as_data(
         "ordinate": scene.ordinate.name,
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "ordinate_unit": scene.ordinate.unit,
-        "natural": {"load": scene.units.load, "ordinate": scene.units.ordinate},
+        "natural": {name: getattr(scene.units, name) for name in ("load", "ordinate", "length", "force", "moment")},
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
         "planar": scene.planar,

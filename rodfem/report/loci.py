@@ -41,13 +41,17 @@ def _special_points(one: Mapping[str, Any], data: Mapping[str, Any]) -> list[lis
         [number, special["row"]]
         for number, branch in enumerate(data["branches"])
         for special in branch["special"]
-        if special["kind"] == one["kind"] and any(_same(special, place) for place in one.get("crossings", ()))
+        if special["kind"] == one["kind"]
+        and any(_same(special, place, data.get("natural") or {}) for place in one.get("crossings", ()))
     ]
 
 
-def _same(special: Mapping[str, Any], place: Sequence[float]) -> bool:
-    here = special["load"], special["ordinate"]
-    return all(abs(x - y) <= SAME_SPECIAL * unit(x, y, one=1.0) for x, y in zip(here, place, strict=True))
+def _same(special: Mapping[str, Any], place: Sequence[float], natural: Mapping[str, float]) -> bool:
+    """Whether a special point has the load and the ordinate of a place, whose ``natural`` sizes an old file lacks."""
+    return all(
+        abs(special[name] - y) <= SAME_SPECIAL * unit(special[name], y, one=natural.get(name, 1.0))
+        for name, y in zip(("load", "ordinate"), place, strict=True)
+    )
 
 
 def _label(one: Mapping[str, Any]) -> str:

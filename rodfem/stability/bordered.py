@@ -49,9 +49,9 @@ class Bordered:
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
 
     def _sizes(self) -> PETSc.Vec:
-        """Natural sizes of the unknowns; the multipliers of the borders have none of their own."""
-        out, own = self.matrix.createVecRight(), self.system.sizes.array_r
-        out.set(1.0)
+        """Natural sizes of the unknowns; the multipliers of the borders have those of drifts."""
+        out, own = self.matrix.createVecRight(), self.system.balanced.array_r
+        out.set(self.system.scene.units.energy**0.5)
         out.array[: len(own)] = own
         return out
 

@@ -24,6 +24,7 @@ from shooting_solver import Problem, Rod
 
 from forms import loads
 from forms.energy import bending_and_twist
+from rodfem.app.run import run
 from rodfem.codim2.locus import Locus, locus
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.static_solver import StaticSolver
@@ -37,6 +38,7 @@ from rodfem.output.plot_locus import _footer, draw_locus
 from rodfem.output.stable_region import stable_region
 from rodfem.problem.ends import clamped, free, pinned
 from rodfem.problem.scene import Ordinate, Parameter, Scene
+from rodfem.report.loci import loci_of
 
 pytestmark = pytest.mark.alone
 
@@ -165,8 +167,38 @@ def test_cusp() -> None:
     assert found.ended == ("lam = 3, its bound", "lam = 3, its bound")
     assert found.values[0, 0] == pytest.approx(-found.values[-1, 0], abs=1e-9)
     assert {tuple(pair) for pair in found.index.tolist()} == {(0, 1)}
-    assert found.passes(fold) and found.passes(other)  # so that no second run writes the same curve
-    assert not found.passes(replace(other, point=replace(other.point, load=0.9 * other.point.load)))
+    units = diagram.scene.units
+    assert found.passes(fold, units) and found.passes(other, units)  # so that no second run writes the same curve
+    assert not found.passes(replace(other, point=replace(other.point, load=0.9 * other.point.load)), units)
+
+
+@pytest.mark.alone
+def test_each_special_point_has_its_locus_where_loads_are_small(tmp_path: Path) -> None:
+    """Of a DNA molecule in metres and newtons: Euler's loads about either axis, pi^2/4 B/L^2, as the thickness grows.
+
+    The loads are 1e-12 N, and all ordinates are zero.
+    """
+    length, stiffness = 1e-8, 2e-28
+    force = stiffness / length**2
+    rod = Scene(
+        name="DNA",
+        interval=(0.0, length),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, tuple(c.thickness * stiffness * x for x in (1, 1.5, 1))),
+        parameters={"P": Parameter(0.0), "thickness": Parameter(1.0)},
+        load="P",
+        ends=(clamped(), free(lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("deflection of the tip", s=length, of=lambda r, q: float(r[0])),
+        span=(0.0, 6.0 * force),
+    )
+    plan = Plan(depth=0, error_bars=False, locus=("thickness", 0.9, 1.1))
+    run(rod, Discretization("reduced", 4, 5), plan, tmp_path, figures=False, quiet=True)
+    found = [Locus.read(tmp_path / f"locus-{number}.json") for number in (1, 2)]
+    for one, factor in zip(found, (1.0, 1.5), strict=True):
+        np.testing.assert_allclose(one.values[:, 0], factor * pi**2 / 4 * one.values[:, 1] * force, rtol=1e-8)
+    data = json.loads((tmp_path / "diagram.json").read_text())
+    rows = [special["row"] for special in data["branches"][0]["special"] if special["kind"] == "branch point"]
+    assert [one["special"] for one in loci_of(tmp_path, data)] == [[[0, row]] for row in rows]
 
 
 def test_a_parameter_that_destroys_the_branch_point() -> None:

@@ -12,6 +12,7 @@ import hemitropic_cases
 import numpy as np
 import pytest
 from demo_cases import Found, explored, scene
+from rescaled import DNA, rescaled
 from shooting_solver import Problem, Rod
 
 from rodfem import pinned, trace
@@ -19,6 +20,7 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
+from rodfem.deflation.deflated_newton import DeflatedNewton
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
 from rodfem.deflation.guesses import turned_state
@@ -192,11 +194,12 @@ def test_known_state_at_another_load() -> None:
         Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
 
 
+@pytest.mark.parametrize("units", [(1.0, 1.0), DNA[:2]], ids=["1", "DNA"])
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-def test_mirrors_are_those_of_the_equations(formulation: str) -> None:
+def test_mirrors_are_those_of_the_equations(formulation: str, units: tuple[float, float]) -> None:
     expected = {"cord": {(1, -1, 1), (1, 1, -1), (1, -1, -1)}, "ruler": {(1, -1, 1)}}
     for name, signs in expected.items():
-        follower = Solver(scene(name), Discretization(formulation)).equilibria
+        follower = Solver(rescaled(scene(name), *units), Discretization(formulation)).equilibria
         found = mirrors(follower.system, follower.start(5.0))
         assert {m.signs for m in found} == signs
         x = turned_state(follower.system, follower.start(5.0), 1.0, [1, 2])
@@ -205,6 +208,20 @@ def test_mirrors_are_those_of_the_equations(formulation: str) -> None:
             assert follower.system.distance(mirror(follower.system, image), x) < 1e-12
             if formulation == "reduced" or not mirror.reversal:  # a reversal may move the reaction to the other end
                 assert force(follower, image) == pytest.approx(force(follower, x), rel=1e-12)
+
+
+def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
+    """Twelve tries of a coil, in three systems of units far from its own."""
+    counts = []
+    for length, force in (DNA[:2], (1e-3, 1e6), (1.0, 1e15)):
+        solver = Solver(rescaled(scene("cord"), length, force), Discretization("reduced", 8, 5)).equilibria
+        counts.append([])
+        for number in range(12):
+            x = turned_state(solver.system, solver.start(25.0), 0.1 + 0.12 * number, [1, number])
+            newton = DeflatedNewton(solver)
+            newton.flow(x)
+            counts[-1].append(newton.approach(x))
+    assert counts[0] == counts[1] == counts[2]
 
 
 def test_step_is_newtons_for_the_deflated_equations() -> None:

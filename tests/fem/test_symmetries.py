@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from math import hypot, pi
+from math import hypot, pi, sqrt
 
 import numpy as np
 import pytest
+import ufl
 from demo_cases import scene
 from hemitropic_cases import DEFAULT
 from hemitropic_cases import scene as hemitropic
 
 from forms.energy import bending_and_twist
+from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
+from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
 from rodfem.fem.newton import relax
@@ -26,12 +29,17 @@ def push(c: Constants) -> tuple:
     return (0.0, 0.0, -c.P)
 
 
-def column(left: End, right: End, B: float = 2.0) -> Scene:
+def sheared(v: ufl.core.expr.Expr, stiffness: float) -> ufl.core.expr.Expr:
+    """Energy of shear, alike in all directions, and of stretch."""
+    return stiffness * (v[0] ** 2 + v[1] ** 2 + 2 * (v[2] - 1) ** 2)
+
+
+def column(left: End, right: End, B: float = 2.0, rod: str = "unshearable and inextensible") -> Scene:
     return Scene(
         name="column",
         interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)),
+        rod=rod,
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)) + (sheared(v, 25.0) if rod == "flexible" else 0),
         parameters={"P": Parameter(0.0), "B": Parameter(B)},
         load="P",
         ends=(left, right),
@@ -44,12 +52,16 @@ def circle(s: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
 
 
-def ring(twisting: float = 1.5, B: float = 1.0) -> Scene:
+def ring(twisting: float = 1.5, B: float = 1.0, shearing: float = 0.0) -> Scene:
+    def energy(v, k, c: Constants):
+        out = bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, c.B, twisting))
+        return out + sheared(v, shearing) if shearing else out
+
     return Scene(
         name="ring",
         interval=(0.0, 2 * pi),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, c.B, twisting)),
+        rod="flexible" if shearing else "unshearable and inextensible",
+        energy=energy,
         parameters={"t": Parameter(0.0), "B": Parameter(B)},
         load="t",
         ends=Ring(),
@@ -68,6 +80,11 @@ CASES = [
     (scene("cord"), 0, 0),
     (ring(), 5, 8),  # three rotations, round cross-sections, along itself; three translations where there are places
     (ring(B=2.0), 4, 7),
+    (column(pinned(), SLIDING, B=1.0, rod="flexible"), 2, 2),  # shear is turned with the sections
+    (column(clamped(), free(push), B=1.0, rod="flexible"), 1, 1),
+    (column(clamped(), free(push), rod="flexible"), 0, 0),
+    (ring(shearing=25.0), 5, 8),
+    (ring(B=2.0, shearing=25.0), 4, 7),
 ]
 
 
@@ -103,6 +120,21 @@ def test_generators_are_null_vectors(formulation: str) -> None:
     for g in generators:
         assert system.norm(g) > 0.1
         assert (matrix * g).norm() < 1e-9 * matrix.norm()
+
+
+@pytest.mark.alone
+def test_round_rods_that_shear() -> None:
+    """A ring of round sections, stiff in shear, buckles where Michell's does; the number of its zeros is that one's.
+
+    A column that has buckled sideways, and may do so to all sides, is stable, as Haringx' column is.
+    """
+    (point,) = trace(ring(shearing=2.5e7), Discretization("auto", 12, 5), Plan((0.0, 1.5), depth=0)).special(
+        "branch point"
+    )
+    assert point.point.load == pytest.approx(2 / sqrt(3), abs=2e-8)
+    assert (point.negative_before, point.negative_after) == (0, 2)
+    diagram = trace(column(clamped(), free(push), B=1.0, rod="flexible"), plan=Plan((0.0, 4.0), depth=1))
+    assert {(p.negative, p.zero, p.undecided) for p in diagram["branch 1"].points[1:]} == {(0, 1, 0)}
 
 
 @pytest.mark.alone

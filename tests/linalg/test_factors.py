@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import Mumps
+from rodfem.linalg.factorization import Mumps, Sizes
 from rodfem.linalg.matrices import gathered
 from rodfem.linalg.pieces import Pieces
 from rodfem.stability.assessment import Assessor
@@ -35,11 +35,11 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
     return system, x
 
 
-def symmetric(system: System, package: str) -> Pieces | Mumps:
-    """LDL^t factors."""
+def symmetric(system: System, package: str, sizes: Sizes | None = None) -> Pieces | Mumps:
+    """LDL^t factors of matrices for unknowns of these natural sizes."""
     if package == "chain":
-        return Pieces("cholesky", system.fields.dense_rows)
-    return Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
+        return Pieces("cholesky", system.fields.dense_rows, sizes=sizes)
+    return Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}, sizes=sizes)
 
 
 def whole(vector: PETSc.Vec) -> np.ndarray:
@@ -109,12 +109,13 @@ def test_many_right_hand_sides(package: str) -> None:
 
 
 @pytest.mark.versions
-def test_natural_sizes() -> None:
-    """What MUMPS factors in units of the unknowns has the inertia, the determinant and the solutions of the matrix."""
+@PACKAGES
+def test_natural_sizes(package: str) -> None:
+    """What is factored in units of the unknowns has the inertia, the determinant and the solutions of the matrix."""
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
     inertia, sizes = Inertia(system), system.new_vector()
     sizes.array[:] = 10.0 ** np.random.default_rng(system.comm.rank).uniform(-3, 3, sizes.local_size)
-    factors = Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}, sizes=lambda: sizes)
+    factors = symmetric(system, package, lambda: sizes)
     for sigma in (-3.0, 0.1):
         matrix = inertia.at(x).matrix
         matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)

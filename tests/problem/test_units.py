@@ -14,7 +14,7 @@ from rescaled import STEEL, differences, rescaled
 
 import rodfem
 from forms.energy import bending_and_twist
-from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
+from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, sliding
 from rodfem.continuation.special_points import coupling_of
 from rodfem.output import digits
 from rodfem.problem.local_state import Constants
@@ -75,6 +75,34 @@ def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> Non
         assert [p.negative for p in a.points] == [p.negative for p in b.points]
         found = np.array([(s.point.load / load, s.point.ordinate / area) for s in b.special])
         np.testing.assert_allclose(found, [(s.point.load, s.point.ordinate) for s in a.special], rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize("units", [(1.0, 1e-35), (1e4, 1e-21)])
+def test_index_where_the_stiffness_is_lost_beside_the_constraints(units: tuple[float, float]) -> None:
+    """A rod of natural curvature, held straight between clamps that slide, buckles at 4 pi^2 B/L^2, as one without.
+
+    Its stiffness is 1e-25 and less of the constraints that are next to it in the matrix, on every row of which these
+    are the largest entries.
+    """
+    length, stiffness = units
+    force = stiffness / length**2
+    rod = Scene(
+        name="held straight",
+        interval=(0.0, length),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(
+            (k[0] - 0.3 / length, k[1], k[2]), tuple(stiffness * x for x in (1, 2, 0.8))
+        ),
+        parameters={"P": 0.0},
+        load="P",
+        ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("middle", s=length / 2, of=lambda r, q: r[0]),
+        span=(0.0, 60 * force),
+    )
+    solver = rodfem.Solver(rod, Discretization("pointwise", elements=8, degree=6))
+    for beside in (1e-2, 1e-3, 1e-4, 1e-5):
+        loads = (4 * np.pi**2 * (1 + sign * beside) * force for sign in (-1, 1))
+        assert [solver.equilibrium(load).negative for load in loads] == [0, 1]
 
 
 def aside(length: float, stiffness: float) -> Scene:

@@ -23,6 +23,7 @@ import pytest
 from output.test_formats import MESH, RUNS
 from PIL import Image
 from problem.test_docs import scenes
+from rescaled import DNA, rescaled
 from scipy.ndimage import uniform_filter
 
 from rodfem.app.run import run
@@ -97,6 +98,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run(scenes()["euler"], MESH, plan, folder / "pinned", figures=False, quiet=True)
     beck = demo_cases.scene("follower", span=(19.0, 21.0))
     run(beck, MESH, Plan(error_bars=False, locus=("J1", 0.0, 0.004)), folder / "beck", figures=False, quiet=True)
+    molecule = rescaled(scenes()["euler"], *DNA[:2], load=DNA[1])
+    plan = Plan((0.0, 12.0 * DNA[1]), depth=1, error_bars=False)
+    run(molecule, MESH, plan, folder / "molecule", figures=False, quiet=True)
     return folder
 
 
@@ -385,6 +389,21 @@ def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., 
     slope = np.diff(size) / np.maximum(np.diff(x), POINT)
     inside = (np.diff(x) > 0)[1:] & (np.diff(x) > 0)[:-1]
     assert len(size) > 100 and abs(np.diff(slope)[inside]).max() < 0.05 * abs(slope).max()
+
+
+def test_curves_along_a_molecule_fill_their_plots(opened: Callable[..., Any]) -> None:
+    """Of 1e-8 m under 1e-11 N: moments of 1e-20 N m are no line at zero, nor are forces."""
+    page = opened("molecule")
+    last = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load.length - 1)")
+    page.execute_script(f"import('report/store').then((store) => store.select(1, {last}))")
+    until(page, lambda: shown(page) == ("branch 1", last))
+    for tab in page.find_elements(By.CSS_SELECTOR, "#profile-tabs button"):
+        tab.click()
+        script = """const plot = document.getElementById('profile');
+            return [plot._fullLayout.yaxis.range, ...plot.data.map((trace) => Array.from(trace.y))]"""
+        (low, high), *curves = page.execute_script(script)
+        if tab.text != "strain":
+            assert high - low < 3 * np.ptp(curves)
 
 
 def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> None:

@@ -1,6 +1,6 @@
 // Strains, contact forces and moments along the rod, components along the directors, each by colour and dashes.
 
-import { entry, values } from "report/data";
+import { data, entry, values } from "report/data";
 import { branch, state, subscribe } from "report/store";
 import { item, lineIcon } from "report/icons";
 import { draw, empty, layout } from "report/plotting";
@@ -19,7 +19,9 @@ const LINES = [
   { color: "#d55e00", width: 2.4, dash: "7px,3px" },
   { color: "#009e73", width: 2.4, dash: "2px,2px" },
 ];
-const LEAST = 1e-4; // difference of values up to which a quantity is drawn as constant
+const { length = 1, force = 1, moment = 1 } = data.natural; // an older file has none
+const NATURAL = { v: 1, k: 1 / length, n: force, m: moment };
+const LEAST = 1e-4; // difference of values, over their natural size, up to which a quantity is drawn as constant
 const ROUND_OFF = 1e-13; // jumps, relative, below which a quantity is continuous by its discretisation
 const PAUSE = 120; // milliseconds
 const FINE = 8; // points of a curve for each interval between two that an element has
@@ -27,14 +29,14 @@ let waiting = 0, last = 0;
 let tab = Object.keys(TABS)[0];
 
 // Range of a quantity over the whole branch, so that the axes stay while the state changes.
-function range(b, first) {
+function range(b, first, natural) {
   const key = `range${first}`;
   if (!b[key]) {
     const all = values(b.profile);
     let [low, high] = [Infinity, -Infinity];
     for (let i = 0; i < all.length; i += SIZE)
       for (let k = first; k < first + 3; k++) if (!Number.isNaN(all[i + k])) [low, high] = [Math.min(low, all[i + k]), Math.max(high, all[i + k])];
-    const room = high - low > LEAST * Math.max(1, Math.abs(low)) ? 0.06 * (high - low) : 0.5;
+    const room = high - low > LEAST * Math.max(natural, Math.abs(low)) ? 0.06 * (high - low) : 0.5 * natural;
     b[key] = [low - room, high + room];
   }
   return b[key];
@@ -75,7 +77,7 @@ function redraw() {
     hovertemplate: `s = %{x:.4g}<br>${symbol}${BELOW[i]} = %{y:.5g}, ${name}<extra></extra>`,
   }));
   const how = layout("arclength s", `${tab} ${symbol}`, { margin: { l: 46, r: 10, t: 6, b: 34 }, uirevision: tab });
-  how.yaxis.range = range(b, first);
+  how.yaxis.range = range(b, first, NATURAL[symbol]);
   const jump = b.jumps[symbol][state.row], size = Math.max(...how.yaxis.range.map(Math.abs));
   error.textContent = jump > ROUND_OFF * size ? `error ≈ ${jump.toExponential(0)}` : "error: ~";
   return draw(plot, traces, how);
