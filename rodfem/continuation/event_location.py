@@ -135,9 +135,10 @@ def event_at(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
 
 
 def noise_of(solver: BranchSolver, event: Event, x: PETSc.Vec, left: PETSc.Vec | None = None) -> float:
-    """How much the value of an event varies with the round-off of a state ``x``; collective.
+    """How much the value of an ``event`` varies with the round-off of a state ``x``; collective.
 
     Newton's method has ``left`` that much there, if it is known: the more the worse the equations are conditioned.
+    ``solver`` has the mesh.
     """
     first, last = x.getOwnershipRange()
     here, most, others = event_at(solver, event, x), 0.0, list[PETSc.Vec]()

@@ -38,6 +38,8 @@ ASIDE = 1e-6
 QUADRATIC = 1e-9
 """Third differences of the stored energy, relative to its values, below which it is quadratic in the strains."""
 
+SHORTEST = 1e-15
+"""Length of a rod above which dolfinx makes a mesh of it: the round-off of one."""
 FARTHEST = 1e9
 """Arclength, over the rod's length, beyond which round-off of arclengths is seen."""
 
@@ -261,10 +263,10 @@ class Scene(Contribution):
             raise SceneError(
                 f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first."
             )
-        if not max(TINIEST, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
+        if not max(SHORTEST, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
             raise SceneError(
-                f"A rod from {a:g} to {b:g} is beyond the range of floats, or short beside its arclengths' round-off: "
-                "choose other units, or let the arclength begin at zero."
+                f"A rod from {a:g} to {b:g} is shorter than {SHORTEST:g}, beyond the range of floats, or short beside "
+                "its arclengths' round-off: choose other units, or let the arclength begin at zero."
             )
         if not isinstance(self.rod, str) or self.rod not in RODS:
             raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")

@@ -87,6 +87,14 @@ def test_what_is_sharp(f: Callable[[Any], Any], elements: int, said: bool) -> No
     assert ("about s = 0.786" in sentence or "about s = 0.785" in sentence) == said == bool(sentence)
 
 
+def test_a_layer_that_strains_follow_in_part() -> None:
+    """On 20 cubic elements the moments of the stiffness are known; a load was 1.3e-4 off, with a bar of 4e-5."""
+    layer = lambda s: 1 + 0.0447015 * ufl.erf((s - 0.1512839) / 3.135095e-3)  # noqa: E731
+    coarse, fine = Rules(4, 5, 0.5**4, strains=(2, 3)), Rules(9, 10, 0.5**9, strains=(7, 8))
+    assert "for the element from 0.1" in unresolved(scene(layer), equal(20), coarse)
+    assert unresolved(scene(layer), equal(400), fine) == ""
+
+
 def test_a_load_that_is_sharp_in_another_unit() -> None:
     """A force along a rod of a kilometre, between two beds that end at a break."""
     bed = lambda x, c: 1e-9 * ufl.conditional(ufl.lt(x.s, 500.0), 1.0, 3.0) * x.r[0] ** 2  # noqa: E731
