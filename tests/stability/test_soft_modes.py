@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from classics import ROUND, circle, column, push
+from classics import ROUND, SUPPORTS, circle, column, push
 from continuation.test_index_chain import localised
 from mpi4py import MPI
 
@@ -184,6 +184,21 @@ def test_a_mesh_that_pins_a_buckle_is_found_out_without_error_bars(elements: int
 
 
 # --- in words and pictures ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.alone
+def test_an_index_that_no_richer_mesh_confirms() -> None:
+    """At twenty times its critical load an elastica has other strains on 4 linear elements than on 2, of one index."""
+    elastica = column("elastica", SUPPORTS["clamped-free"], (0.0, 50.0))
+    for mesh, why in (
+        (Discretization("reduced", 2, 1), "another state at load 50"),
+        (Discretization("reduced", 8, 4), ""),
+    ):
+        diagram = trace(elastica, mesh, Plan(depth=1, most_branches=2, error_bars=False))
+        verdict = Solver(elastica, mesh).assess(diagram[1].points[-1])
+        assert verdict.stable
+        assert (why in verdict.uncompared) if why else verdict.uncompared == ""
+        assert ("not compared with a richer mesh" in str(verdict)) == bool(why)
 
 
 def test_words() -> None:
