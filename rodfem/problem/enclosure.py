@@ -20,7 +20,7 @@ from ufl import classes
 from ufl.corealg.traversal import unique_post_traversal
 
 from rodfem.problem.intervals import Interval, chosen, hull, number
-from rodfem.problem.values import Symbol, scalar
+from rodfem.problem.values import OTHER_NAMES, Symbol, scalar
 
 PIECES = 256
 """Pieces of the rod to begin with, about."""
@@ -197,12 +197,6 @@ RULES: dict[Any, Callable[..., Any]] = {
 """Bounds of what UFL makes of others."""
 
 
-def _erf(x: np.ndarray) -> np.ndarray:
-    from scipy import special  # takes a tenth of a second to load
-
-    return np.asarray(special.erf(x))
-
-
 def _shifted(x: Interval) -> Interval:
     return x + number(pi / 2)
 
@@ -225,6 +219,6 @@ FUNCTIONS: dict[str, tuple[Function, Callable[[Interval, Interval], Interval]]] 
     "asin": (lambda x: x.monotone(np.arcsin), lambda x, y: (ONE + -x.power(2.0)).power(-0.5)),
     "acos": (lambda x: number(pi / 2) + -x.monotone(np.arcsin), lambda x, y: -(ONE + -x.power(2.0)).power(-0.5)),
     "atan": (lambda x: x.monotone(np.arctan), lambda x, y: ONE / (ONE + x.power(2.0))),
-    "erf": (lambda x: x.monotone(_erf), lambda x, y: number(2 / sqrt(pi)) * _bell(x)),
+    "erf": (lambda x: x.monotone(OTHER_NAMES["erf"]), lambda x, y: number(2 / sqrt(pi)) * _bell(x)),
 }
 """Bounds of functions, and of their slopes by those of the argument and of the value."""
