@@ -32,13 +32,15 @@ from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import Found, nearest_event, noise_of
+from rodfem.continuation.interpolant import Node
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import NEAREST, WINDOW, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
-from rodfem.continuation.states_between import STEADY, Curve
+from rodfem.continuation.states_between import STEADY, Curve, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, halved, richer_system
+from rodfem.linalg.orthogonal import combine
 from rodfem.problem.events import Event
 from rodfem.tolerances import ROUND_OFF, round_off
 
@@ -150,10 +152,7 @@ class Enriched:
             )
         units = system.scene.units
         load, ordinate = system.scalar(x), self.solver.shape.ordinate(x)
-        equations, step = system.new_vector(), system.new_vector()
-        system.at(x).residual(equations)
-        system.solve(equations, step)
-        x.axpy(-1.0, step)
+        x = stepped(self.solver, x, row)
         last = system.scalar(x), self.solver.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
@@ -233,15 +232,35 @@ class Enriched:
             found = refine(solver, curve, 0.0, narrow * WINDOW, mode, test_function, beside=point.load)
         except ConvergenceError:  # it lies farther away
             found = refine(solver, curve, 0.0, WINDOW, mode, test_function, beside=point.load)
-        ordinate = solver.shape.ordinate(found.x)
+        settled, moved = self._settled(found.nodes, curve)
+        ordinate = solver.shape.ordinate(settled)
         slope = ordinate_along(solver, found.x, found.tangent)
-        left = abs(slope) * found.along + round_off(ordinate, self.solver.units.ordinate)
+        left = abs(slope) * found.along + STEADY * moved + round_off(ordinate, self.solver.units.ordinate)
         sharp, indicator = solver.inertia.held.sharpened(mode), self._indicators[1]  # by the factors of a state nearby
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(mode, sharp, state=False))
         self.origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
-        ordinate_error = self._ordinate(point.x, found.x, left, rho)
+        ordinate_error = self._ordinate(point.x, settled, left, rho)
         return Again(found.x, found.load, ordinate, found.uncertainty, left, ordinate_error, rho, changed)
+
+    def _settled(self, nodes: Sequence[Node], curve: Curve) -> tuple[PETSc.Vec, float]:
+        """A state between ``nodes`` on a curve after more steps of Newton's method at each.
+
+        Also the size of what yet more of them, which are round-off, move its ordinate by.  An ordinate may have its
+        least value there: both directions are tried.
+        """
+        solver, weights, states, left = self.solver, [node.weight for node in nodes], [], []
+        for node in nodes:
+            row = solver.row(curve(node.s)[1])
+            states.append(stepped(solver, node.x, row))
+            left.append(stepped(solver, states[-1], row) - states[-1])
+        x = combine(states, np.array(weights))
+        here = solver.shape.ordinate(x)
+        moved = [
+            max(abs(solver.shape.ordinate(x + step * (sign * weight)) - here) for sign in (-1.0, 1.0))
+            for step, weight in zip(left, weights, strict=True)
+        ]
+        return x, float(sum(moved))
 
 
 def _noise_beside(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec) -> float:

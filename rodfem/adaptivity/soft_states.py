@@ -24,7 +24,7 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.locate import across
-from rodfem.continuation.states_between import STEADY
+from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
@@ -273,7 +273,7 @@ def _nearest(
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
     The first ``left_out`` of them at the ``point``, and those of the vectors ``still``, are no part of that number.
-    What arithmetic leaves open of the state, one more step of Newton's method tells, by the factors of the last one.
+    What arithmetic leaves open of the state, one more step of Newton's method tells.
     """
     found = solver.inertia.at(point.x)
     found.count()
@@ -284,15 +284,8 @@ def _nearest(
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale
     rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])
-    stepped = solver.inertia.at(_stepped(solver, point.x))
-    moved = abs(np.array([v.dot(stepped.matrix * v).real for v in vectors]) - values)
+    row = solver.axis if point.tangent is None else solver.row(point.tangent)
+    settled = solver.inertia.at(stepped(solver, point.x, row))
+    moved = abs(np.array([v.dot(settled.matrix * v).real for v in vectors]) - values)
     order = np.argsort(values)
     return values[order], (rounding + STEADY * moved)[order]
-
-
-def _stepped(solver: BranchSolver, x: PETSc.Vec) -> PETSc.Vec:
-    """Equilibrium after one more step of Newton's method, by the factors of the last one."""
-    system = solver.system
-    equations, step = system.new_vector(), system.new_vector()
-    system.at(x).residual(equations)
-    return x - step if system.solve(equations, step) else x

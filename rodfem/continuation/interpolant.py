@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -40,6 +41,14 @@ class Sample:
     found: Factored
 
 
+class Node(NamedTuple):
+    """A node of an interpolant: parameter ``s``, state ``x``, and ``weight`` of it in the interpolated state."""
+
+    s: float
+    x: PETSc.Vec
+    weight: float
+
+
 @dataclass
 class Located:
     """A zero found on a piece of a branch: parameter, state, direction, load, slope of the load, uncertainty, index.
@@ -47,6 +56,7 @@ class Located:
     The ``uncertainty`` is of the load, ``along`` is that of the parameter, and ``arithmetic`` the part of the first
     that no sharper interpolation lowers.  At the parameter ``s`` the state is ``x``, the direction ``tangent``, and
     ``slope`` the load's derivative along it, ``rate`` that of the eigenvalue; the index is ``before`` and ``after`` it.
+    The state is the sum of those at the ``nodes`` times their weights.
     """
 
     s: float
@@ -60,6 +70,7 @@ class Located:
     along: float
     arithmetic: float
     rate: float
+    nodes: list[Node]
 
 
 def interpolate(
@@ -107,6 +118,7 @@ def interpolate(
         *(middle + half * root, x, tangent, load_at, slope_at / half, max(tail - floor, 0.0) + arithmetic),
         *(before[-1], after[0], half * (left + moved), arithmetic),
         float(chebyshev.chebval(root, chebyshev.chebder(mu))) / half,
+        [Node(p.s, p.x, float(w)) for p, w in zip(samples, weights, strict=True)],
     )
 
 

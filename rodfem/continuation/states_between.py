@@ -30,6 +30,8 @@ APART = 1e-9
 """Least distance of two states of the curve, relative to it: two that are nearer tell no direction."""
 STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
+SETTLES = 1e-2
+"""Distance, in the metric, that a state which was solved for with damping may move without it."""
 ALONG = 0.9
 """Cosine between the curve and the tangent of a branch below which that is the tangent of another one."""
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
@@ -171,18 +173,37 @@ class EventCurve:
         return min(self.solved, key=lambda knot: abs(knot.s - s))
 
 
+def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
+    """The equilibrium ``x`` of a mesh after more steps of Newton's method, one where that makes no difference.
+
+    They are made on the plane across ``row``, with factors of that state, and without damping: where an equilibrium was
+    solved for with it, its factors see little of what a soft mode has left.  A state that slides away along a family
+    makes one step with damping.  ``solver`` has the mesh.
+    """
+    system, settled = solver.system, x.copy()
+    given = system.damping
+    try:
+        system.damping = 0.0
+        if correct(system, settled, row, reach=SETTLES).converged:
+            return settled
+    finally:
+        system.damping = given
+    equations, step, state = system.new_vector(), system.new_vector(), system.at(x)
+    system.set_phase(x)
+    state.residual(equations)
+    state.factor(row, damping=given or solver.inertia.tolerance)
+    return x - step if system.solve(equations, step) else x
+
+
 def solved_on(solver: BranchSolver, curve: Curve, s: float, aside: float) -> Solved:
     """The equilibrium across a ``curve`` at ``s``, or ``aside`` of it; raises :class:`ConvergenceError`.
 
     ``solver`` has the mesh.
     """
     x, there = solve_beside(solver, curve, s, aside)
-    system = solver.system
-    equations, left = system.new_vector(), system.new_vector()
-    system.at(x).residual(equations)
-    system.solve(equations, left)
     direction = curve(there)[1]
     row = solver.row(direction)
+    left = x - stepped(solver, x, row)
     try:
         tangent = solver.tangent(row, at=x)
         slope = float(row.dot(tangent))
@@ -190,5 +211,5 @@ def solved_on(solver: BranchSolver, curve: Curve, s: float, aside: float) -> Sol
         slope = 0.0
     if slope < ALONG:  # the curve knows the direction better
         return Solved(s, there, x, direction, left)
-    tangent.scale(system.norm(direction) / slope)
+    tangent.scale(solver.system.norm(direction) / slope)
     return Solved(s, there, x, tangent, left)

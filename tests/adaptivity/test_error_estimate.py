@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import reference_values
 from classics import SUPPORTS, column
+from hard.fuzz import wider
 from mpi4py import MPI
 from scipy.integrate import OdeSolution, solve_ivp
 from scipy.optimize import brentq
@@ -256,6 +257,18 @@ def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch)
     moved = abs(again.ordinate - stopped[0])
     assert again.ordinate_left == pytest.approx(error_estimate.STEADY * moved, rel=1e-3)
     assert moved > 1e-6
+
+
+@pytest.mark.alone
+def test_ordinate_of_a_branch_point_beside_a_soft_mode() -> None:
+    """A nearly round column (1e-8) buckles; where it is straight its mode may turn by 1e-9, and 3e-10 are measured."""
+    scene = wider.scene(14, 454)[0]
+    bars = []
+    for mesh in (Discretization("auto", 5, 6), Discretization("pointwise", 7, 5)):
+        (lost,) = (s for s in trace(scene, mesh, Plan(depth=0))[0].special if s.kind == BRANCH_POINT)
+        assert 0.0 <= lost.point.ordinate <= lost.ordinate_error
+        bars.append(lost.ordinate_error)
+    assert max(bars) < 1e-8
 
 
 @pytest.mark.alone
