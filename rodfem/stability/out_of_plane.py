@@ -12,7 +12,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.problem.ring import CLOSING_MOMENT
 from rodfem.stability.inertia import NULL, Factored, Index, Inertia
-from rodfem.stability.round_off import SPARE, quotient_error
+from rodfem.stability.round_off import inside_band, quotient_error
 from rodfem.tolerances import same_place
 
 PUSHED = 1e-8
@@ -52,19 +52,18 @@ class InSpace:
         """Number of negative eigenvalues in space of the planar equilibrium ``x``; raises as :meth:`count` does.
 
         Those out of the plane that the count has as zero are decided by their Rayleigh quotients: symmetries in space
-        are left out, and a rod that is nearly symmetric may fall out of its plane slowly.
+        are left out, and a rod that is nearly symmetric may fall out of its plane slowly.  Raises
+        :class:`ConvergenceError` where they are not told apart.
         """
         found = self.at(x)
         index = found.count()
         near = index.zero - found.drifts
         if near <= 0:
             return index.negative
-        _, vectors = found.nearest(near + SPARE, NULL)
-        values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
+        values, vectors = inside_band(found, near, NULL)
         falling = [
             value < -quotient_error(found.matrix, v) and self._share(v) > MOSTLY
             for value, v in zip(values, vectors, strict=True)
-            if abs(value) <= self.inertia.tolerance
         ]
         return index.negative + int(sum(falling))
 

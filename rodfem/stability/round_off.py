@@ -78,7 +78,7 @@ def decide(found: Factored) -> Decision:
             f"{inside} eigenvalues are within round-off of the count, {inertia.resolution:.2g} in the metric: the mesh "
             "is too fine for this rod; use fewer elements of a higher degree."
         )
-    theta, vectors = _inside(found, inside)
+    theta, vectors = inside_band(found, inside)
     doubt = np.array([max(quotient_error(found.matrix, v), least) for v in vectors])
     negative = int((theta < -doubt).sum())
     zero = int((abs(theta) <= doubt).sum())
@@ -86,10 +86,10 @@ def decide(found: Factored) -> Decision:
     return Decision(index, inertia.tolerance, theta, doubt)
 
 
-def _inside(found: Factored, number: int, accuracy: float = DECIDED) -> tuple[np.ndarray, list[PETSc.Vec]]:
-    """Rayleigh quotients and vectors of the ``number`` eigenvalues inside the band of the count, which were counted.
+def inside_band(found: Factored, number: int, accuracy: float = DECIDED) -> tuple[np.ndarray, list[PETSc.Vec]]:
+    """Rayleigh quotients and vectors of the ``number`` eigenvalues inside the band of the count, which were ``found``.
 
-    Those near zero are as accurate as asked for, the others are accurate enough for their signs.  Raises
+    Those near zero have the relative ``accuracy``, the others are accurate enough for their signs.  Raises
     :class:`ConvergenceError` where others are found than were counted.
     """
     inertia = found.inertia
@@ -119,7 +119,7 @@ def resolve(found: Factored) -> tuple[int, int]:
     near = index.zero - found.drifts
     if near <= 0:
         return index.negative, index.negative
-    theta, vectors = _inside(found, near, NULL)
+    theta, vectors = inside_band(found, near, NULL)
     doubt = np.array([quotient_error(found.matrix, v) for v in vectors])
     return index.negative + int((theta < -doubt).sum()), index.negative + int((theta <= doubt).sum())
 
@@ -133,7 +133,7 @@ def clear_of_zero(found: Factored) -> int:
     near = found.count().zero - found.drifts
     if near <= 0:
         return 0
-    theta, vectors = _inside(found, near, NULL)
+    theta, vectors = inside_band(found, near, NULL)
     doubt = [max(quotient_error(found.matrix, v), TOLERANCE * inertia.scale) for v in vectors]
     return int((abs(theta) > doubt).sum())
 
