@@ -30,11 +30,12 @@ from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
 from rodfem.diagram.unfollowed import Unfollowed
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
 from rodfem.problem.fast_load import FastLoad
 from rodfem.stability.census import census
 from rodfem.stability.cluster import Cluster
+from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.frequencies import REAL, Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import unit
@@ -128,6 +129,8 @@ class Sweep:
                 state = self._next(load, x)
                 if self.latest and (why := self._lost_convexity(self.latest[-1].x, state)):
                     return why
+                if why := self._dependent(state):
+                    return why
                 self.latest = [*self.latest[1 - ROWS :], self._point(state)]
                 for notice in self.solver.notices():
                     self.observer.warn(notice)
@@ -161,6 +164,20 @@ class Sweep:
         if not found.resolved:
             self.observer.warn(unresolved(name, *(solver.system.scalar(x) for x in (a, b))))
         return "" if found.lost is None else solver.not_convex(state(found.lost))
+
+    def _dependent(self, x: PETSc.Vec) -> str:
+        """Why a sweep ends before the equilibrium ``x``; empty where its constraints do not depend on one another.
+
+        Where they do, as those of a rod that is pulled taut, frequencies are not defined.
+        """
+        if self.latest and may_depend(self.solver.shape, x):
+            try:
+                require_independent_constraints(self.solver.shape, x)
+            except SceneError as trouble:
+                why = f"no frequencies at {self._load} = {self.solver.system.scalar(x):.8g}: {trouble}"
+                self.observer.warn(why)
+                return why
+        return ""
 
     def _take(self, branch: Branch, rows: list[Row]) -> None:
         """Take rows of the grid into a branch, and the special points before each."""

@@ -62,11 +62,14 @@ which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than t
 NEAR = 10.0
 """Times the distance from the shift of the nearest eigenvalue, or of zero, within which another is none of those."""
 DOUBT = 1e-4
-"""Relative round-off of an eigenvalue above which it is infinite: its vector hardly moves.
+"""Relative round-off of an eigenvalue above which it may be infinite: its vector hardly moves.
 
-It is that of the stiffness over the kinetic energy of the vector: 5e-4 and more for such, 2e-5 and less for others.
-Beside a body of 1e4 times its mass a light rod has them among the finite ones.
+It is that of the stiffness over the kinetic energy of the vector: 5e-4 and more for such.  Beside a body of 1e4 times
+its mass a light rod has them among the finite ones.  It is 2e-5 and less for others, but for a rod that cannot stretch
+and is nearly taut, of whose vectors the forces are the largest part.
 """
+AGAIN = 1e-3
+"""Relative difference of a finite eigenvalue from one shift and from another: 3e-5 and less, of others 0.2 and more."""
 LOST = 1e-6
 """Relative round-off of the kinetic energy above which an eigenvalue has no digits: beside a body of 1e9 masses of the
 rod."""
@@ -302,10 +305,28 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return [_Pair(complex(w), [x.real.copy(), x.imag.copy()], EPS) for w, x in zip(values, own.T, strict=True)]
 
     def _shifted(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
-        """Solve with a shift that this PETSc's numbers can express."""
+        """Solve with a shift that this PETSc's numbers can express.
+
+        What may be infinite, for its round-off, is sought from another shift: finite eigenvalues are found again.
+        """
+        found = self._pairs(number, target, matrix, mass)
+        if any(doubtful for _, doubtful in found):
+            others = [p.value for p, doubtful in self._pairs(number, target + SHIFT, matrix, mass) if doubtful]
+            found = [
+                (pair, doubtful)
+                for pair, doubtful in found
+                if not doubtful or any(abs(pair.value - v) <= AGAIN * abs(v) for v in others)
+            ]
+        return [pair for pair, _ in found][: number + SPARE]
+
+    def _pairs(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[tuple[_Pair, bool]]:
+        """Eigenpairs that have digits, nearest to the shift first, and whether each may be an infinite one.
+
+        There are ``number`` or more, as in :meth:`near`, that are finite.
+        """
         solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
         re, im = matrix.createVecRight(), matrix.createVecRight()
-        values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], []
+        values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], list[tuple[_Pair, bool]]()
         stiffness, inertia = EPS * self._stiffness(matrix), EPS * mass.norm(PETSc.NormType.INFINITY)
         heavy = mass.getDiagonal()
         heavy.array[:] = abs(heavy.array_r) > 0
@@ -317,12 +338,14 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             kinetic = sum(abs(x.dot(mass * x)) for x in (re, im))
             moved = sum((x * heavy).norm() ** 2 for x in (re, im))
             noise = stiffness * (re.norm() ** 2 + im.norm() ** 2)
-            if abs(value - target) > far and (noise > DOUBT * size * kinetic or inertia * moved > LOST * kinetic):
+            beyond = abs(value - target) > far
+            if beyond and inertia * moved > LOST * kinetic:
                 continue
             parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
-            out.append(_Pair(complex(value), [part[self._own].copy() for part in parts], error))
-            if len(out) == number + SPARE:
+            pair = _Pair(complex(value), [part[self._own].copy() for part in parts], error)
+            out.append((pair, bool(beyond and noise > DOUBT * size * kinetic)))
+            if sum(not doubtful for _, doubtful in out) == number + SPARE:
                 break
         solver.destroy()
         return out

@@ -31,6 +31,8 @@ ZERO, NEAR = 1e-7, 1e-4
 """An eigenvalue less than the first, over the lowest bending one, is zero; between the two it may be either."""
 OF_A_RING = 1e-2
 """The second where a closed rod may move along itself: the mesh's eigenvalue of that motion."""
+LAST = 0.99
+"""Share of the greatest recorded frequencies below which none is missing."""
 SQUARE = 1e-5
 """Relative difference of two values of omega^2 that are one: double ones have half of the digits."""
 SURE = 0.1
@@ -206,9 +208,14 @@ def frequencies_of(oracle: Oracle, point: Point) -> str | None:
     apart = abs(mine[:, None] - dense).min(axis=1) / np.maximum(abs(mine), one)
     dense = dense[abs(dense) > NEAR * one]
     close = [abs(a - b) < 1e-3 * max(abs(a), one) for a, b in pairwise(sorted(dense[:FREQUENCIES], key=abs))]
+    unsure = oracle.noise > SURE * SQUARE or any(close)
     if apart.max() > SQUARE:
-        worst, unsure = int(apart.argmax()), oracle.noise > SURE * SQUARE
-        return None if unsure or any(close) else f"omega^2 = {mine[worst]:.8g} is none of {dense[:FREQUENCIES]}"
+        worst = int(apart.argmax())
+        return None if unsure else f"omega^2 = {mine[worst]:.8g} is none of {dense[:FREQUENCIES]}"
+    among = dense[(abs(dense) < LAST * abs(mine).max()) & (dense.real < LAST * mine.real.max())]
+    missing = among[(abs(among[:, None] - mine) > SQUARE * np.maximum(abs(among), one)[:, None]).all(axis=1)]
+    if len(missing):
+        return None if unsure else f"omega^2 = {missing[0]:.8g} is missing among {mine}"
     return ""
 
 
