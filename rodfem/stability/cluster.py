@@ -88,12 +88,28 @@ def members(
         share = (abs(inside) ** 2).sum(axis=0) / energy
         if abs(cluster.mean) > beside:
             share[abs(found.values) < STILL * found.far] = 0.0
-        chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
+        chosen = closed(found.values, share, size)
         values = found.values[chosen]
-        closed = abs(values.imag.sum()) < REAL * abs(values).max()
-        if len(chosen) == size and closed and share[chosen].min() > least:
+        if len(chosen) == size and share[chosen].min() > least:
             return found, chosen, values
     raise ConvergenceError(f"the {size} eigenvalues near {cluster.mean:.6g} are not found again")
+
+
+def closed(values: np.ndarray, share: np.ndarray, size: int) -> list[int]:
+    """Places of the ``size`` ones of eigenvalues (k,) with the greatest shares (k,), closed under conjugation.
+
+    Where a third one comes by it may have a greater share than one of a complex pair.  Fewer are returned where there
+    are not as many.
+    """
+    order = np.argsort(-share, kind="stable")
+    above, real = (order[of[order]] for of in (values.imag > 0, values.imag == 0))
+    partner = [int(np.argmin(abs(values - values[i].conj()))) for i in above]
+    best: list[int] = []
+    for pairs in range(min(len(above), size // 2) + 1):
+        chosen = [*above[:pairs].tolist(), *partner[:pairs], *real[: size - 2 * pairs].tolist()]
+        if (len(chosen), share[chosen].sum()) > (len(best), share[best].sum()):
+            best = chosen
+    return sorted(best)
 
 
 def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:

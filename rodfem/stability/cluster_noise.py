@@ -11,6 +11,9 @@ to first order.  Errors of the entries of ``S``, independent and ``eps |S_ij|`` 
 
 Bases of the subspaces may be any: ``Z`` is the same.  A Chebyshev interpolant shows no more of this than scatters from
 load to load: rounding of one matrix at neighbouring loads is much the same.
+
+The error of the eigensolver comes to that.  ``W^t S V`` with both bases is in error by the product of theirs, so that
+it tells how far off are the eigenvalues by which the cluster was measured (Parlett, Math. Comput. 28 (1974) 679).
 """
 
 from __future__ import annotations
@@ -27,10 +30,15 @@ from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 
 class ClusterNoise(NamedTuple):
-    """Uncertainty of the ``mean`` and of the ``discriminant`` of a cluster by round-off in the matrix."""
+    """Uncertainty of the ``mean`` and of the ``discriminant`` of a cluster by round-off in the matrix.
+
+    What the eigensolver left open of the two, ``mean_left`` and ``discriminant_left``, is added to it.
+    """
 
     mean: float
     discriminant: float
+    mean_left: float
+    discriminant_left: float
 
 
 def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
@@ -54,4 +62,7 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
         squares = abs(rows.data * np.einsum("ij,ij->i", np.repeat(left, np.diff(rows.indptr), 0), every[rows.indices]))
         return float(NOISE * EPS / size * np.sqrt(pencil.system.comm.allreduce(float(squares @ squares))))
 
-    return ClusterNoise(of(W), of(2 * W @ B.T))
+    off = float(np.trace(B)) / size
+    inside = B - off * np.eye(size)
+    discriminant = float(np.trace(inside @ inside)) / size
+    return ClusterNoise(of(W), of(2 * W @ B.T), abs(off), abs(discriminant - measured.discriminant))

@@ -9,11 +9,12 @@ import classics
 import numpy as np
 import pytest
 import rescaled
+from hard.fuzz import wider
 
-from rodfem import Discretization, Parameter, Scene, Solver
+from rodfem import Discretization, Parameter, Plan, Scene, Solver, trace
 from rodfem.diagram.held import at_load
 from rodfem.linalg.matrices import gathered
-from rodfem.stability.cluster import Measured, cluster_of, measure
+from rodfem.stability.cluster import Measured, closed, cluster_of, measure
 from rodfem.stability.cluster_noise import noise_of
 from rodfem.stability.inertia import EPS, NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
@@ -56,3 +57,41 @@ def test_noise_of_eigenvalues_that_meet(make: Callable[[], Scene], size: int) ->
     scale = RELATIVE / (NOISE * EPS)
     assert np.std(means) == pytest.approx(scale * noise.mean, rel=0.3)
     assert np.std(discriminants) == pytest.approx(scale * noise.discriminant, rel=0.3)
+
+
+def test_what_an_eigensolver_leaves_open() -> None:
+    """Errors that are given to the mean, and to D, of two eigenvalues."""
+    pencil, measured = nearly_met(classics.beck(), 19.0, 2)
+    own, mean = noise_of(pencil, measured), measured.cluster.mean
+    assert own.mean_left < 1e-9 * mean and own.discriminant_left < 1e-9 * measured.discriminant
+    shifted = replace(measured, cluster=replace(measured.cluster, mean=mean * (1 + 1e-6)))
+    assert noise_of(pencil, shifted).mean_left == pytest.approx(1e-6 * mean, rel=1e-3)
+    off = replace(measured, discriminant=measured.discriminant * (1 + 1e-6))
+    assert noise_of(pencil, off).discriminant_left == pytest.approx(1e-6 * measured.discriminant, rel=1e-3)
+
+
+def test_flutter_of_steel_by_other_factors() -> None:
+    """MUMPS leaves 1e-10 of a flutter load in newtons; that is in its bar."""
+    scene = wider.scene(14, 463)[0]
+    first, other = (
+        next(s for s in trace(scene, Discretization("pointwise", 12, 5, factors=how), Plan())[0].special if s.omega2)
+        for how in ("chain", "petsc")
+    )
+    assert abs(first.point.load - other.point.load) < other.error_estimate < 1e-8 * first.point.load
+
+
+@pytest.mark.parametrize(
+    ("values", "share", "size", "chosen"),
+    [
+        ([1, 2, 3], [0.1, 0.9, 0.8], 2, [1, 2]),
+        ([1, 2 + 1j, 2 - 1j], [0.9, 0.6, 0.6], 2, [1, 2]),
+        ([1, 3, 2 + 1j, 2 - 1j], [0.9, 0.8, 0.6, 0.6], 2, [0, 1]),
+        ([1, 2 + 1j, 2 - 1j, 3 + 1j, 3 - 1j], [0.1, 0.8, 0.8, 0.7, 0.7], 4, [1, 2, 3, 4]),
+        ([1, 2 + 1j, 2 - 1j], [0.9, 0.6, 0.6], 1, [0]),
+        ([2 + 1j, 2 - 1j], [0.6, 0.6], 1, []),
+    ],
+)
+def test_a_cluster_is_closed_under_conjugation(
+    values: list[complex], share: list[float], size: int, chosen: list[int]
+) -> None:
+    assert closed(np.array(values, dtype=complex), np.array(share), size) == chosen
