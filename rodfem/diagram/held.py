@@ -7,20 +7,30 @@ from petsc4py import PETSc
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError, SceneError
 
+PARTS = (1, 2, 4, 8)
+"""Numbers of steps to a load that are tried, one after the other."""
 DRIVEN = 1e-7
 """Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 
 
 def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
-    """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none.
+    """Equilibrium at a load from a ``guess`` nearby, in more and more steps; there may be none.
+
+    That raises :class:`ConvergenceError`.  ``solver`` has the mesh.
 
     Raises :class:`SceneError` where a load drives a motion that nothing holds.
     """
-    x, outcome = solver.at_load(guess, load)
-    if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
-    require_held(solver, x)
-    return x
+    begin = solver.system.scalar(guess)
+    for parts in PARTS:
+        x, converged = guess, True
+        for part in range(1, parts + 1):
+            x, outcome = solver.at_load(x, load if part == parts else begin + (load - begin) * part / parts)
+            if not (converged := outcome.converged):
+                break
+        if converged:
+            require_held(solver, x)
+            return x
+    raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
 
 
 def require_held(solver: StaticSolver, x: PETSc.Vec) -> None:

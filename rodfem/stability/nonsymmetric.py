@@ -97,11 +97,16 @@ SPARE = 2
 
 @dataclass(frozen=True)
 class _Pair:
-    """An eigenvalue, the real and imaginary part of its vector on this rank, and its backward error."""
+    """An eigenvalue, the real and imaginary part of its vector on this rank, and its backward error.
+
+    A ``noisy`` one has more round-off than :data:`DOUBT`: far from the shift it is ``doubtful``, an infinite one maybe.
+    """
 
     value: complex
     parts: list[np.ndarray]
     error: float
+    noisy: bool = False
+    doubtful: bool = False
 
     @property
     def vector(self) -> np.ndarray:
@@ -191,12 +196,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return self.left(number + BEYOND, SHIFT * self.system.scene.units.omega2)
 
     def left(self, number: int, target: complex) -> Frequencies:
-        """Return those of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
+        """Return those of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation.
+
+        They have no parts along free motions ``g``: of ``S g = 0`` follows ``z.Mg = 0``.
+        """
         matrix, mass = self._whole()
         transposed = matrix.copy()
         transposed.transpose()
         try:
-            return self._near(number, target, transposed, mass)
+            return self._near(number, target, transposed, mass, left=True)
         finally:
             transposed.destroy()
 
@@ -209,7 +217,9 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         whole, mass = (petsc_matrix(MPI.COMM_SELF, gathered(matrix)) for matrix in pencil)
         return whole, mass
 
-    def _near(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> Frequencies:
+    def _near(
+        self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat, *, left: bool = False
+    ) -> Frequencies:
         target /= self.system.scene.units.omega2
         with self.system.clock("stability"):
             if matrix.getSize()[0] < DENSE * (2 * number + 20):
@@ -222,23 +232,27 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
             vectors = np.stack([p.vector for p in found], axis=1)
-            return self.frequencies(np.array([p.value for p in found]), np.array([p.error for p in found]), vectors)
-
-    def frequencies(self, values: np.ndarray, errors: np.ndarray, vectors: np.ndarray) -> Frequencies:
-        """Frequencies from eigenvalues (k,) and vectors (n, k), complex, of the pencil in units of natural sizes."""
-        return named(self.system, [(self.unnamed(values, errors, vectors), self.turned)])[0]
+            values, errors = np.array([p.value for p in found]), np.array([p.error for p in found])
+            return named(self.system, [(self.unnamed(values, errors, vectors, left=left), self.turned)])[0]
 
     def unnamed(
-        self, values: np.ndarray, errors: np.ndarray, vectors: np.ndarray, weighed: np.ndarray | None = None
+        self,
+        values: np.ndarray,
+        errors: np.ndarray,
+        vectors: np.ndarray,
+        weighed: np.ndarray | None = None,
+        *,
+        left: bool = False,
     ) -> Frequencies:
         """Frequencies of ``values`` with their ``errors`` and ``vectors`` before their motions are named.
 
-        The ``weighed`` vectors are the products with the mass, in the same units, where they are known.
+        Vectors (n, k) are complex, in units of natural sizes, and those of the transposed pencil where they are
+        ``left`` ones.  The ``weighed`` vectors are the products with the mass, in the same units, where they are known.
         """
         units = self.system.scene.units
         if not units.ordinary:
             values, vectors, weighed = values * units.omega2, vectors * self.sizes.array_r.real[:, None], None
-        if self._free:
+        if self._free and not left:
             vectors, weighed = vectors.astype(complex), None
             self._complete(values, vectors)
         order = np.lexsort((values.imag, np.round(values.real / units.omega2, 9)))
@@ -316,23 +330,20 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         What may be infinite, for its round-off, is sought from another shift: finite eigenvalues are found again.
         """
         found = self._pairs(number, target, matrix, mass)
-        if any(doubtful for _, doubtful in found):
-            others = [p.value for p, doubtful in self._pairs(number, target + SHIFT, matrix, mass) if doubtful]
+        if any(pair.doubtful for pair in found):
+            others = [pair.value for pair in self._pairs(number, target + SHIFT, matrix, mass) if pair.noisy]
             found = [
-                (pair, doubtful)
-                for pair, doubtful in found
-                if not doubtful or any(abs(pair.value - v) <= AGAIN * abs(v) for v in others)
+                pair
+                for pair in found
+                if not pair.doubtful or any(abs(pair.value - v) <= AGAIN * abs(v) for v in others)
             ]
-        return [pair for pair, _ in found][: number + SPARE]
+        return found[: number + SPARE]
 
-    def _pairs(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[tuple[_Pair, bool]]:
-        """Eigenpairs that have digits, nearest to the shift first, and whether each may be an infinite one.
-
-        There are ``number`` or more, as in :meth:`near`, that are finite.
-        """
+    def _pairs(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
+        """Eigenpairs that have digits, nearest to the shift first; ``number`` or more of them are finite."""
         solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
         re, im = matrix.createVecRight(), matrix.createVecRight()
-        values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], list[tuple[_Pair, bool]]()
+        values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], list[_Pair]()
         stiffness, inertia = EPS * self._stiffness(matrix), EPS * mass.norm(PETSc.NormType.INFINITY)
         heavy = mass.getDiagonal()
         heavy.array[:] = abs(heavy.array_r) > 0
@@ -351,9 +362,10 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
             if abs(value.imag) <= DRAWN * _off(matrix, mass, value, re, im):
                 value = value.real
-            pair = _Pair(complex(value), [part[self._own].copy() for part in parts], error)
-            out.append((pair, bool(beyond and noise > DOUBT * size * kinetic)))
-            if sum(not doubtful for _, doubtful in out) == number + SPARE:
+            noisy = bool(noise > DOUBT * size * kinetic)
+            own = [part[self._own].copy() for part in parts]
+            out.append(_Pair(complex(value), own, error, noisy, beyond and noisy))
+            if sum(not pair.doubtful for pair in out) == number + SPARE:
                 break
         solver.destroy()
         return out

@@ -1,0 +1,44 @@
+"""None of the first frequencies is missing where round-off is large, against dense linear algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hard.fuzz import wider
+from hard.fuzz.comparison import meshes
+from hard.fuzz.oracle import Oracle
+
+from rodfem import Discretization, Plan, Solver, trace
+from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
+
+pytestmark = pytest.mark.alone
+
+
+def check(found: np.ndarray, dense: np.ndarray) -> None:
+    """Compare the first real frequencies (k,) that were found with all (n,) by dense matrices."""
+    every = np.sort(dense.real)[: len(found)]
+    assert abs(found - every).max() < 1e-6 * every[-1]
+
+
+@pytest.mark.parametrize("number", [172, 175])
+def test_a_sweep_ends_where_the_rod_is_taut(number: int) -> None:
+    """The tension of a taut rod is any, and so are its frequencies: 115.9 and -21.7 were recorded for one state.
+
+    Nearly taut, the forces are the largest part of the vectors of some motions.
+    """
+    diagram = trace(wider.scene(15, number)[0], Discretization("auto", 5, 6), Plan(error_bars=False))
+    (branch,) = diagram
+    assert branch.ended.startswith("no frequencies at P = 0: Constraints depend on one another")
+    assert branch.ended in diagram.warnings
+    oracle = Oracle(diagram.solvers[0].system)
+    for point in branch.points[-3:]:
+        check(np.array([value for value, _ in point.omega2]), oracle.squares(point.x))
+
+
+def test_an_element_of_6e_7() -> None:
+    """Its stiffness is so large that finite eigenvalues have the round-off of infinite ones."""
+    scene = wider.scene(16, 174)[0]
+    solver = Solver(scene, meshes(scene, 174)[0])
+    x, system = solver.equilibrium(0.0).x, solver.equilibria.system
+    found = NonsymmetricSolver(system).at(x).near(6, SHIFT).values
+    check(np.sort(found.real)[:7], Oracle(system).squares(x))
