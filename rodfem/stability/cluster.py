@@ -76,8 +76,8 @@ def members(
 
     Returns what was found, the places of its own in that, and their values.  Of left vectors, which are orthogonal to
     the right ones of all other eigenvalues, any share tells.  Right vectors are not orthogonal: those of rigid motions,
-    zero at all loads, may have a greater share in the subspace than its own.  They are none of a cluster away from
-    zero.  Raises :class:`ConvergenceError`.
+    zero at all loads of a rod that floats, may have a greater share in the subspace than its own.  They are none of a
+    cluster away from zero.  Raises :class:`ConvergenceError`.
     """
     size, beside = cluster.size, BESIDE * pencil.system.scene.units.omega2
     least = LEAST if near == pencil.near else REAL
@@ -86,7 +86,7 @@ def members(
         inside = pencil.product(basis, found.weighed)
         energy = pencil.squares(found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
-        if abs(cluster.mean) > beside:
+        if found.floating and abs(cluster.mean) > beside:
             share[abs(found.values) < STILL * found.far] = 0.0
         chosen = closed(found.values, share, size)
         values = found.values[chosen]

@@ -31,9 +31,10 @@ step.  A polynomial through the last four loads magnifies it up to 15 times, one
 three times: what is left of the guards' neighbours dies out.
 
 The product of two predictions is far below round-off.  So one side is improved at one load, and the other one at the
-next; that which rests is taken to have the error that was measured when it was improved.  It may rest only while what
-the polynomial misses of the next power of the load is no more than it was then.  Where the bound does not hold, both
-sides are improved, as often as it takes.
+next; that which rests is taken to have the error that was measured when it was improved, once: that of a prediction.
+It may rest only while what the polynomial misses of the next power of the load is no more than it was then, and the
+error of the side that is improved does not grow much.  Where the bound does not hold, both sides are improved, as often
+as it takes.
 
 Eigenvalues that come from outside are what some columns more see, the probes: power iteration from load to load, in the
 complement of all that is followed, has the size of the greatest ``nu'`` there.  Random vectors that are mixed into it
@@ -43,7 +44,7 @@ keep it from forgetting the others.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 
 import numpy as np
 
@@ -67,6 +68,8 @@ ERROR = 1e-13
 """Error of ``nu``, over the greatest, that is round-off: what SLEPc is asked for."""
 CONDITION = 1e8
 """Condition of an eigenvalue above which the bases are hardly bases: round-off, times that, is what SLEPc leaves."""
+GROWN = 3.0
+"""Growth of the error of a prediction from one load to the next up to which that of the other side is no larger."""
 SAME = 1e-6
 """Relative difference of predictions that are equally good."""
 VECTOR = 1e-4
@@ -109,21 +112,29 @@ class _Ritz:
 
 
 class _Past:
-    """Bases of one side at the last loads at which they were improved, and the polynomial fitted to them."""
+    """Bases of one side at the last loads at which they were improved, and the polynomial fitted to them.
+
+    The ``error`` is that of the last prediction that was improved, in the mass.
+    """
 
     def __init__(self, load: float, basis: np.ndarray) -> None:
         """Begin with a basis (n, p) at a load."""
         self.bases, self.loads = np.zeros((SUPPORT, *basis.shape)), list[float]()
         self.reach = self.reached = 0.0
+        self.error = inf
         self._next = 0
-        self.keep(load, basis)
+        self.keep(load, basis, once=False)
 
     def predict(self, spaces: Subspaces, side: int, load: float) -> None:
         """Predict the basis of a side at a load."""
         self.reach = spaces.predict(side, DEGREE, np.array(self.loads) - load, self.bases)
 
-    def keep(self, load: float, basis: np.ndarray) -> None:
-        """Keep the basis (n, p) at a load, improved there after it was predicted, instead of the oldest one."""
+    def keep(self, load: float, basis: np.ndarray, *, once: bool) -> None:
+        """Keep the basis (n, p) at a load, improved there after it was predicted, instead of the oldest one.
+
+        Of a basis that was improved ``once`` the error of the prediction was measured; else only that of later steps.
+        """
+        self._once = once
         self.reached = self.reach if len(self.loads) == SUPPORT else 0.0
         self.bases[self._next] = basis
         self.loads[self._next : self._next + 1] = [load]
@@ -135,7 +146,7 @@ class _Past:
 
         The error is a derivative times what the polynomial misses of the next power of the load.
         """
-        return self.reach <= self.reached * (1.0 + SAME)
+        return self._once and self.reach <= self.reached * (1.0 + SAME)
 
 
 class FollowedPairs:
@@ -252,22 +263,27 @@ class FollowedPairs:
                 return None
             for side, past in enumerate(self._past):
                 past.predict(spaces, side, load)
-            improved = set[int]()
+            improved = list[int]()
             for step in range(STEPS):
                 side, other = self._turn, LEFT if self._turn == RIGHT else RIGHT
                 spaces.improve(side)
-                improved.add(side)
+                improved.append(side)
                 self._turn = other
-                if step == 0 and not self._past[other].rests:
+                if step == 0 and not (self._steady(side, spaces) and self._past[other].rests):
                     continue
                 found = _ritz(spaces)
                 chosen = found.nearest(self.number + SPARE)
                 if found.known(chosen, self._natural(pencil)):
-                    for kept in improved:
-                        self._past[kept].keep(load, spaces.bases[kept])
+                    for kept in set(improved):
+                        self._past[kept].keep(load, spaces.bases[kept], once=improved.count(kept) == 1)
                     nearer = spaces.outside > abs(found.nu[chosen[-1]])
                     return None if nearer or not found.whole(chosen) else self._frequencies(pencil, found, chosen)
         return None
+
+    def _steady(self, side: int, spaces: Subspaces) -> bool:
+        """Whether a side that has just been predicted and improved had hardly more error than at the load before."""
+        before, self._past[side].error = self._past[side].error, float(np.trace(spaces.changes[side])) ** 0.5
+        return self._past[side].error <= GROWN * before
 
     def _frequencies(self, pencil: NonsymmetricPencil, found: _Ritz, chosen: np.ndarray) -> Frequencies:
         """Frequencies of the ``chosen`` pairs, whose motions have no names yet."""

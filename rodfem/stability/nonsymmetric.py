@@ -360,7 +360,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
                 continue
             parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
-            if abs(value.imag) <= DRAWN * _off(matrix, mass, value, re, im):
+            if abs(value.imag) <= DRAWN * self._off(matrix, mass, value, re, im):
                 value = value.real
             noisy = bool(noise > DOUBT * size * kinetic)
             own = [part[self._own].copy() for part in parts]
@@ -370,14 +370,35 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         solver.destroy()
         return out
 
+    def _off(self, matrix: PETSc.Mat, mass: PETSc.Mat, value: complex, re: PETSc.Vec, im: PETSc.Vec) -> float:
+        """Distance of an eigenvalue from the Rayleigh quotient of its vector, ``re + i im``: about its round-off.
+
+        Where PETSc is complex ``re`` is all of it.  The rows of the load and of drifts are left out, which have no part
+        in it and other units.
+        """
+        parts = [re] if compat.COMPLEX else [re, im]
+        left, other = [x.copy() for x in parts], self._others(matrix)
+        for x in left:
+            x.array[other] = 0.0
+        S, M = (np.array([[x.dot(A * y) for y in parts] for x in left]) for A in (matrix, mass))
+        if compat.COMPLEX:
+            stiffness, inertia = S[0, 0], M[0, 0]
+        else:  # (re - i im) . A (re + i im)
+            stiffness, inertia = (A[0, 0] + A[1, 1] + 1j * (A[0, 1] - A[1, 0]) for A in (S, M))
+        return float(abs(stiffness - value * inertia) / max(abs(inertia), TINY))
+
+    def _others(self, matrix: PETSc.Mat) -> list[int]:
+        """Rows of the load and of drifts, of those that this rank has of a matrix."""
+        begin, end = matrix.getOwnershipRange()
+        return [i - begin for i in (self.system.load_index, *self.system.drifts) if begin <= i < end]
+
     def _stiffness(self, matrix: PETSc.Mat) -> float:
         """Largest sum of the absolute entries of a row of ``matrix``, but for rows of the load and of drifts.
 
         These have a one on the diagonal, which is no stiffness and has other units.
         """
-        begin, end = matrix.getOwnershipRange()
         sums = np.asarray(abs(local_rows(matrix)).sum(axis=1)).ravel()
-        sums[[i - begin for i in (self.system.load_index, *self.system.drifts) if begin <= i < end]] = 0.0
+        sums[self._others(matrix)] = 0.0
         return float(matrix.comm.tompi4py().allreduce(float(sums.max(initial=0.0)), op=MPI.MAX))
 
     def _doubled(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
@@ -486,20 +507,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if not factors.regular:
             raise ConvergenceError(_singular(target))
         return Inverse(factors)
-
-
-def _off(matrix: PETSc.Mat, mass: PETSc.Mat, value: complex, re: PETSc.Vec, im: PETSc.Vec) -> float:
-    """Distance of an eigenvalue from the Rayleigh quotient of its vector, ``re + i im``: about its round-off.
-
-    Where PETSc is complex ``re`` is all of it.
-    """
-    parts = [re] if compat.COMPLEX else [re, im]
-    S, M = (np.array([[x.dot(A * y) for y in parts] for x in parts]) for A in (matrix, mass))
-    if compat.COMPLEX:
-        stiffness, inertia = S[0, 0], M[0, 0]
-    else:  # (re - i im) . A (re + i im)
-        stiffness, inertia = (A[0, 0] + A[1, 1] + 1j * (A[0, 1] - A[1, 0]) for A in (S, M))
-    return float(abs(stiffness - value * inertia) / max(abs(inertia), TINY))
 
 
 def _singular(target: complex) -> str:

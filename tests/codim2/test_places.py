@@ -8,6 +8,7 @@ from math import pi
 import classics
 import numpy as np
 import pytest
+import rescaled
 from hard.two_freedoms import scene
 
 from forms.energy import bending_and_twist
@@ -67,6 +68,15 @@ def check(found: Locus, kind: str, exact: tuple[float, float]) -> None:
 )
 def test_column_whose_load_follows_in_part(kind: str, number: int, mark: str, exact: tuple[float, float]) -> None:
     check(of_column(kind, number), mark, exact)
+
+
+def test_the_same_column_in_units_of_a_molecule() -> None:
+    """Pairs at and next to the double zero: one of the end and one of a row beside it were 1e-7, and 0.1, off."""
+    small = rescaled.rescaled(classics.partly_following(0.4, (15.0, 30.0)), 1e-9, 1e-12)
+    diagram = trace(small, Discretization("pointwise", 4, 6), Plan(depth=0))
+    found = diagram.locus(diagram.special(FLUTTER)[0], "share", (0.0, 1.2), (0.0, 40.0))
+    check(found, "turns in P", TURNS_IN_LOAD)
+    check(found, "the double eigenvalue vanishes", DOUBLE_ZERO)
 
 
 @pytest.mark.parametrize(("number", "index"), [(0, [0, 2]), (1, [2, 2])])
