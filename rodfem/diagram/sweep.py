@@ -8,6 +8,8 @@ At each load the equilibrium is solved for, and the left-most eigenvalues ``mu =
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
+from math import isnan
 
 import numpy as np
 from petsc4py import PETSc
@@ -95,6 +97,7 @@ class Sweep:
         if self.plan.error_bars:
             self._error_bars(branch)
             kinks.error_bars(branch)
+        self._within_bars(branch)
         self.observer.finished(branch)
         with without("Whether frequencies stay zero was not examined", comm, warn):
             self._family(last)
@@ -283,6 +286,22 @@ class Sweep:
                 f"{told.entered} eigenvalues that are found at {self._load} = {b.load:.6g} and not at {a.load:.6g} are "
                 "complex at both: the rows before, which count none, may count too few. Ask for more frequencies."
             )
+
+    def _within_bars(self, branch: Branch) -> None:
+        """Say of which frequencies that meet, and part at the next special point, that is not known.
+
+        Where two pass one another, of motions in two planes, round-off makes a complex pair of them for a while: the
+        two loads differ by less than their bars, or than what their location leaves open where there are none.
+        """
+        for s, t in pairwise(branch.special):
+            changes = [x.negative_after - x.negative_before for x in (s, t)]
+            bars = [x.located_to if isnan(x.error_estimate) else x.error_estimate for x in (s, t)]
+            if s.kind == t.kind == FLUTTER and sum(changes) == 0 and abs(s.point.load - t.point.load) <= sum(bars):
+                what, loads = "meet" if changes[0] > 0 else "part", f"{s.point.load:.8g} and {t.point.load:.8g}"
+                self.observer.warn(
+                    f"Whether frequencies {what} between {self._load} = {loads} is not known: these loads differ by "
+                    "less than their bars. Use another mesh, without very short elements."
+                )
 
     def _name(self, point: Point, cluster: Cluster, number: int) -> None:
         """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one."""

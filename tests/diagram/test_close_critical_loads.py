@@ -7,6 +7,7 @@ its stiffness B2.  What the load does may be any function of a parameter, so tha
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from math import sqrt
@@ -24,6 +25,8 @@ from scipy.optimize import brentq, fsolve
 from rodfem import Diagram, Plan, clamped, free
 from rodfem.continuation.complex_pairs import paired, upper
 from rodfem.continuation.eigenvalue_curves import assignment
+from rodfem.continuation.observer import Observer
+from rodfem.diagram.sweep import Sweep
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.problem.scene import Scene
@@ -218,3 +221,24 @@ def test_one_diverges_where_the_other_comes_back(span: tuple[float, float]) -> N
     diagram = columns(BACK / DIVERGES, span, SHARE)
     agree(critical(diagram[0], "divergence"), [DIVERGES])
     assert any("pass through zero" in said for said in diagram.warnings)
+
+
+@pytest.mark.parametrize(
+    ("apart", "bar", "before", "words"),
+    [(1e-7, 1e-6, 0, "meet"), (1e-7, 1e-6, 2, "part"), (1e-5, 1e-6, 0, ""), (1e-5, float("nan"), 0, "meet")],
+)
+def test_loads_within_their_bars(apart: float, bar: float, before: int, words: str) -> None:
+    """Of two that pass one another round-off makes a pair for a while; without bars their location counts."""
+    diagram = trace(classics.beck(), MESH, Plan(error_bars=False))
+    (flutter,) = diagram.special("flutter")
+    other = replace(flutter.point, load=flutter.point.load + apart)
+    both = [
+        replace(flutter, point=p, negative_before=n, negative_after=2 - n, error_estimate=bar, located_to=1e-5)
+        for p, n in ((flutter.point, before), (other, 2 - before))
+    ]
+    said: list[str] = []
+    sweep = Sweep(diagram.solvers[0], Plan(), Observer(), lambda: None)
+    sweep.observer.warn = said.append  # type: ignore[method-assign]
+    sweep._within_bars(replace(diagram[0], special=both))
+    assert [w for w in said if f"Whether frequencies {words} between P" in w] == (said if words else [])
+    assert len(said) == bool(words)
