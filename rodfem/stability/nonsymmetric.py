@@ -228,7 +228,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
                 found = self._shifted(number, target, matrix, mass)
             else:
                 found = self._doubled(number, target, matrix, mass)
-            found = sorted(found, key=lambda p: abs(p.value - target))[: number + SPARE]
+            found = _whole_pairs(sorted(found, key=lambda p: abs(p.value - target))[: number + SPARE], target)
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
             vectors = np.stack([p.vector for p in found], axis=1)
@@ -507,6 +507,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if not factors.regular:
             raise ConvergenceError(_singular(target))
         return Inverse(factors)
+
+
+def _whole_pairs(found: list[_Pair], target: complex) -> list[_Pair]:
+    """Eigenvalues near a real ``target`` without the last one where that is a half of a pair, cut in two."""
+    if target.imag or len(found) < 2 or not found[-1].value.imag:
+        return found
+    value, others = found[-1].value.conjugate(), [p.value for p in found[:-1]]
+    cut = min(abs(v - value) for v in others) > abs(value.imag)
+    return found[:-1] if cut else found
 
 
 def _singular(target: complex) -> str:

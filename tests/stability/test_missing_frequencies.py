@@ -42,3 +42,13 @@ def test_an_element_of_6e_7() -> None:
     x, system = solver.equilibrium(0.0).x, solver.equilibria.system
     found = NonsymmetricSolver(system).at(x).near(6, SHIFT).values
     check(np.sort(found.real)[:7], Oracle(system).squares(x))
+
+
+def test_no_pair_is_cut_in_two() -> None:
+    """The last of 14 eigenvalues at this load is one of a pair: 11 unstable ones were counted between 10 and 10."""
+    scene = wider.scene(16, 146)[0]
+    solver = Solver(scene, meshes(scene, 146)[0])
+    pencils, x = NonsymmetricSolver(solver.equilibria.system), solver.equilibrium(1.75).x
+    for number in range(4, 13):
+        found = pencils.at(x).near(number, SHIFT).values
+        assert number <= len(found) and (found.imag > 0).sum() == (found.imag < 0).sum() >= 2
