@@ -190,9 +190,9 @@ ENTRIES = {
     "points reached": "The largest number of rows of a branch was reached: there is more of it.",
     "not convex": "The stored energy loses convexity: an index means nothing beyond.",
     # pictures of frequencies, loci
-    "motion | bending about d1 | bending about d2 | bending | torsion | mixed | rigid motion": (
-        "The rotation that a mode mostly consists of: about a director of the cross-section, about the axis, or "
-        "several. A rod that nothing holds has rigid motions of frequency zero."
+    "motion | bending about d1 | bending about d2 | bending | torsion | mixed | without rotation | rigid motion": (
+        "The rotation that a mode mostly consists of: about a director of the cross-section, about the axis, several, "
+        "or none, as in vibrations along the rod. A rod that nothing holds has rigid motions of frequency zero."
     ),
     "curve": "Number of the curve of frequencies that an eigenvalue is on.",
     "complex pair, real part | complex pair, imaginary part": (

@@ -11,7 +11,6 @@ from mpi4py import MPI
 from rodfem.fem.system import System
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
-from rodfem.tolerances import TINY
 
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
@@ -107,10 +106,11 @@ def named(
         owners += [owner] * len(parts)
         counts.append(len(parts) * len(owner))
         count += len(of_row)
-    squares = np.zeros((count, 3))
+    squares, moved, columns = np.zeros((count, 3)), np.zeros(count), np.concatenate(blocks, axis=1)
     turned = np.repeat(np.stack([field for _, field in rows]), counts, axis=0)
-    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, turned, np.concatenate(blocks, axis=1)))
-    names = iter(mode_type.names(squares / np.maximum(squares.sum(axis=1), TINY)[:, None]))
+    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, turned, columns))
+    np.add.at(moved, np.concatenate(owners), mode_type.displacements(system, columns))
+    names = iter(mode_type.names(mode_type.of_all(squares, moved)))
     out, floating = [], floats(system.scene)
     for (found, _), of_row in zip(rows, together, strict=True):
         kinds = [""] * len(found.values)
