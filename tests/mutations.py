@@ -1088,8 +1088,8 @@ FAULTS = {
     ),
     "flutter-within-its-bars-is-known": Fault(
         "rodfem/diagram/sweep.py",
-        "abs(s.point.load - t.point.load) <= sum(bars)",
-        "s.point.load == t.point.load",
+        "0 < apart <= sum(bars)",
+        "0 < apart <= 0",
         CLOSE,
     ),
     "pairs-are-cut-in-two": Fault(

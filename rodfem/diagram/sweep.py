@@ -291,12 +291,14 @@ class Sweep:
         """Say of which frequencies that meet, and part at the next special point, that is not known.
 
         Where two pass one another, of motions in two planes, round-off makes a complex pair of them for a while: the
-        two loads differ by less than their bars, or than what their location leaves open where there are none.
+        two loads differ by less than their bars, or than what their location leaves open where there are none.  At one
+        load frequencies are double whatever the mesh.
         """
         for s, t in pairwise(branch.special):
             changes = [x.negative_after - x.negative_before for x in (s, t)]
             bars = [x.located_to if isnan(x.error_estimate) else x.error_estimate for x in (s, t)]
-            if s.kind == t.kind == FLUTTER and sum(changes) == 0 and abs(s.point.load - t.point.load) <= sum(bars):
+            apart = abs(s.point.load - t.point.load)
+            if s.kind == t.kind == FLUTTER and sum(changes) == 0 and 0 < apart <= sum(bars):
                 what, loads = "meet" if changes[0] > 0 else "part", f"{s.point.load:.8g} and {t.point.load:.8g}"
                 self.observer.warn(
                     f"Whether frequencies {what} between {self._load} = {loads} is not known: these loads differ by "

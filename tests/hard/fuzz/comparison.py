@@ -163,7 +163,7 @@ def check_rows(diagram: Diagram, out: Compared, most: int) -> None:
     system = diagram.solvers[0].system
     oracle = Oracle(system)
     rows = [(b, i, p) for b in diagram for i, p in enumerate(b.points) if p.mesh == 0]
-    special = {id(s.point) for b in diagram for s in singular(b)}
+    special = {id(s.point) for b in diagram for s in singular(b)} | {id(b.points[0]) for b in diagram if b.parent}
     for j in np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)):
         branch, i, point = rows[j]
         out.rows += 1
