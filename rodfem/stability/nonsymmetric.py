@@ -360,7 +360,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
                 continue
             parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
-            if abs(value.imag) <= DRAWN * self._off(matrix, mass, value, re, im):
+            if value.imag and abs(value.imag) <= DRAWN * self._off(matrix, mass, value, re, im):
                 value = value.real
             noisy = bool(noise > DOUBT * size * kinetic)
             own = [part[self._own].copy() for part in parts]
