@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rodfem.stability.nonsymmetric import SHIFT, Frequencies, NonsymmetricPencil
+from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
 
 NUMBER = 10
 """Eigenvalues that are sought besides those of the locus."""

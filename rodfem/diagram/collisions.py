@@ -27,8 +27,6 @@ from rodfem.tolerances import TINY, round_off, unit
 
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
-DRAWN = 3.0
-"""Uncertainty that an eigensolver leaves of a collision, in units of the error that it made at one load."""
 COMMON = 0.5
 """Share of a subspace in another above which both are one collision's."""
 
@@ -230,6 +228,6 @@ def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: f
     found = locate_flutter(measured, cluster, load, width)
     noise, clear = measured.noise(found.clear, found.cluster), measured(found.clear, found.cluster)
     split = float(abs((clear.values - clear.cluster.mean) ** 2 - clear.discriminant).max())
-    moved = (noise.discriminant + DRAWN * noise.discriminant_left + split) / abs(found.slope)
-    left = noise.mean + DRAWN * noise.mean_left + split / max(2 * float(np.sqrt(abs(clear.discriminant))), TINY)
+    moved = (noise.of_discriminant + split) / abs(found.slope)
+    left = noise.of_mean + split / max(2 * float(np.sqrt(abs(clear.discriminant))), TINY)
     return replace(found, uncertainty=found.uncertainty + moved, left=found.left + left)

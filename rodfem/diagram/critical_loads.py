@@ -26,8 +26,9 @@ from rodfem.diagram.hidden_events import HiddenEvents, signature
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import cluster_of
+from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.frequencies import REAL, Frequencies
-from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, unit
 
 PARTS, PART = 16, 0.47
@@ -76,30 +77,42 @@ class CriticalLoads:
         return told
 
     def _hidden(self, last: Side | None, a: Side, b: Side) -> Told:
-        """What happens in a step, also what comes and goes in it, as the ``last`` side before it suggests."""
+        """What happens in a step, also what comes and goes in it or at its first load, as the ``last`` side suggests.
+
+        Nothing does in the step between that one and this.
+        """
         told = self._told(a, b)
-        if told.events or told.doubts or signature(a.found) != signature(b.found):
+        if told.events or told.doubts:
             return told
+        before, here, after = (None if side is None else signature(side.found) for side in (last, a, b))
         try:
-            if last is None or last.load == a.load or signature(last.found) != signature(a.found):
+            if last is not None and here != after == before:
+                told.doubts += [self._near_at(a.load)] if self.hidden.at_row(a, last) else []
+            if here != after:
+                return told
+            if last is None or last.load == a.load or before != here:
                 last = self._side(a, a.load + PART * (b.load - a.load))
-                if signature(last.found) != signature(a.found):
+                if signature(last.found) != here:
                     return self._told(a, last).and_then(self._told(last, b))
             for load in self.hidden.between(last, a, b):
                 middle = self._side(a, load)
                 told = self._told(a, middle).and_then(self._told(middle, b))
-                if told.events or told.doubts:
-                    return told
-                told.doubts.append(
-                    f"Two frequencies come so near one another at {self._load} = {load:.8g}, or one so near zero, that "
-                    "whether they meet there, and part again, is not known."
-                )
+                if not told.events and not told.doubts:
+                    told.doubts.append(self._near_at(load))
+                return told
         except ConvergenceError as trouble:
             told.doubts.append(
                 f"Whether frequencies meet, and part again, between {self._load} = {a.load:.6g} and {b.load:.6g} is "
                 f"not known ({str(trouble).rstrip('.')})."
             )
         return told
+
+    def _near_at(self, load: float) -> str:
+        """Words for a load at which something may come and go at once."""
+        return (
+            f"Two frequencies come so near one another at {self._load} = {load:.8g}, or one so near zero, that "
+            "whether they meet there, and part again, is not known."
+        )
 
     def _told(self, a: Side, b: Side) -> Told:
         """What happens in a step, which is parted where not all of it is clear."""

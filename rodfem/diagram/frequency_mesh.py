@@ -22,7 +22,8 @@ from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
-from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
+from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import unit
 
 MARGIN = 10.0

@@ -17,9 +17,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
+from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.followed_pairs import FollowedPairs
 from rodfem.stability.frequencies import ALIKE, EPS, NEAR_ZERO, REAL, Frequencies, named
-from rodfem.stability.nonsymmetric import BEYOND, SHIFT, NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import BEYOND, NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import unit
 
 FREQUENCIES = 6

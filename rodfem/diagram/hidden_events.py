@@ -9,6 +9,7 @@ the lowest value is sought, by equilibria.  Eigenvalues that cross have a lowest
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,11 +18,13 @@ from petsc4py import PETSc
 
 from rodfem.continuation.complex_pairs import upper
 from rodfem.roots import lowest_between
-from rodfem.stability.cluster import cluster_of
+from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
+from rodfem.stability.cluster_noise import noise_of
 from rodfem.stability.frequencies import ALIKE, REAL, Frequencies, groups
 
 if TYPE_CHECKING:
     from rodfem.diagram.collisions import Measuring, Side
+    from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 NEAR = 0.3
 """Part of the values at two rows below which the lowest one of a parabola is near zero."""
@@ -29,6 +32,12 @@ BESIDE = 0.2
 """Part of a step by which a parabola may be lowest beside it."""
 WITHIN = 1e-6
 """Part of a step to which the lowest value is sought."""
+DIP, CLOSE = 1 - 1e-6, 0.1
+"""Ratio to the values at rows beside it below which a row's is a lowest one, and distance, relative, that is close."""
+EDGE = 1e-5
+"""Part of a step within which the lowest value is at its first or last row."""
+ONE = 100.0
+"""Square of a cluster's matrix over its discriminant above which the vectors are nearly one: 1 where some cross."""
 
 
 class Approach(NamedTuple):
@@ -37,6 +46,28 @@ class Approach(NamedTuple):
     places: list[int]
     sign: int
     value: float
+
+
+@dataclass(frozen=True)
+class Lowest:
+    """The ``value`` of what approaches zero, of a ``cluster`` and a ``sign``, at the ``load`` at which it is lowest.
+
+    It may be zero, for round-off, where it is ``open``.  Another mesh may have it on the other side of zero, unless
+    eigenvalues of a ``crossing`` cluster pass one another: they have vectors of their own.  Beside a row
+    of the sweep it is ``below`` that of the row.
+    """
+
+    load: float
+    sign: int
+    value: float
+    cluster: Cluster
+    open: bool
+    crossing: bool = False
+    below: float = 0.0
+
+    def measured(self, here: Measured) -> float:
+        """The same value of a cluster that was measured on another mesh."""
+        return self.sign * (here.cluster.mean if here.cluster.size == 1 else here.discriminant)
 
 
 def approaches(found: Frequencies) -> list[Approach]:
@@ -88,37 +119,102 @@ class HiddenEvents:
     def __init__(self, measured: Callable[[PETSc.Vec], Measuring], one: float) -> None:
         """Know how a cluster is ``measured`` near an equilibrium, and the natural size, ``one``, of eigenvalues."""
         self.measured, self.one = measured, one
+        self.near: list[Lowest] = []
+        self._told: set[int] = set()  # of what approached in the last step, what was lowest in it
 
     def between(self, third: Side, a: Side, b: Side) -> list[float]:
-        """Loads between two sides at which something has happened that is undone at the other one.
+        """Loads between two sides at which something has happened that is undone at the other one, or may have.
 
         The ``third`` is another load nearby, all three with one :func:`signature`.  Raises
         :class:`~rodfem.errors.ConvergenceError` where eigenvalues are not followed.
         """
         out: list[float] = []
-        for here, *others in zip(approaches(a.found), approaches(third.found), approaches(b.found), strict=True):
+        before, self._told = self._told, set()
+        for i, (here, *others) in enumerate(zip(*(approaches(s.found) for s in (a, third, b)), strict=True)):
             f = others[0].value, here.value, others[1].value
             sizes = [abs(s.found.values[one.places]).max() for s, one in ((a, here), (b, others[1]))]
-            if len(here.places) > 1 and min(np.sqrt(f[1]) / sizes[0], np.sqrt(f[2]) / sizes[1]) < ALIKE:
-                continue  # multiple at all loads, or they meet at a row
+            apart = [np.sqrt(value) / size for value, size in zip(f[1:], sizes, strict=True)]
+            if len(here.places) > 1 and min(apart) < ALIKE:  # multiple at all loads, or they meet at a row
+                meet = max(apart) > ALIKE > apart[1] and self._meet(b, others[1].places, here.sign)
+                out += [b.load] if meet else []
+                continue
             at, low = lowest_of_parabola((third.load, a.load, b.load), f)
             along = (at - a.load) / (b.load - a.load)
-            if -BESIDE < along < 1 + BESIDE and low < NEAR * min(f[1], f[2]):
-                load, lowest = self._lowest(here, a, b, min(max(along, 0.1), 0.9))
-                out += [load] if lowest < 0 else []
+            # lower at the first row than at those beside it
+            turns = i not in before and (third.load - a.load) * (b.load - a.load) < 0 and DIP * min(f[0], f[2]) > f[1]
+            beside = min(f[0], f[2]) if turns and along < BESIDE else min(f[1], f[2])
+            if -BESIDE < along < 1 + BESIDE and low < NEAR * beside:
+                lowest = self._lowest(here, a, b, min(max(along, 0.1), 0.9))
+                part = (lowest.load - a.load) / (b.load - a.load)
+                if part > 1 - EDGE or (part < EDGE and not turns):
+                    continue  # lower beyond a row: in the next step, or in one that has told of it
+                self._told.add(i)
+                out += [lowest.load] if self._open(lowest) else []
+            elif turns and f[1] < (CLOSE * sizes[0] if len(here.places) == 1 else (CLOSE * sizes[0]) ** 2):
+                self._open(replace(self._at(here, a), below=f[1] - min(low, f[1])))
         return out
 
-    def _lowest(self, approach: Approach, a: Side, b: Side, along: float) -> tuple[float, float]:
-        """Load between two sides at which what approaches zero is lowest, and how far it is above that for sure."""
+    def at_row(self, row: Side, beside: Side) -> bool:
+        """Whether something may happen at a ``row`` that is undone at once: a side ``beside`` it shows nothing of it.
+
+        An eigenvalue is zero at the row, or two are equal there and have one vector.  Raises
+        :class:`~rodfem.errors.ConvergenceError` where eigenvalues are not followed.
+        """
+        if signature(row.found)[1] > signature(beside.found)[1]:
+            return True
+        values, pairs = row.found.values, [(side.found.values.imag > 0).sum() for side in (row, beside)]
+        real = [g for g in groups(values, row.found.far, ALIKE) if len(g) > 1 and not values[g].imag.any()]
+        sign = -1 if pairs[0] < pairs[1] else 1
+        return any([self._meet(row, group, sign) for group in real])
+
+    def _meet(self, row: Side, places: list[int], sign: int) -> bool:
+        """Whether eigenvalues that are equal at a ``row``, of these ``places``, may collide there.
+
+        Beside it their discriminant has this ``sign``.
+        """
+        return self._open(self._at(Approach(places, sign, 0.0), row))
+
+    def _at(self, approach: Approach, row: Side) -> Lowest:
+        """What approaches zero at a ``row``."""
+        pencil = self.measured(row.x).pencil(row.load)
+        cluster = cluster_of(pencil, row.found, approach.places)
+        if len(approach.places) == 1:
+            return Lowest(row.load, approach.sign, approach.value, cluster, open=False)
+        return _several(pencil, row.load, approach.sign, cluster)
+
+    def _open(self, lowest: Lowest) -> bool:
+        """Whether what is lowest may be zero; else it is kept, to be compared with another mesh."""
+        self.near += [] if lowest.open or lowest.crossing else [lowest]
+        return lowest.open
+
+    def _lowest(self, approach: Approach, a: Side, b: Side, along: float) -> Lowest:
+        """Where between two sides what approaches zero is lowest."""
         measured = self.measured(a.x)
         cluster = cluster_of(measured.pencil(a.load), a.found, approach.places)
-        width = b.load - a.load
+        width, sign, single = b.load - a.load, approach.sign, len(approach.places) == 1
 
         def value(t: float) -> float:
             here = measured(a.load + t * width, cluster)
-            if len(approach.places) == 1:
-                return approach.sign * here.cluster.mean + REAL * max(self.one, abs(here.cluster.mean))
-            return approach.sign * here.discriminant + float(REAL * abs(here.values).max()) ** 2
+            if single:
+                return sign * here.cluster.mean + REAL * max(self.one, abs(here.cluster.mean))
+            return sign * here.discriminant + float(REAL * abs(here.values).max()) ** 2
 
         t, lowest = lowest_between(value, 0.0, along, 1.0, WITHIN)
-        return a.load + t * width, lowest
+        load = a.load + t * width
+        if single:
+            return Lowest(load, sign, lowest - REAL * self.one, cluster, lowest <= 2 * REAL * self.one)
+        return _several(measured.pencil(load), load, sign, cluster, below=lowest < 0)
+
+
+def _several(pencil: NonsymmetricPencil, load: float, sign: int, cluster: Cluster, *, below: bool = False) -> Lowest:
+    """Discriminant of a ``cluster`` of this ``sign`` at the ``load`` of a ``pencil``, and whether it may be zero.
+
+    It may where it is ``below`` zero, or round-off as large.  Eigenvalues that cross have vectors of their own:
+    round-off changes their discriminant in second order only.
+    """
+    here = measure(pencil, cluster)
+    noise, value = noise_of(pencil, here), sign * here.discriminant
+    equal = max(REAL * float(abs(here.values).max()), noise.of_mean) ** 2
+    crossing = noise.square < ONE * max(abs(value), equal)
+    hidden = value <= noise.of_discriminant and not crossing
+    return Lowest(load, sign, value, here.cluster, below or hidden, crossing)

@@ -28,6 +28,7 @@ from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load, require_held
 from rodfem.diagram.kinks import Kinks
+from rodfem.diagram.missed_loads import missed_loads
 from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
@@ -326,3 +327,6 @@ class Sweep:
                     errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
+            with without("Whether a richer mesh has more critical loads was not examined", comm, warn):
+                for words in missed_loads(branch, self.critical.hidden.near, errors.measured, self._load):
+                    warn(words)

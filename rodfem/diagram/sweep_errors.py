@@ -13,7 +13,7 @@ from rodfem.diagram.collisions import Measuring, located_flutter
 from rodfem.diagram.divergence_loads import Mean, zero_near
 from rodfem.diagram.held import at_load
 from rodfem.fem.transfer import Transfer, halved, richer_system
-from rodfem.stability.cluster import Cluster, as_vectors
+from rodfem.stability.cluster import Cluster, Measured, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off
 
@@ -51,7 +51,7 @@ class SweepErrors:
             of_load = max(bound(point.load, load, left, rho), s.located_to)
             s.omega2_error = bound(s.omega2, mu, max(doubt, MEAN * abs(mu) * ROUND_OFF), rho)
         elif s.kind == DIVERGENCE:
-            cluster = self._transferred(s)
+            cluster = self._cluster(s)
             still = cluster.size - abs(s.negative_after - s.negative_before)
             mean = Mean(Measuring(richer, self.eigensolver, x), cluster, still)
             load, left = zero_near(mean, point.load, self.units.load)
@@ -70,16 +70,28 @@ class SweepErrors:
         beside = at_load(self.richer, x, s.point.load + step)
         return abs(self.richer.shape.ordinate(beside) - self.richer.shape.ordinate(x))
 
-    def _transferred(self, s: SpecialPoint) -> Cluster:
+    def measured(self, x: PETSc.Vec, load: float, cluster: Cluster) -> Measured:
+        """A ``cluster`` at a ``load`` on the richer discretisation; ``x`` is a state near that.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where it is not found there.
+        """
+        at = Measuring(self.richer, self.eigensolver, self.transfer(x, state=True))
+        return at(load, self._transferred(cluster))
+
+    def _cluster(self, s: SpecialPoint) -> Cluster:
         """The cluster of a special point on the richer discretisation."""
         assert s.cluster is not None
-        vectors = as_vectors(self.solver.system, s.cluster.basis)
+        return self._transferred(s.cluster)
+
+    def _transferred(self, cluster: Cluster) -> Cluster:
+        """A cluster on the richer discretisation."""
+        vectors = as_vectors(self.solver.system, cluster.basis)
         columns = [self.transfer(v, state=False).array_r.real for v in vectors]
-        return Cluster(np.stack(columns, axis=1), s.cluster.mean)
+        return Cluster(np.stack(columns, axis=1), cluster.mean)
 
     def _flutter(self, guess: PETSc.Vec, s: SpecialPoint) -> tuple[float, float, float, float]:
         """Flutter load on the richer discretisation, its uncertainty there, the double eigenvalue and that of it."""
-        measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._transferred(s)
+        measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._cluster(s)
         if s.note:  # double there, whatever the mesh
             return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean, 0.0
         width = WIDTH * max(abs(s.point.load), abs(self.span[1] - self.span[0]))

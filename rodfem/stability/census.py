@@ -21,7 +21,8 @@ from scipy.sparse.linalg import splu
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.matrices import gathered
-from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricPencil
+from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.stability.outside import inverse_with_mass
 from rodfem.tolerances import TINY
 

@@ -28,17 +28,32 @@ from rodfem.stability.cluster import Measured, members, real_span
 from rodfem.stability.inertia import EPS, NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
+DRAWN = 3.0
+"""Uncertainty that an eigensolver leaves of a collision, in units of the error that it made at one load."""
+
 
 class ClusterNoise(NamedTuple):
     """Uncertainty of the ``mean`` and of the ``discriminant`` of a cluster by round-off in the matrix.
 
-    What the eigensolver left open of the two, ``mean_left`` and ``discriminant_left``, is added to it.
+    What the eigensolver left open of the two, ``mean_left`` and ``discriminant_left``, is added to it.  The ``square``
+    is ``|B|^2 / k``: the magnitude of ``D`` where vectors are orthogonal, much more where they are nearly one.
     """
 
     mean: float
     discriminant: float
     mean_left: float
     discriminant_left: float
+    square: float
+
+    @property
+    def of_mean(self) -> float:
+        """Uncertainty of the mean by both."""
+        return self.mean + DRAWN * self.mean_left
+
+    @property
+    def of_discriminant(self) -> float:
+        """Uncertainty of the discriminant by both."""
+        return self.discriminant + DRAWN * self.discriminant_left
 
 
 def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
@@ -65,4 +80,5 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     off = float(np.trace(B)) / size
     inside = B - off * np.eye(size)
     discriminant = float(np.trace(inside @ inside)) / size
-    return ClusterNoise(of(W), of(2 * W @ B.T), abs(off), abs(discriminant - measured.discriminant))
+    left = abs(off), abs(discriminant - measured.discriminant)
+    return ClusterNoise(of(W), of(2 * W @ B.T), *left, float((inside**2).sum()) / size)

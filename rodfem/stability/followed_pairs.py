@@ -49,8 +49,9 @@ from math import inf, nan
 import numpy as np
 
 from rodfem.errors import ConvergenceError
+from rodfem.stability.finite_pairs import SPARE
 from rodfem.stability.frequencies import ALIKE, EPS, Frequencies, orthonormal
-from rodfem.stability.nonsymmetric import SPARE, NonsymmetricPencil
+from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.stability.outside import enclosed
 from rodfem.stability.subspaces import LEFT, RIGHT, Subspaces
 
@@ -282,7 +283,8 @@ class FollowedPairs:
 
     def _steady(self, side: int, spaces: Subspaces) -> bool:
         """Whether a side that has just been predicted and improved had hardly more error than at the load before."""
-        before, self._past[side].error = self._past[side].error, float(np.trace(spaces.changes[side])) ** 0.5
+        squared = max(float(np.trace(spaces.changes[side])), 0.0)  # below zero by round-off
+        before, self._past[side].error = self._past[side].error, squared**0.5
         return self._past[side].error <= GROWN * before
 
     def _frequencies(self, pencil: NonsymmetricPencil, found: _Ritz, chosen: np.ndarray) -> Frequencies:

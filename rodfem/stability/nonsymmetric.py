@@ -4,23 +4,13 @@ A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low
 couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
 axis: flutter.
 
-Eigenvalues are found by shift-invert.  A complex PETSc takes a complex shift ``a + i b`` as it is, and is used where
-it is what is installed.  A real one needs no more than twice the size: with vectors written as pairs of their real and
-imaginary parts, ``S - (a + i b) M`` is the real matrix ::
-
-    ( S - a M     b M   )
-    (  -b M     S - a M )
-
-whose pencil with ``diag(M, M)`` has the eigenvalues ``mu - (a + i b)`` and their conjugates; those with vectors
-of the form ``(x, -i x)`` belong to the first kind.
+Which eigenvalues are finite, near which shift: :mod:`~rodfem.stability.finite_pairs`.
 
 A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
 ``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,8 +27,8 @@ from rodfem.linalg.matrices import Shared, gathered, local_rows, petsc_matrix, p
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
-from rodfem.stability.dense import finite_eigenpairs
-from rodfem.stability.frequencies import EPS, Frequencies, named, orthonormal, product, squares
+from rodfem.stability.finite_pairs import SHIFT, FinitePairs
+from rodfem.stability.frequencies import Frequencies, named, orthonormal, product, squares
 from rodfem.stability.pencil import (
     FACTORS,
     Inverse,
@@ -51,67 +41,12 @@ from rodfem.stability.pencil import (
     weighed_modes,
     with_factors,
 )
-from rodfem.tolerances import NEGLIGIBLE, TINY
+from rodfem.tolerances import NEGLIGIBLE
 
-FAR = 1e5
-"""How many times farther from the shift than the third nearest an eigenvalue may be.
-
-The pencil has infinite eigenvalues with Jordan blocks of size two, one for each pair of constraint and multiplier,
-which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
-"""
-NEAR = 10.0
-"""Times the distance from the shift of the nearest eigenvalue, or of zero, within which another is none of those."""
-DOUBT = 1e-4
-"""Relative round-off of an eigenvalue above which it may be infinite: its vector hardly moves.
-
-It is that of the stiffness over the kinetic energy of the vector: 5e-4 and more for such.  Beside a body of 1e4 times
-its mass a light rod has them among the finite ones.  It is 2e-5 and less for others, but for a rod that cannot stretch
-and is nearly taut, of whose vectors the forces are the largest part.
-"""
-AGAIN = 1e-3
-"""Relative difference of a finite eigenvalue from one shift and from another: 3e-5 and less, of others 0.2 and more."""
-LOST = 1e-6
-"""Relative round-off of the kinetic energy above which an eigenvalue has no digits: beside a body of 1e9 masses of the
-rod."""
-SHIFT = -10.0
-"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
-
-Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
-its digits from all others.
-"""
 BEYOND = 6
 """Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
-DENSE = 3
-"""A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
 PILE = 64
 """States after which what PETSc keeps of matrices that are not used any more is destroyed."""
-DRAWN = 3.0
-"""Imaginary part of an eigenvalue that is round-off, over the distance of its real part from its Rayleigh quotient.
-
-That is, beside a body of 1e6 times the rod's mass, what another shift changes it by: 1e-6 of the fourth, 1e-4 of the
-last one of a dozen.
-"""
-SPARE = 2
-"""Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """An eigenvalue, the real and imaginary part of its vector on this rank, and its backward error.
-
-    A ``noisy`` one has more round-off than :data:`DOUBT`: far from the shift it is ``doubtful``, an infinite one maybe.
-    """
-
-    value: complex
-    parts: list[np.ndarray]
-    error: float
-    noisy: bool = False
-    doubtful: bool = False
-
-    @property
-    def vector(self) -> np.ndarray:
-        """The vector on this rank, complex."""
-        return np.asarray(self.parts[0] + 1j * (0.0 if len(self.parts) < 2 else self.parts[1]))
 
 
 class NonsymmetricSolver(PencilMatrices):
@@ -222,15 +157,8 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     ) -> Frequencies:
         target /= self.system.scene.units.omega2
         with self.system.clock("stability"):
-            if matrix.getSize()[0] < DENSE * (2 * number + 20):
-                found = self._dense(matrix, mass)
-            elif target.imag == 0 or compat.COMPLEX:
-                found = self._shifted(number, target, matrix, mass)
-            else:
-                found = self._doubled(number, target, matrix, mass)
-            found = _whole_pairs(sorted(found, key=lambda p: abs(p.value - target))[: number + SPARE], target)
-            third = abs(found[min(2, len(found) - 1)].value - target)
-            found = [p for p in found if abs(p.value - target) <= FAR * third]
+            apart = (self.system.load_index, *self.system.drifts)
+            found = FinitePairs(matrix, mass, self._solve, apart, self._own).near(number, target)
             vectors = np.stack([p.vector for p in found], axis=1)
             values, errors = np.array([p.value for p in found]), np.array([p.error for p in found])
             return named(self.system, [(self.unnamed(values, errors, vectors, left=left), self.turned)])[0]
@@ -316,120 +244,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             shares[moving] = work[moving] / values[moving]
             vectors += np.outer(mode.array_r.real, shares)
 
-    def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
-        """All finite eigenvalues of a pencil that is small enough for dense matrices."""
-        values, vectors = finite_eigenpairs(*(dense(A) for A in (matrix, mass)))
-        if len(values) == 0:
-            raise ConvergenceError("The rod has no inertia: give it a mass, or a rotary inertia.")
-        own = vectors[self._own]
-        return [_Pair(complex(w), [x.real.copy(), x.imag.copy()], EPS) for w, x in zip(values, own.T, strict=True)]
-
-    def _shifted(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
-        """Solve with a shift that this PETSc's numbers can express.
-
-        What may be infinite, for its round-off, is sought from another shift: finite eigenvalues are found again.
-        """
-        found = self._pairs(number, target, matrix, mass)
-        if any(pair.doubtful for pair in found):
-            others = [pair.value for pair in self._pairs(number, target + SHIFT, matrix, mass) if pair.noisy]
-            found = [
-                pair
-                for pair in found
-                if not pair.doubtful or any(abs(pair.value - v) <= AGAIN * abs(v) for v in others)
-            ]
-        return found[: number + SPARE]
-
-    def _pairs(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
-        """Eigenpairs that have digits, nearest to the shift first; ``number`` or more of them are finite."""
-        solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
-        re, im = matrix.createVecRight(), matrix.createVecRight()
-        values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], list[_Pair]()
-        stiffness, inertia = EPS * self._stiffness(matrix), EPS * mass.norm(PETSc.NormType.INFINITY)
-        heavy = mass.getDiagonal()
-        heavy.array[:] = abs(heavy.array_r) > 0
-        nearest = min((abs(value - target) for value in values), default=0.0)
-        far = min(FAR * nearest, NEAR * max(nearest, -SHIFT))  # rigid motions have no kinetic energy here
-        for i in sorted(range(len(values)), key=lambda i: abs(values[i] - target)):
-            value = solver.getEigenpair(i, re, im)
-            size = max(abs(value), abs(value - target))
-            kinetic = sum(abs(x.dot(mass * x)) for x in (re, im))
-            moved = sum((x * heavy).norm() ** 2 for x in (re, im))
-            noise = stiffness * (re.norm() ** 2 + im.norm() ** 2)
-            beyond = abs(value - target) > far
-            if beyond and inertia * moved > LOST * kinetic:
-                continue
-            parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
-            error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
-            if value.imag and abs(value.imag) <= DRAWN * self._off(matrix, mass, value, re, im):
-                value = value.real
-            noisy = bool(noise > DOUBT * size * kinetic)
-            own = [part[self._own].copy() for part in parts]
-            out.append(_Pair(complex(value), own, error, noisy, beyond and noisy))
-            if sum(not pair.doubtful for pair in out) == number + SPARE:
-                break
-        solver.destroy()
-        return out
-
-    def _off(self, matrix: PETSc.Mat, mass: PETSc.Mat, value: complex, re: PETSc.Vec, im: PETSc.Vec) -> float:
-        """Distance of an eigenvalue from the Rayleigh quotient of its vector, ``re + i im``: about its round-off.
-
-        Where PETSc is complex ``re`` is all of it.  The rows of the load and of drifts are left out, which have no part
-        in it and other units.
-        """
-        parts = [re] if compat.COMPLEX else [re, im]
-        left, other = [x.copy() for x in parts], self._others(matrix)
-        for x in left:
-            x.array[other] = 0.0
-        S, M = (np.array([[x.dot(A * y) for y in parts] for x in left]) for A in (matrix, mass))
-        if compat.COMPLEX:
-            stiffness, inertia = S[0, 0], M[0, 0]
-        else:  # (re - i im) . A (re + i im)
-            stiffness, inertia = (A[0, 0] + A[1, 1] + 1j * (A[0, 1] - A[1, 0]) for A in (S, M))
-        return float(abs(stiffness - value * inertia) / max(abs(inertia), TINY))
-
-    def _others(self, matrix: PETSc.Mat) -> list[int]:
-        """Rows of the load and of drifts, of those that this rank has of a matrix."""
-        begin, end = matrix.getOwnershipRange()
-        return [i - begin for i in (self.system.load_index, *self.system.drifts) if begin <= i < end]
-
-    def _stiffness(self, matrix: PETSc.Mat) -> float:
-        """Largest sum of the absolute entries of a row of ``matrix``, but for rows of the load and of drifts.
-
-        These have a one on the diagonal, which is no stiffness and has other units.
-        """
-        sums = np.asarray(abs(local_rows(matrix)).sum(axis=1)).ravel()
-        sums[self._others(matrix)] = 0.0
-        return float(matrix.comm.tompi4py().allreduce(float(sums.max(initial=0.0)), op=MPI.MAX))
-
-    def _doubled(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
-        """Solve with a complex shift by the real matrix of twice the size."""
-        a, b, comm = target.real, target.imag, matrix.comm
-        shifted, upper = matrix.copy(), mass.copy()
-        shifted.axpy(-a, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        upper.scale(b)
-        lower = upper.copy()
-        lower.scale(-1.0)
-        pencil = PETSc.Mat().createNest([[shifted, upper], [lower, shifted]], comm=comm).convert("aij")
-        masses = PETSc.Mat().createNest([[mass, None], [None, mass]], comm=comm).convert("aij")
-        solver = self._solve(pencil, masses, 2 * number, 0.0)
-        re, im = pencil.createVecRight(), pencil.createVecRight()
-        out = []
-        for i in range(solver.getConverged()):
-            shift = solver.getEigenpair(i, re, im)
-            n = re.getLocalSize() // 2  # each rank holds its part of x, then its part of y
-            x, y = re.array_r[:n] + 1j * im.array_r[:n], re.array_r[n:] + 1j * im.array_r[n:]
-            first, second = comm.tompi4py().allreduce(
-                np.array([np.linalg.norm(x + 1j * y) ** 2, np.linalg.norm(x - 1j * y) ** 2])
-            )
-            if first >= second:
-                vector = (x + 1j * y)[self._own]
-                error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
-                out.append(_Pair(target + shift, [vector.real.copy(), vector.imag.copy()], error))
-        solver.destroy()
-        for made in (shifted, upper, lower, pencil, masses):
-            made.destroy()
-        return out[:number]
-
     def _solve(self, matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
         """Run SLEPc; raises :class:`ConvergenceError` where it finds nothing at all, or has no factors to do so.
 
@@ -509,19 +323,5 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return Inverse(factors)
 
 
-def _whole_pairs(found: list[_Pair], target: complex) -> list[_Pair]:
-    """Eigenvalues near a real ``target`` without the last one where that is a half of a pair, cut in two."""
-    if target.imag or len(found) < 2 or not found[-1].value.imag:
-        return found
-    value, others = found[-1].value.conjugate(), [p.value for p in found[:-1]]
-    cut = min(abs(v - value) for v in others) > abs(value.imag)
-    return found[:-1] if cut else found
-
-
 def _singular(target: complex) -> str:
     return f"The pencil is singular at the shift {target:.6g}: choose another load, or another discretisation."
-
-
-def dense(matrix: PETSc.Mat) -> np.ndarray:
-    """A matrix on this rank as a dense array, real."""
-    return np.array(matrix.copy().convert("dense").getDenseArray().real)

@@ -22,9 +22,10 @@ from rodfem.diagram import frequency_rows
 from rodfem.diagram.frequency_rows import FrequencyRows, Row
 from rodfem.diagram.held import at_load
 from rodfem.diagram.solver import Solver
+from rodfem.stability.finite_pairs import SHIFT, SPARE
 from rodfem.stability.followed_pairs import GUARDS, FollowedPairs
 from rodfem.stability.frequencies import Frequencies
-from rodfem.stability.nonsymmetric import SHIFT, SPARE, NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.stability.subspaces import Subspaces
 
 pytestmark = pytest.mark.alone

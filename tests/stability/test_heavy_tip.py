@@ -7,7 +7,8 @@ import pytest
 
 from forms.energy import bending_and_twist
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
-from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
+from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 
 def pushed(body: float) -> Scene:

@@ -9,7 +9,8 @@ from hard.fuzz.comparison import meshes
 from hard.fuzz.oracle import Oracle
 
 from rodfem import Discretization, Plan, Solver, trace
-from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
+from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 pytestmark = pytest.mark.alone
 

@@ -11,8 +11,9 @@ import pytest
 from hard.fuzz import scenes as fuzz
 
 from rodfem import Discretization, Solver
+from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.mode_type import STRAIGHT
-from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 EA = 40.0
 

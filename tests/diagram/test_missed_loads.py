@@ -1,0 +1,88 @@
+"""Pairs of critical loads of a sweep that come out of a thrust's greatest value, about as large as the critical one.
+
+The thrust on a column is a parabola in a parameter, and its greatest value at a row of the sweep or between two.  What
+is critical of the column is known: flutter of Beck's, divergence of one whose thrust follows the tip in part.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import classics
+import pytest
+from test_close_critical_loads import BECK, DIVERGES, FLUTTERS, SHARE
+
+from rodfem import Diagram, Plan, clamped, free
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+
+FINE, COARSE = Discretization("pointwise", 4, 6), Discretization("pointwise", 2, 4)
+AT_ROW, BETWEEN = 5.0, 5.0371
+CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE), "late flutter": (FLUTTERS, SHARE)}
+
+
+def peaked(
+    kind: str, top: float, at: float, mesh: Discretization, curvature: float = 1.0, bars: bool = True
+) -> Diagram:
+    """Sweep whose thrust is ``top`` above the critical one where it is greatest, ``at`` a value of its parameter."""
+    critical, share = CRITICAL[kind]
+
+    def push(part: float) -> Any:
+        return lambda c: (0.0, 0.0, -part * (critical + c.top - c.curvature * (c.p - c.at) ** 2))
+
+    ends = clamped(), free(force=push(1 - share), follower=push(share))
+    constants = {"p": 0.0, "B2": 10.0, "top": top, "at": at, "curvature": curvature}
+    scene = classics.column("peaked", ends, (0.0, 10.0), load="p", inertia=classics.BEAM, constants=constants)
+    return trace(scene, mesh, Plan(depth=0, error_bars=bars))
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
+@pytest.mark.parametrize(
+    ("kind", "top", "mesh", "curvature", "hidden"),
+    [
+        ("flutter", 3e-3, COARSE, 1.0, False),
+        ("flutter", 1e-5, COARSE, 1.0, True),
+        ("flutter", 1e-5, COARSE, 1e-3, True),
+        ("flutter", -1e-1, COARSE, 1.0, False),
+        ("flutter", 1e-9, FINE, 1.0, False),
+        ("flutter", 6e-11, FINE, 1.0, True),
+        ("flutter", 1e-11, FINE, 1.0, True),
+        ("flutter", -1e-9, FINE, 1.0, False),
+        ("divergence", 1e-6, COARSE, 1.0, False),
+        ("divergence", 1e-7, COARSE, 1.0, True),
+        ("divergence", 1e-7, COARSE, 1e-3, True),
+        ("divergence", -1e-4, COARSE, 1.0, False),
+        ("divergence", 1e-9, FINE, 1.0, True),
+        ("divergence", -1e-6, FINE, 1.0, False),
+    ],
+)
+def test_two_loads_or_none(
+    kind: str, top: float, mesh: Discretization, curvature: float, at: float, hidden: bool
+) -> None:
+    """Both are found, within their bars, or there are none, or what hides them is said: round-off, or the mesh."""
+    diagram = peaked(kind, top, at, mesh, curvature)
+    found = sorted((s.point.load, s.error_estimate) for s in diagram.special(kind) if abs(s.point.load - at) < 0.3)
+    exact = [at - sqrt(top / curvature), at + sqrt(top / curvature)] if top > 0 and not hidden else []
+    assert [abs(load - x) <= bar for (load, bar), x in zip(found, exact, strict=True)] == [True] * len(exact)
+    said = [any(words in one for words in ("is not known", "on a richer one")) for one in diagram.warnings]
+    assert said == [True] * hidden
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
+@pytest.mark.parametrize(("kind", "top"), [("late flutter", 5e-12), ("divergence", 1e-9), ("divergence", 1e-13)])
+def test_round_off_hides_two_loads(kind: str, top: float, at: float) -> None:
+    """It is said without another mesh, too: on this one flutter begins 5e-12 later than that of the column."""
+    diagram = peaked(kind, top, at, FINE, bars=False)
+    assert not [s for s in diagram.special() if s.kind.words in CRITICAL and abs(s.point.load - at) < 0.3]
+    assert ["is not known" in said for said in diagram.warnings] == [True]
+
+
+@pytest.mark.alone
+def test_prediction_without_an_error() -> None:
+    """One that is as good as none could be: its square was below zero, and the sweep ended with an exception."""
+    diagram = peaked("late flutter", -1e-1, AT_ROW, COARSE)
+    assert len(diagram.special("divergence")) == 4
+    assert not diagram.special("flutter")
