@@ -875,8 +875,8 @@ FAULTS = {
     ),
     "pairs-taken-for-one-meet-at-one-load": Fault(
         "rodfem/diagram/collisions.py",
-        "noise.discriminant_left + split) /",
-        "noise.discriminant_left) /",
+        "noise.of_discriminant + split) /",
+        "noise.of_discriminant) /",
         CLOSE,
     ),
     "frequencies-without-a-certificate": Fault(
@@ -1234,8 +1234,8 @@ FAULTS = {
     ),
     "flutter-without-the-matrix-s-round-off": Fault(
         f"{STABILITY}cluster_noise.py",
-        "of(2 * W @ B.T), abs(off)",
-        "0.0, abs(off)",
+        "of(2 * W @ B.T), *left",
+        "0.0, *left",
         "tests/stability/test_cluster_noise.py",
     ),
     "modules-beside-a-file-come-first": Fault(
