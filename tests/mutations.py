@@ -867,6 +867,9 @@ FAULTS = {
         "rodfem/diagram/hidden_events.py", "self._open(replace(self._at(here, a)", "(replace(self._at(here, a)", MISSED
     ),
     "a-mesh-misses-no-critical-loads": Fault("rodfem/diagram/missed_loads.py", "again > KNOWN * mine", "True", MISSED),
+    "steps-with-an-event-hide-no-others": Fault(
+        "rodfem/diagram/critical_loads.py", "self._beside(told, a, b) if told.events", "told if told.events", MISSED
+    ),
     "no-change-is-negative": Fault(
         "rodfem/stability/followed_pairs.py",
         "max(float(np.trace(spaces.changes[side])), 0.0)",

@@ -10,6 +10,7 @@ single real one passes through zero the rod diverges: the eigenvalue itself is s
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -82,8 +83,12 @@ class CriticalLoads:
         Nothing does in the step between that one and this.
         """
         told = self._told(a, b)
-        if told.events or told.doubts:
+        if told.doubts:
             return told
+        return self._beside(told, a, b) if told.events else self._quiet(told, last, a, b)
+
+    def _quiet(self, told: Told, last: Side | None, a: Side, b: Side) -> Told:
+        """The same of a step of which no events are ``told``."""
         before, here, after = (None if side is None else signature(side.found) for side in (last, a, b))
         try:
             if last is not None and here != after == before:
@@ -101,11 +106,31 @@ class CriticalLoads:
                     told.doubts.append(self._near_at(load))
                 return told
         except ConvergenceError as trouble:
-            told.doubts.append(
-                f"Whether frequencies meet, and part again, between {self._load} = {a.load:.6g} and {b.load:.6g} is "
-                f"not known ({str(trouble).rstrip('.')})."
-            )
+            told.doubts.append(self._unknown(a.load, b.load, trouble))
         return told
+
+    def _beside(self, told: Told, a: Side, b: Side) -> Told:
+        """What happens in a step, also what comes and goes on either side of the events that were ``told`` of it."""
+        for low, high in self._pieces(a, b, [event.load for event in told.events]):
+            ends = [side if load == side.load else None for side, load in ((a, low), (b, high))]
+            try:
+                first, last = (end or self._side(a, load) for end, load in zip(ends, (low, high), strict=True))
+            except ConvergenceError as trouble:
+                told.doubts.append(self._unknown(low, high, trouble))
+                continue
+            self.hidden.forget()
+            more = self._quiet(Told(), None, first, last)
+            if sum(event.change for event in more.events) == 0:
+                told = told.and_then(replace(more, entered=0))
+        self.hidden.forget()
+        return told
+
+    def _unknown(self, low: float, high: float, trouble: ConvergenceError) -> str:
+        """Words for two loads between which something may come and go, for a reason."""
+        return (
+            f"Whether frequencies meet, and part again, between {self._load} = {low:.6g} and {high:.6g} is not known "
+            f"({str(trouble).rstrip('.')})."
+        )
 
     def _near_at(self, load: float) -> str:
         """Words for a load at which something may come and go at once."""
@@ -171,13 +196,14 @@ class CriticalLoads:
         return bool((abs(a - b) > SMALL * abs(a)).any())
 
     @staticmethod
-    def _pieces(a: Side, b: Side, collisions: list[float]) -> list[tuple[float, float]]:
-        """Ranges of the load between ``a`` and ``b``, in their order, in which no two negative eigenvalues collide.
+    def _pieces(a: Side, b: Side, between: list[float]) -> list[tuple[float, float]]:
+        """Ranges of the load between ``a`` and ``b``, in their order, without the loads ``between`` them.
 
-        Where two do, fewer are real on one side: what passes through zero has another number in ascending order.
+        Where two negative eigenvalues collide, fewer are real on one side: what passes through zero has another number
+        in ascending order.
         """
         width, edges = b.load - a.load, [a.load]
-        for load in sorted(collisions, key=lambda x: abs(x - a.load)):
+        for load in sorted(between, key=lambda x: abs(x - a.load)):
             edges += [load - CLEAR * width, load + CLEAR * width]
         edges.append(b.load)
         return [(x, y) for x, y in zip(edges[::2], edges[1::2], strict=True) if (y - x) * width > 0]

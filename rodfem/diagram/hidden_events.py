@@ -122,6 +122,10 @@ class HiddenEvents:
         self.near: list[Lowest] = []
         self._told: set[int] = set()  # of what approached in the last step, what was lowest in it
 
+    def forget(self) -> None:
+        """The next step does not follow the last one."""
+        self._told = set()
+
     def between(self, third: Side, a: Side, b: Side) -> list[float]:
         """Loads between two sides at which something has happened that is undone at the other one, or may have.
 

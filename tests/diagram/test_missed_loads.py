@@ -13,6 +13,7 @@ import classics
 import pytest
 from test_close_critical_loads import BECK, DIVERGES, FLUTTERS, SHARE
 
+from forms.energy import bending_and_twist
 from rodfem import Diagram, Plan, clamped, free
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
@@ -78,6 +79,30 @@ def test_round_off_hides_two_loads(kind: str, top: float, at: float) -> None:
     diagram = peaked(kind, top, at, FINE, bars=False)
     assert not [s for s in diagram.special() if s.kind.words in CRITICAL and abs(s.point.load - at) < 0.3]
     assert ["is not known" in said for said in diagram.warnings] == [True]
+
+
+@pytest.mark.alone
+def test_two_loads_beside_a_third_one() -> None:
+    """In one step of the sweep flutter comes and goes in one plane, and in the other one the column diverges."""
+
+    def push(part: float) -> Any:
+        return lambda c: (0.0, 0.0, -part * (FLUTTERS + 1e-5 - (c.p - 5.007) ** 2))
+
+    scene = classics.column(
+        "two planes",
+        (clamped(), free(force=push(1 - SHARE), follower=push(SHARE))),
+        (4.0, 6.0),
+        load="p",
+        inertia=classics.BEAM,
+        constants={"p": 4.0},
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, FLUTTERS / DIVERGES * (1 + 0.1 * (c.p - 5.015)), 1.0)),
+    )
+    diagram = trace(scene, FINE, Plan(depth=0))
+    loads = sorted((s.point.load, s.kind.words) for s in diagram.special() if 5.0 < s.point.load < 5.02)
+    assert [kind for _, kind in loads] == ["flutter", "flutter", "divergence"]
+    exact = [5.007 - sqrt(1e-5), 5.007 + sqrt(1e-5)]
+    assert [load for load, _ in loads[:2]] == pytest.approx(exact, abs=1e-8)
+    assert not diagram.warnings
 
 
 @pytest.mark.alone

@@ -212,7 +212,8 @@ def frequencies_of(oracle: Oracle, point: Point) -> str | None:
     if apart.max() > SQUARE:
         worst = int(apart.argmax())
         return None if unsure else f"omega^2 = {mine[worst]:.8g} is none of {dense[:FREQUENCIES]}"
-    among = dense[(abs(dense) < LAST * abs(mine).max()) & (dense.real < LAST * mine.real.max())]
+    last = mine.real.max() - (1 - LAST) * abs(mine.real.max())  # the last one may be half of a pair
+    among = dense[(abs(dense) < LAST * abs(mine).max()) & (dense.real < last)]
     missing = among[(abs(among[:, None] - mine) > SQUARE * np.maximum(abs(among), one)[:, None]).all(axis=1)]
     if len(missing):
         return None if unsure else f"omega^2 = {missing[0]:.8g} is missing among {mine}"
