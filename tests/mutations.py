@@ -870,6 +870,12 @@ FAULTS = {
     "steps-with-an-event-hide-no-others": Fault(
         "rodfem/diagram/critical_loads.py", "self._beside(told, a, b) if told.events", "told if told.events", MISSED
     ),
+    "a-one-of-other-units-beside-the-stiffness": Fault(
+        f"{STABILITY}pencil.py",
+        "return 1.0 if units.ordinary else units.energy / float(system.sizes.getValue(index).real) ** 2",
+        "return 1.0",
+        "tests/problem/test_units.py",
+    ),
     "no-change-is-negative": Fault(
         "rodfem/stability/followed_pairs.py",
         "max(float(np.trace(spaces.changes[side])), 0.0)",

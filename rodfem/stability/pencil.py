@@ -140,7 +140,7 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
         state.assemble_into(target, form)
     if system.has_scalars:
         for index in (system.load_index, *system.drifts):  # no part of the pencil: an infinite eigenvalue each
-            matrix.setValue(index, index, 1.0, addv=True)
+            matrix.setValue(index, index, _one(system, index), addv=True)
     matrix.assemble()
     mass.assemble()
     if mass.norm(PETSc.NormType.INFINITY) == 0.0:
@@ -149,6 +149,12 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
             f"{system.scalar(x):g} this one has none: give it more, or another range."
         )
     return state
+
+
+def _one(system: System, index: int) -> float:
+    """Entry on the diagonal that is one in units of natural sizes: a greater one hides all others from a norm."""
+    units = system.scene.units
+    return 1.0 if units.ordinary else units.energy / float(system.sizes.getValue(index).real) ** 2
 
 
 def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
@@ -205,7 +211,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
         begin, end = image.getOwnershipRange()
         own = np.arange(begin, end, dtype=PETSc.IntType)
         if system.has_scalars:
-            matrix.setValue(index, index, -1.0, addv=True)
+            matrix.setValue(index, index, -_one(system, index), addv=True)
         matrix.setValues([index], own, image.array_r, addv=True)
         matrix.setValues(own, [index], image.array_r, addv=True)
     matrix.assemble()

@@ -18,6 +18,7 @@ from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
 from rodfem.continuation.special_points import coupling_of
 from rodfem.output import digits
 from rodfem.problem.local_state import Constants
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 DNA, PIPELINE = (1e-8, 2e-28, 1e-15), (1e4, 1e9, 1e3)
 """Lengths, stiffnesses and masses per length in SI units."""
@@ -153,6 +154,23 @@ def test_flutter(units: tuple[float, float, float]) -> None:
     omega2 = np.array(diagram["straight"].points[0].omega2)[[0, 2], 0] * mass * length**4 / stiffness
     np.testing.assert_allclose(omega2, np.array([1.875104068711961, 4.694091132974174]) ** 4, rtol=1e-7)
     assert [p.negative for p in diagram["straight"].points if p.load < flutter.point.load][-1] == 0
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(("length", "force"), [(1e-9, 1e-12), (1e4, 1e9)])
+@pytest.mark.parametrize("elements", [2, 8])
+def test_frequencies_of_a_cantilever(length: float, force: float, elements: int) -> None:
+    """By dense matrices on a coarse mesh: where the load was a number about one a molecule had no inertia there.
+
+    It had no asymmetry on any mesh.  In each of two planes the thrust is coupled to the rotation and the place of the
+    tip.
+    """
+    scene = rescaled(pushed(1.0, 1.0, 1.0), length, force)
+    solver = rodfem.Solver(scene, Discretization("pointwise", elements, 4))
+    pencil = NonsymmetricSolver(solver.equilibria.system).at(solver.equilibrium(1e-3).x)
+    omega2 = pencil.near_zero(4).values.real[:2] * length**2 / force
+    np.testing.assert_allclose(omega2, 1.875104068711961**4 * np.array([1.0, 1.3]), rtol=1e-3)
+    assert pencil.asymmetry()[0] == 4
 
 
 @pytest.mark.alone
