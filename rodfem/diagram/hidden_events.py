@@ -3,7 +3,8 @@
 Two real eigenvalues meet and part again, a complex pair becomes real and complex again, or one passes through zero and
 comes back.  What is smooth there and vanishes at the critical loads, the square of half the difference of the two or
 the eigenvalue itself, has a lowest value between the rows.  Where a parabola through it at three rows comes near zero
-the lowest value is sought, by equilibria.  Eigenvalues that cross have a lowest value of zero, and are left alone.
+the lowest value is sought, by equilibria.  Eigenvalues that cross have a lowest value of zero, and are left alone: they
+have vectors of their own there, where those of two that meet become one.
 """
 
 from __future__ import annotations
@@ -53,8 +54,8 @@ class Lowest:
     """The ``value`` of what approaches zero, of a ``cluster`` and a ``sign``, at the ``load`` at which it is lowest.
 
     It may be zero, for round-off, where it is ``open``.  Another mesh may have it on the other side of zero, unless
-    eigenvalues of a ``crossing`` cluster pass one another: they have vectors of their own.  Beside a row
-    of the sweep it is ``below`` that of the row.
+    eigenvalues of a ``crossing`` cluster pass one another: they have vectors of their own.  Beside a row of the sweep
+    it is ``below`` that of the row.
     """
 
     load: float
@@ -154,7 +155,7 @@ class HiddenEvents:
                     continue  # lower beyond a row: in the next step, or in one that has told of it
                 self._told.add(i)
                 out += [lowest.load] if self._open(lowest) else []
-            elif turns and f[1] < (CLOSE * sizes[0] if len(here.places) == 1 else (CLOSE * sizes[0]) ** 2):
+            elif turns and low > 0 and f[1] < (CLOSE * sizes[0] if len(here.places) == 1 else (CLOSE * sizes[0]) ** 2):
                 self._open(replace(self._at(here, a), below=f[1] - min(low, f[1])))
         return out
 

@@ -29,7 +29,7 @@ def missed_loads(
     """
     for lowest in near:
         row = min(branch.points, key=lambda p: abs(p.load - lowest.load))
-        one, mine = lowest.cluster.size == 1, lowest.value - lowest.below
+        single, mine = lowest.cluster.size == 1, lowest.value - lowest.below
         try:
             again = lowest.measured(richer(row.x, lowest.load, lowest.cluster)) - lowest.below
             found = f"{mine:.2g} on this mesh, and {again:.2g} on a richer one"
@@ -37,8 +37,8 @@ def missed_loads(
                 continue
         except ConvergenceError:
             found = f"{mine:.2g} on this mesh, and not found on a richer one"
-        what = "an eigenvalue is nearest to zero" if one else "two frequencies are nearest to one another"
-        measure = "its distance" if one else "the square of half the difference of their omega^2"
+        what = "an eigenvalue is nearest to zero" if single else "two frequencies are nearest to one another"
+        measure = "its distance" if single else "the square of half the difference of their omega^2"
         yield (
             f"Near {name} = {lowest.load:.8g} {what}: {measure} is {found}. A pair of critical loads may be missing "
             "there, use more elements."
