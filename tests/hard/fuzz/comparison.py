@@ -31,6 +31,8 @@ ZERO, NEAR = 1e-7, 1e-4
 """An eigenvalue less than the first, over the lowest bending one, is zero; between the two it may be either."""
 OF_A_RING = 1e-2
 """The second where a closed rod may move along itself: the mesh's eigenvalue of that motion."""
+COLLAPSED = 1e-9
+"""Stretch, at its least along the rod, at which the null space of the constraints of an unshearable rod is another."""
 LAST = 0.99
 """Share of the greatest recorded frequencies below which none is missing."""
 SQUARE = 1e-5
@@ -186,7 +188,7 @@ def index_of(oracle: Oracle, system: System, point: Point, special: bool) -> str
     mu = oracle.eigenvalues(point.x)
     near = OF_A_RING if any(s.along for s in system.symmetries) else NEAR
     unsure = ((abs(mu) > ZERO) & (abs(mu) < near)) | (oracle.noise > np.maximum(abs(mu), ZERO))
-    if special or oracle.dependent or unsure.any():
+    if special or oracle.dependent or point.stretch < COLLAPSED or unsure.any():
         return None
     negative, zero = int((mu < -ZERO).sum()), int((abs(mu) <= ZERO).sum())
     if point.negative <= negative <= point.negative + point.undecided and point.zero == zero:
