@@ -23,6 +23,7 @@ from rodfem.deflation.search import SAME, find_equilibria
 from rodfem.diagram.equivalence import equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.first_state import first_state
+from rodfem.diagram.images import has_other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.diagram.two_sides import are_images
 from rodfem.errors import ConvergenceError, SceneError
@@ -224,7 +225,9 @@ class Explorer(Tracer):
                     self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
                     continue
                 first = branch.points[1]
-                if any(are_images(self.solver, special, known, first, self.alike) for known in firsts):
+                images = [p for p in firsts if are_images(self.solver, special, p, first, self.alike)]
+                if images:
+                    self._say_other_ordinates(self.branches[before:], special, images[0], first)
                     continue  # the mirror image of a branch just traced
                 firsts.append(replace(first))  # as it is now: once it is traced richer meshes have decided its index
                 if special.connects_to is None and self._traced_already(branch, special):
@@ -233,6 +236,16 @@ class Explorer(Tracer):
                     continue
                 self.trace(branch)
         self._classify_from_the_side(special, self.branches[before:])
+
+    def _say_other_ordinates(self, traced: Sequence[Branch], special: SpecialPoint, first: Point, image: Point) -> None:
+        """Say where a side that is not traced, the ``image`` of one of the branches ``traced``, has other ordinates."""
+        for branch in traced:
+            if branch.points[1].x is first.x and first.mesh == image.mesh == self.solver.mesh:
+                if words := has_other_ordinates(branch, first, image, self.solver):
+                    self.observer.warn(
+                        f"{branch.name}: What leaves {special.point.load:.8g} on the other side is its mirror image "
+                        f"({words}), at the same loads and as stable, but has other ordinates, and is not traced."
+                    )
 
     def _lines(self, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
         """Directions of the branches that leave, given those of the null vectors; what leaves subcritically is first.
