@@ -210,6 +210,8 @@ class Explorer(Tracer):
             self.use(special.point.mesh)
             self._law(special, direction)
             for sign in (1.0, -1.0):
+                if self._enough():
+                    break
                 self.use(special.point.mesh)
                 name = self._name(parent)
                 origin = parent.name, i

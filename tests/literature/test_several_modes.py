@@ -70,6 +70,12 @@ def test_both_branches_leave(make: Callable[[float], Scene], B2: float) -> None:
     assert not diagram.warnings
 
 
+def test_no_more_branches_than_asked_for_leave_one_point() -> None:
+    """Two do; of a ring that its load leaves free in three motions there were tens, of seven asked for."""
+    plan = Plan(depth=1, error_bars=False, most_branches=2)
+    assert len(rodfem.trace(on_foundation(2.0), plan=plan).branches) == 2
+
+
 def test_two_waves_are_two_elasticas() -> None:
     """They leave the spring in the middle alone: each half is a column between pins, ``P = (4 K(m))^2``."""
     P = 44.0
