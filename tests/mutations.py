@@ -1130,12 +1130,6 @@ FAULTS = {
         "self._once = True",
         "tests/diagram/test_followed.py",
     ),
-    "round-off-of-the-load-s-row": Fault(
-        "rodfem/stability/finite_pairs.py",
-        "x.array[other] = 0.0",
-        "pass",
-        "tests/codim2/test_places.py",
-    ),
     "flutter-within-its-bars-is-known": Fault(
         "rodfem/diagram/sweep.py",
         "0 < apart <= sum(bars)",
