@@ -23,7 +23,7 @@ from rodfem.deflation.search import SAME, find_equilibria
 from rodfem.diagram.equivalence import equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.first_state import first_state
-from rodfem.diagram.images import has_other_ordinates
+from rodfem.diagram.images import other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.diagram.two_sides import are_images
 from rodfem.errors import ConvergenceError, SceneError
@@ -243,7 +243,7 @@ class Explorer(Tracer):
         """Say where a side that is not traced, the ``image`` of one of the branches ``traced``, has other ordinates."""
         for branch in traced:
             if branch.points[1].x is first.x and first.mesh == image.mesh == self.solver.mesh:
-                if words := has_other_ordinates(branch, first, image, self.solver):
+                if words := other_ordinates(branch, first, image, self.solver):
                     self.observer.warn(
                         f"{branch.name}: What leaves {special.point.load:.8g} on the other side is its mirror image "
                         f"({words}), at the same loads and as stable, but has other ordinates, and is not traced."

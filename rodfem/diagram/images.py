@@ -46,7 +46,7 @@ def image_of(branch: Branch, solver: StaticSolver) -> str:
     return found[0].in_words() if found else ""
 
 
-def has_other_ordinates(branch: Branch, first: Point, image: Point, solver: StaticSolver) -> str:
+def other_ordinates(branch: Branch, first: Point, image: Point, solver: StaticSolver) -> str:
     """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty where it keeps them, or signs.
 
     It carries the ``first`` state after the branch point to the state ``image`` on the other side.  States of other
