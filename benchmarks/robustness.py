@@ -39,6 +39,7 @@ SEED = 1
 TITLES = {
     "stiffness": "Stiffness, meshes, rotations",
     "bifurcations": "Bifurcations",
+    "sweeps": "Flutter and divergence of a sweep",
     "published": "Cases of the literature",
     "endurance": "Endurance",
 }

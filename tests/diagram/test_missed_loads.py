@@ -11,31 +11,15 @@ from typing import Any
 
 import classics
 import pytest
-from test_close_critical_loads import BECK, DIVERGES, FLUTTERS, SHARE
+from hard.thrusts import AT_ROW, BETWEEN, loads, peaked
+from test_close_critical_loads import DIVERGES, FLUTTERS, SHARE
 
 from forms.energy import bending_and_twist
-from rodfem import Diagram, Plan, clamped, free
+from rodfem import Plan, clamped, free
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 
 FINE, COARSE = Discretization("pointwise", 4, 6), Discretization("pointwise", 2, 4)
-AT_ROW, BETWEEN = 5.0, 5.0371
-CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE), "late flutter": (FLUTTERS, SHARE)}
-
-
-def peaked(
-    kind: str, top: float, at: float, mesh: Discretization, curvature: float = 1.0, bars: bool = True
-) -> Diagram:
-    """Sweep whose thrust is ``top`` above the critical one where it is greatest, ``at`` a value of its parameter."""
-    critical, share = CRITICAL[kind]
-
-    def push(part: float) -> Any:
-        return lambda c: (0.0, 0.0, -part * (critical + c.top - c.curvature * (c.p - c.at) ** 2))
-
-    ends = clamped(), free(force=push(1 - share), follower=push(share))
-    constants = {"p": 0.0, "B2": 10.0, "top": top, "at": at, "curvature": curvature}
-    scene = classics.column("peaked", ends, (0.0, 10.0), load="p", inertia=classics.BEAM, constants=constants)
-    return trace(scene, mesh, Plan(depth=0, error_bars=bars))
 
 
 @pytest.mark.alone
@@ -64,7 +48,7 @@ def test_two_loads_or_none(
 ) -> None:
     """Both are found, within their bars, or there are none, or what hides them is said: round-off, or the mesh."""
     diagram = peaked(kind, top, at, mesh, curvature)
-    found = sorted((s.point.load, s.error_estimate) for s in diagram.special(kind) if abs(s.point.load - at) < 0.3)
+    found = loads(diagram, kind, at)
     exact = [at - sqrt(top / curvature), at + sqrt(top / curvature)] if top > 0 and not hidden else []
     assert [abs(load - x) <= bar for (load, bar), x in zip(found, exact, strict=True)] == [True] * len(exact)
     said = [any(words in one for words in ("is not known", "on a richer one")) for one in diagram.warnings]
@@ -76,8 +60,8 @@ def test_two_loads_or_none(
 @pytest.mark.parametrize(("kind", "top"), [("late flutter", 5e-12), ("divergence", 1e-9), ("divergence", 1e-13)])
 def test_round_off_hides_two_loads(kind: str, top: float, at: float) -> None:
     """It is said without another mesh, too: on this one flutter begins 5e-12 later than that of the column."""
-    diagram = peaked(kind, top, at, FINE, bars=False)
-    assert not [s for s in diagram.special() if s.kind.words in CRITICAL and abs(s.point.load - at) < 0.3]
+    diagram = peaked(kind, top, at, FINE, error_bars=False)
+    assert not [one for words in ("flutter", "divergence") for one in loads(diagram, words, at)]
     assert ["is not known" in said for said in diagram.warnings] == [True]
 
 
@@ -98,10 +82,10 @@ def test_two_loads_beside_a_third_one() -> None:
         energy=lambda v, k, c: bending_and_twist(k, (1.0, FLUTTERS / DIVERGES * (1 + 0.1 * (c.p - 5.015)), 1.0)),
     )
     diagram = trace(scene, FINE, Plan(depth=0))
-    loads = sorted((s.point.load, s.kind.words) for s in diagram.special() if 5.0 < s.point.load < 5.02)
-    assert [kind for _, kind in loads] == ["flutter", "flutter", "divergence"]
+    inside = sorted((s.point.load, s.kind.words) for s in diagram.special() if 5.0 < s.point.load < 5.02)
+    assert [kind for _, kind in inside] == ["flutter", "flutter", "divergence"]
     exact = [5.007 - sqrt(1e-5), 5.007 + sqrt(1e-5)]
-    assert [load for load, _ in loads[:2]] == pytest.approx(exact, abs=1e-8)
+    assert [load for load, _ in inside[:2]] == pytest.approx(exact, abs=1e-8)
     assert not diagram.warnings
 
 

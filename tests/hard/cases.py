@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from hard import (
     bifurcations,
     classical,
@@ -13,7 +15,9 @@ from hard import (
     snapping,
     springy_rings,
     stiffness,
+    thrusts,
     uneven,
+    units,
     writhing,
 )
 from hard.case import Case
@@ -64,6 +68,17 @@ STIFFNESS = (
         "a foundation that varies on any scale", "the same, of springs along the rod", SAID,
         "Magnus' expansion of fourth order, on graded pieces", "number of a random draw", uneven.bed,
         (5,), tuple(range(20)),
+    ),
+    Case(
+        "metres and newtons of a molecule, and of a pipeline", "entries of the matrix from 1e-30 to 1e9", f"{EXACT}; "
+        "the loads are those in the problem's own units to 1e-9", "Euler, Haringx, Timoshenko, Greenhill, Michell, ...",
+        "problem", units.critical, ("heavy", "greenhill"), classical.PROBLEMS,
+    ),
+    Case(
+        "an end nearly free to turn", "eigenvalues as small as the error of a state", "eigenvalues within "
+        "their uncertainty; the index, or that their sign is undecided where that exceeds them", "the stiffness of a "
+        "joint is the eigenvalue of three rotations", "stiffness", stiffness.soft, (1e-6, -1e-8, -1e-10),
+        (1e-5, 1e-6, 1e-8, 1e-9, 1e-10, 1e-12, -1e-12, -1e-10, -1e-8, -1e-6, -1e-5),
     ),
 )  # fmt: skip
 BIFURCATIONS = (
@@ -140,6 +155,24 @@ BIFURCATIONS = (
     Case(
         "a load asked for at a branch point", "its equations are singular, or nearly", EXACT,
         "Euler, pi^2/4", "distance from it", ranges.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9),
+    ),
+)  # fmt: skip
+ABOVE = (1e-2, 1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-13, -1e-9, -1e-4)
+"""Greatest thrust of a sweep, less the critical one."""
+SWEEPS = (
+    Case(
+        "flutter of two planes", "one flutters in the step in which the other one does, or both are one pair to "
+        "round-off", EXACT, "Beck, by the characteristic equation", "B2/B1 - 1", thrusts.two_planes, (1e-6,),
+        (2e-2, 1e-2, 1e-3, 1e-6, 1e-9, 1e-10),
+    ),
+    *(
+        Case(
+            f"{kind} that comes and goes{where}", "complex pairs, or negative eigenvalues, of a range within one "
+            "step, about the greatest thrust", SAID, "Beck, thrusts that follow in part, by characteristic equations",
+            "greatest thrust less the critical one", partial(thrusts.pair, kind, at), few, ABOVE,
+        )
+        for kind in ("flutter", "divergence")
+        for at, where, few in ((thrusts.BETWEEN, "", (1e-6, 1e-11)), (thrusts.AT_ROW, ", at a row", (1e-9,)))
     ),
 )  # fmt: skip
 PUBLISHED = (
@@ -261,4 +294,10 @@ ENDURANCE = (
         endurance.scenes, (20,), (100, 1000),
     ),
 )  # fmt: skip
-CASES = {"stiffness": STIFFNESS, "bifurcations": BIFURCATIONS, "published": PUBLISHED, "endurance": ENDURANCE}
+CASES = {
+    "stiffness": STIFFNESS,
+    "bifurcations": BIFURCATIONS,
+    "sweeps": SWEEPS,
+    "published": PUBLISHED,
+    "endurance": ENDURANCE,
+}

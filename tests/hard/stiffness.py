@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from math import pi, sqrt, tan
+from math import inf, pi, sqrt, tan
 
 import classics
 import numpy as np
 from classics import SUPPORTS, column
 from hard.case import Change, Measured, compare, run, said, singular
 from scipy.optimize import brentq
+from stability.test_soft_modes import nearly_free
 
-from rodfem import Discretization
+from rodfem import Discretization, Solver
 
 EULER = pi**2 / 4
 """Buckling load of a cantilever of length and bending stiffness one."""
@@ -66,3 +67,13 @@ def turned(C: float) -> Measured:
     scene = scene.varying("phi", (0.0, 1.03 * GREENHILL / C), C=C)
     diagram = run(scene)
     return compare(singular(diagram[0]), [Change(GREENHILL / C, 0, 2)], said(diagram))
+
+
+def soft(spring: float) -> Measured:
+    """A spring at a ball joint, about three axes: of each rotation it is the eigenvalue, and its sign the stability."""
+    point = Solver(nearly_free(spring), Discretization("reduced", 4, 4)).equilibrium(0.0)
+    undecided = tuple(str(mode) for mode in point.soft if not mode.decided)
+    index = 0 if undecided or spring > 0 else 3
+    if len(point.soft) != 3 or (point.negative, point.undecided) != (index, len(undecided)):
+        return Measured(inf, 1.0, undecided, repr(point))
+    return Measured(max(abs(mode.value - spring) / mode.uncertainty for mode in point.soft), 1.0, undecided)

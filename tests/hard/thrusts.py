@@ -1,0 +1,59 @@
+"""Hard because they are near each other: two critical loads of a sweep, of two planes, or out of a greatest thrust.
+
+The thrust on a column is a parabola in a parameter, and at its greatest about as large as the critical one.  What is
+critical of the column is known: flutter of Beck's, divergence of one whose thrust follows the tip in part.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any
+
+import classics
+from diagram.test_close_critical_loads import BECK, DIVERGES, FLUTTERS, SHARE
+from hard.case import Change, Measured, compare, run, said
+
+from rodfem import Diagram, Discretization, clamped, free
+
+MESH = Discretization("pointwise", 4, 6)
+AT_ROW, BETWEEN = 5.0, 5.0371
+"""Values of the parameter: one of a row of the sweep, and one between two rows."""
+CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE), "late flutter": (FLUTTERS, SHARE)}
+NEAR = 0.3
+"""Of that value: other critical loads are farther away."""
+
+
+def peaked(kind: str, top: float, at: float, mesh: Discretization, curvature: float = 1.0, **plan: Any) -> Diagram:
+    """Sweep whose thrust is ``top`` above the critical one where it is greatest, ``at`` a value of its parameter."""
+    critical, share = CRITICAL[kind]
+
+    def push(part: float) -> Any:
+        return lambda c: (0.0, 0.0, -part * (critical + c.top - c.curvature * (c.p - c.at) ** 2))
+
+    ends = clamped(), free(force=push(1 - share), follower=push(share))
+    constants = {"p": 0.0, "B2": 10.0, "top": top, "at": at, "curvature": curvature}
+    scene = classics.column("peaked", ends, (0.0, 10.0), load="p", inertia=classics.BEAM, constants=constants)
+    return run(scene, mesh, **plan)
+
+
+def loads(diagram: Diagram, kind: str, at: float) -> list[tuple[float, float]]:
+    """Critical loads of a kind that are near the greatest thrust, each with its bar, in ascending order."""
+    return sorted((s.point.load, s.error_estimate) for s in diagram.special(kind) if abs(s.point.load - at) < NEAR)
+
+
+def pair(kind: str, at: float, top: float) -> Measured:
+    """``at -+ top^(1/2)``, or none where the greatest thrust is below the critical one."""
+    diagram = peaked(kind, top, at, MESH)
+    found = loads(diagram, kind, at)
+    exact = [at - sqrt(top), at + sqrt(top)] if top > 0 else []
+    if len(found) != len(exact):
+        return Measured(inf, 1.0, said(diagram), f"{found} where {exact} were expected")
+    ratios = tuple(abs(load - x) / bar for (load, bar), x in zip(found, exact, strict=True))
+    return Measured(max(ratios, default=0.0), 1.0, said(diagram), ratios=ratios)
+
+
+def two_planes(apart: float) -> Measured:
+    """Beck's column with bending stiffnesses 1 and 1 + apart."""
+    strong = 1.0 + apart
+    diagram = run(classics.partly_following(1.0, (0.0, 30.0), strong), MESH)
+    return compare(diagram.special("flutter"), [Change(BECK, 0, 2), Change(BECK * strong, 2, 4)], said(diagram))
