@@ -32,11 +32,9 @@ STILL = 1e-6
 """Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
 HOLDS = 1e6
 """Damping that holds a state while the multipliers of its constraints are found, over the lowest bending eigenvalue."""
-NEAR_START = 0.1
-"""An equilibrium nearer than this (metric norm) to the start is the one that is meant."""
 STRAYED = 0.3
 """If Newton's method moves the initial guess farther than this (metric norm), the result is not accepted as the first
-state."""
+state; an equilibrium nearer than this to the start is the one that is meant."""
 HELD = 1e-8
 """Drift scalar, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
 
@@ -131,7 +129,7 @@ class StaticSolver:
         x, outcome = self.at_load(guess, load)
         if not (outcome.converged and self._turned(guess, x) < STRAYED):
             near, found = self.at_load(self._balanced(guess), load)
-            if found.converged and self._turned(guess, near) < NEAR_START:
+            if found.converged and self._turned(guess, near) < STRAYED:
                 x, outcome = near, found
         if outcome.converged and self._turned(guess, x) >= STRAYED:
             outcome, good = self._examined(x, outcome)

@@ -260,3 +260,13 @@ def test_the_oracle_knows_a_saddle_point() -> None:
     scaled = (d := scaling(size[:, None] * S * size, np.arange(9)))[:, None] * (size[:, None] * S * size) * d
     assert abs(scaled).max(axis=1) == pytest.approx(1.0, rel=0.05)
     assert (np.linalg.eigvalsh(scaled) < 0).sum() == (np.linalg.eigvalsh(S) < 0).sum()
+
+
+def test_the_oracle_knows_a_frequency_that_is_zero() -> None:
+    """Nothing holds a rod against a rotation: beside elements of 2e-7 its omega^2 is round-off of up to 2e-4."""
+    made, _ = worker.made_by(20, 155, wide=True)
+    solver = Solver(made, comparison.meshes(made, 155)[0])
+    point = solver.equilibrium(4.9212295)
+    zero, *others = Oracle(solver.equilibria.system).squares(point.x)
+    assert zero == 0
+    assert np.real(others[:3]) == pytest.approx([omega2 for omega2, _ in point.omega2[:3]], rel=1e-6)

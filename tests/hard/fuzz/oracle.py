@@ -24,6 +24,8 @@ STRAINS = 1e-3
 """Weight of strains, which are not in the metric, relative to what is."""
 ROUND_OFF = 1e-14
 """Error of an eigenvalue, relative to the largest one."""
+OF_ENTRIES = 1e-15
+"""Round-off of the entries of a matrix."""
 FEW = 6
 """Eigenvalues ``omega^2`` whose round-off is measured."""
 FLOOR = 1e-13
@@ -73,13 +75,18 @@ class Oracle:
         """Finite eigenvalues ``omega^2`` of a rod under loads without a potential, by their distance from zero.
 
         ``noise`` is the largest difference, relative to it or to one unit, of one of the first few with another shift.
+        Those that the round-off of ``K`` cannot tell from zero, whatever the shift, are zero.
         """
         K, Z, _, M = self._reduced(x)
         unit = self.system.scene.units.omega2
         found = []
         for shift in (10.0 * unit, 7.0 * unit):
-            inverse = np.linalg.eigvals(np.linalg.solve(Z.T @ (K + shift * M) @ Z, Z.T @ M @ Z))
-            values = 1.0 / inverse[abs(inverse) > 1e-9 * abs(inverse).max()] - shift
+            inverse, w = np.linalg.eig(np.linalg.solve(Z.T @ (K + shift * M) @ Z, Z.T @ M @ Z))
+            finite = abs(inverse) > 1e-9 * abs(inverse).max()
+            values, vectors = 1.0 / inverse[finite] - shift, Z @ w[:, finite]
+            entries = (abs(vectors) * (abs(K) @ abs(vectors))).sum(axis=0)
+            kinetic = abs((vectors.conj() * (M @ vectors)).sum(axis=0))
+            values[abs(values) * kinetic <= OF_ENTRIES * entries] = 0.0
             found.append(values[np.argsort(abs(values))])
         first, other = found
         few = first[:FEW]

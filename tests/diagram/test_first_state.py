@@ -1,4 +1,4 @@
-"""States at which eigenvalues cannot be counted are no first state: the way down leads past them."""
+"""First states from a start that is no equilibrium: one on all meshes, and none at which nothing can be counted."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
+from classics import circle
 
-from rodfem import Attachment, Discretization, Ordinate, Plan, Scene, hinged, sliding_hinge, trace
+from rodfem import Attachment, Discretization, Ordinate, Plan, Ring, Scene, Solver, hinged, sliding_hinge, trace
 
 
 def energy(v: Any, k: Any, c: Any) -> Any:
@@ -41,3 +42,22 @@ def test_all_meshes_find_one_first_state() -> None:
         assert len(first) == len(other) == 2
         for a, b in zip(first, other, strict=True):
             assert abs(a.point.load - b.point.load) <= a.error_estimate + b.error_estimate
+
+
+def test_of_two_equilibria_the_one_beside_the_start() -> None:
+    """A tapered ring under dead loads inwards is 0.17 from the circle, and unstable: turned by pi it is stretched.
+
+    Newton's method without forces led there, on the meshes of 7 and 10 elements.
+    """
+
+    def stiff(v: Any, k: Any, c: Any) -> Any:
+        return (1 - 0.15 * c.s) * (1.335 * (k[0] ** 2 + k[1] ** 2) + 1.1 * k[2] ** 2 + 20 * (v[2] - 1) ** 2)
+
+    ring = Scene(
+        "tapered ring", (0.0, 2 * np.pi), "unshearable", stiff, {"P": 0.2}, "P", Ring(),
+        Ordinate("bending", None, of=lambda x, c: x.k[0] ** 2 + x.k[1] ** 2), (0.2, 5.0), planar="e2", start=circle,
+        distributed=lambda c: (c.P * ufl.cos(c.s), 0.0, -c.P * ufl.sin(c.s)),
+    )  # fmt: skip
+    found = [Solver(ring, Discretization("auto", elements, 5)).equilibrium(0.2) for elements in (7, 8, 10, 14)]
+    assert [point.negative for point in found] == [1] * 4
+    assert [point.ordinate for point in found] == pytest.approx([found[-1].ordinate] * 4, rel=1e-3)
