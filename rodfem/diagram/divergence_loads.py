@@ -77,11 +77,16 @@ def interpolated_zero(mean: Mean, load: float, one: float) -> tuple[float, float
 def zero_near(mean: Mean, load: float, one: float) -> tuple[float, float]:
     """Load near ``load``, of natural size ``one``, at which a ``mean`` of eigenvalues vanishes.
 
-    Also what round-off of the mean leaves open of it.
+    Also what round-off of the mean leaves open of it.  Raises :class:`ConvergenceError` where it does not vanish near.
     """
     from scipy.optimize import newton  # slow to load
 
     step = BESIDE * unit(load, one=one)
-    found = float(newton(mean, load, x1=load + step, tol=round_off(load, one)))
+    found, result = newton(mean, load, x1=load + step, tol=round_off(load, one), full_output=True, disp=False)
     slope = (mean(found + step) - mean(found - step)) / (2 * step)
-    return found, abs(mean.noise(found) / slope)
+    left = mean.noise(found)
+    if not result.converged:  # round-off of the mean may be more than the tolerance
+        left = max(left, abs(mean(found)))
+        if left > step * abs(slope):
+            raise ConvergenceError(f"No divergence load was found near {load:.6g}: use a smaller range.")
+    return float(found), abs(left / slope)

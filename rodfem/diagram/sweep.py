@@ -20,14 +20,14 @@ from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.prediction import ROWS, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
-from rodfem.diagram.held import at_load, require_held
+from rodfem.diagram.held import at_load
 from rodfem.diagram.kinks import Kinks
+from rodfem.diagram.load_steps import LoadSteps
 from rodfem.diagram.missed_loads import missed_loads
 from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
@@ -69,7 +69,6 @@ class Sweep:
         self.invariants = Invariants(solver)
         self.last: Row | None = None
         self._still = self.number  # frequencies that are zero at all loads
-        self.latest: list[Point] = []
         self.branches: list[Branch] = []
         self._load = solver.system.scene.load
 
@@ -129,29 +128,19 @@ class Sweep:
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
+            steps, latest = None, None
             for load in loads.tolist():
-                state = self._next(load, x)
-                if self.latest and (why := self._lost_convexity(self.latest[-1].x, state)):
+                state = x if steps is None else steps.to(load)
+                if latest is not None and (why := self._lost_convexity(latest.x, state) or self._dependent(state)):
                     return why
-                if why := self._dependent(state):
-                    return why
-                self.latest = [*self.latest[1 - ROWS :], self._point(state)]
+                latest = self._point(state)
+                steps = steps or LoadSteps(self.solver, latest, self.span)
                 for notice in self.solver.notices():
                     self.observer.warn(notice)
-                self._take(branch, self.rows.add(self.latest[-1]))
+                self._take(branch, self.rows.add(latest))
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._take(branch, self.rows.finish())
         return ""
-
-    def _next(self, load: float, first: PETSc.Vec) -> PETSc.Vec:
-        """Equilibrium at the next ``load``, predicted by the last ones; the ``first`` one where there are none."""
-        if not self.latest:
-            return first
-        x, outcome = self.solver.at_load(predict_at_load(self.solver.system, self.latest, load), load, nearby=True)
-        if not outcome.converged:
-            return at_load(self.solver, self.latest[-1].x, load)
-        require_held(self.solver, x)
-        return x
 
     def _lost_convexity(self, a: PETSc.Vec, b: PETSc.Vec) -> str:
         """Why a sweep ends between the equilibria ``a`` and ``b``; empty where the stored energy stays convex."""
@@ -174,7 +163,7 @@ class Sweep:
 
         Where they do, as those of a rod that is pulled taut, frequencies are not defined.
         """
-        if self.latest and may_depend(self.solver.shape, x):
+        if may_depend(self.solver.shape, x):
             try:
                 require_independent_constraints(self.solver.shape, x)
             except SceneError as trouble:

@@ -31,8 +31,10 @@ CLEAR = 1e-5
 
 Equal eigenvalues are taken apart by less.
 """
-ROUNDED = 1e-14
-"""Round-off of the inverse relative to its norm, and to the natural size of its entries where that is larger."""
+ROUNDED = 1e-13
+"""Round-off of the inverse relative to its norm, and to the natural size of its entries where that is larger.
+
+Of free rods on six elements up to 1.2e-14 is seen."""
 MANY = 1000
 """Rows with mass of which a second or so finds all eigenvalues."""
 MOST = 4000

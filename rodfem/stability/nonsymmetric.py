@@ -28,7 +28,7 @@ from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
 from rodfem.stability.finite_pairs import SHIFT, FinitePairs
-from rodfem.stability.frequencies import Frequencies, named, orthonormal, product, squares
+from rodfem.stability.frequencies import REAL, Frequencies, named, orthonormal, product, squares
 from rodfem.stability.pencil import (
     FACTORS,
     Inverse,
@@ -231,10 +231,11 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
         From ``S (x + c g) = mu M (x + c g)``, with ``S g = 0``.  The multiplier of ``g . Mx = 0`` is ``-mu c`` as well,
         but that of a vector which was predicted belongs to the basis ``g`` at the loads that it was predicted from.
+        Where ``mu`` is zero to round-off any part is as good, and none is taken.
         """
         begin, end = self.matrix.getOwnershipRange()
         drifts = [index - begin for index in self.system.drifts if begin <= index < end]
-        moving = abs(values) > 0
+        moving = abs(values) > REAL * self.system.scene.units.omega2
         for mode in self._free.values():
             force = mode.duplicate()
             self.matrix.multTranspose(mode, force)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import ufl
-from classics import column
+from classics import BEAM, column
 from hard.case import Change, Measured, compare, run, said, singular
 from hard.shooting_plane import ANGLE, MOMENT, STEP, Misfit, X, Z, determinant, fold, integrate, solve
 from hard.shooting_space import Branch
@@ -177,33 +177,39 @@ RANGE = 2.0
 """Largest angle of its clamp."""
 
 
-def clamp_of(tip: np.ndarray, load: float) -> np.ndarray:
-    """Angles of the clamp for angles of the tip, (m,)."""
-    return np.asarray(integrate((tip, 0.0, 0.0, 0.0, 0.0, -load), k0=CURVED, length=-1.0)[ANGLE])
+def clamp_of(tip: np.ndarray, load: float, share: float = 0.0) -> np.ndarray:
+    """Angles of the clamp for angles of the tip, (m,), which a ``share`` of the load follows."""
+    force = -share * load * np.sin(tip), -load * (1 - share + share * np.cos(tip))
+    return np.asarray(integrate((tip, 0.0, 0.0, 0.0, *force), k0=CURVED, length=-1.0)[ANGLE])
 
 
-def extremes(load: float) -> list[float]:
+def extremes(load: float, share: float = 0.0) -> list[float]:
     """Angles of the clamp within the range that are extreme for some angle of the tip."""
 
     def slope(tip: Any) -> np.ndarray:
-        return np.asarray(clamp_of(np.atleast_1d(tip) + 1j * STEP, load).imag / STEP)
+        return np.asarray(clamp_of(np.atleast_1d(tip) + 1j * STEP, load, share).imag / STEP)
 
     tips = np.linspace(-2 * pi, 2 * pi, 401)
     change = np.flatnonzero(np.diff(np.sign(slope(tips))))
     found = [brentq(lambda b: slope(b)[0], tips[i], tips[i + 1], xtol=1e-14) for i in change]
-    angles = clamp_of(np.array(found), load).real
+    angles = clamp_of(np.array(found), load, share).real
     return [float(t) for t in angles if abs(t) < RANGE]
+
+
+def turning(load: float, share: float, span: tuple[float, float]) -> Scene:
+    """The cantilever whose clamp turns through a ``span`` of angles, and whose load follows its tip by a ``share``."""
+    follower = {"follower": lambda c: (0.0, 0.0, -share * c.P)} if share else {}
+    return column(
+        "hysteresis", (clamped(rotation=lambda c: (ufl.cos(c.t / 2), 0.0, ufl.sin(c.t / 2), 0.0)),
+                       free(lambda c: (0.0, 0.0, (share - 1) * c.P), **follower)),
+        span, load="t", planar="e2", constants={"t": span[0], "P": load, "B2": 1.0, "k": CURVED},
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.k, k[2]), (c.B1, c.B2, c.C)),
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]), inertia=BEAM,
+    )  # fmt: skip
 
 
 def hysteresis(load: float) -> Measured:
     """Both folds, and the index on either side of each."""
-    scene = column(
-        "hysteresis", (clamped(rotation=lambda c: (ufl.cos(c.t / 2), 0.0, ufl.sin(c.t / 2), 0.0)),
-                       free(lambda c: (0.0, 0.0, -c.P))),
-        (-RANGE, RANGE), load="t", planar="e2", constants={"t": -RANGE, "P": load, "B2": 1.0, "k": CURVED},
-        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.k, k[2]), (c.B1, c.B2, c.C)),
-        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-    )  # fmt: skip
-    diagram = run(scene, Discretization("auto", 8, 6))
+    diagram = run(turning(load, 0.0, (-RANGE, RANGE)), Discretization("auto", 8, 6))
     high, low = sorted(extremes(load), reverse=True)
     return compare(singular(diagram[0]), [Change(high, 0, 1), Change(low, 1, 0)], said(diagram))

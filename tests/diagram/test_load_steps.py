@@ -1,0 +1,100 @@
+"""Sweeps that stay on one path of equilibria: up to a fold, past an imperfect bifurcation, across kinks of a load."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import classics
+import pytest
+import ufl
+from hard.snapping import RANGE, extremes, turning
+from hard.two_freedoms import scene as two_freedoms
+
+from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, clamped, free, trace
+
+pytestmark = pytest.mark.alone
+MESH = Discretization("auto", 6, 5)
+
+
+@pytest.mark.parametrize("down", [False, True])
+@pytest.mark.parametrize(("load", "share"), [(3.0, 0.02), (4.0, 0.1), (5.0, 0.2)])
+def test_a_path_ends_at_its_fold(load: float, share: float, down: bool) -> None:
+    """Beyond it there is one equilibrium, stable, and Newton's method finds it: the rod was said to be stable."""
+    span = (RANGE, -RANGE) if down else (-RANGE, RANGE)
+    fold = (min if down else max)(extremes(load, share))
+    diagram = trace(turning(load, share, span), Discretization("auto", 8, 6), Plan(depth=0, error_bars=False))
+    (said,) = diagram.warnings
+    found = re.search(r"= ([-0-9.e]+) could not be followed", said)
+    assert found is not None and abs(float(found[1]) - fold) < 1e-5
+    assert all(p.load >= fold if down else p.load <= fold for p in diagram[0].points)
+    assert said in diagram[0].ended
+
+
+def imperfect(lateral: Callable[[Any], Any], most: float) -> Scene:
+    """A column whose thrust follows its tip in part, under a lateral load as well."""
+    ends = (
+        clamped(),
+        free(force=lambda c: (0.0, lateral(c), -0.8 * c.P), follower=lambda c: (0.0, 0.0, -0.2 * c.P)),
+    )
+    return classics.column("pushed", ends, (0.0, most), planar="e1", inertia=classics.BEAM, constants={"B2": 5.0})
+
+
+@pytest.mark.parametrize("most", [5.0, 8.0])
+@pytest.mark.parametrize("lateral", [1e-3, 1e-4, 1e-5, 1e-7])
+def test_an_imperfect_column_bends_and_does_not_diverge(lateral: float, most: float) -> None:
+    """To one side, further and further; on the other side of the branch point the straight state is unstable."""
+    diagram = trace(imperfect(lambda c: lateral, most), MESH, Plan(depth=0, error_bars=False))
+    assert not diagram.special() and not diagram.warnings
+    assert all(p.stable for p in diagram[0].points)
+    below = [p.ordinate for p in diagram[0].points if p.load < 6.0]
+    assert all(a < b for a, b in pairwise(below))
+
+
+@pytest.mark.parametrize(
+    "lateral",
+    [
+        lambda c: 0.1 * ufl.max_value(c.P - 1.003, 0),
+        lambda c: 0.1 * abs(c.P - 1.003),
+        lambda c: 0.05 * ufl.sqrt(abs(c.P - 1.003)),
+    ],
+)
+def test_across_a_kink(lateral: Callable[[Any], Any]) -> None:
+    diagram = trace(imperfect(lateral, 2.5), MESH, Plan(depth=0, error_bars=False))
+    assert diagram[0].ended == "end of range" and not diagram.warnings
+
+
+def test_not_across_a_jump() -> None:
+    """The path ends where the lateral load has two values."""
+    jumping = imperfect(lambda c: ufl.conditional(ufl.lt(c.P, 1.003), 0.1, 0.3), 2.5)
+    diagram = trace(jumping, MESH, Plan(depth=0, error_bars=False))
+    assert diagram[0].points[-1].load < 1.003 and "could not be followed" in diagram[0].ended
+
+
+@pytest.mark.parametrize("apart", [0.1, 1e-2, 1e-3, 1e-5])
+def test_a_fold_pair_in_one_step(apart: float) -> None:
+    """``u^3 - a u = P`` with folds at P = +-apart/2, beside a force that follows and does no work."""
+    a = 3 * (apart / 4) ** (2 / 3)
+    scene = following(two_freedoms(lambda u, f2, c: 0.25 * u**4 - 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-1, 1), a=a))
+    diagram = trace(scene, Discretization("auto", 4, 3), Plan(depth=0, error_bars=False))
+    assert diagram.warnings and diagram[0].points[-1].load <= apart / 2
+
+
+def following(scene: Scene) -> Scene:
+    """The same with a force of 1e-9 that follows the middle, along the rod."""
+    return replace(
+        scene,
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1.0, 1.0, 1.0)),
+        attachments=(Attachment(0.5, follower=lambda c: (0.0, 0.0, c.small)),),
+        parameters=scene.parameters | {"small": Parameter(1e-9)},
+    )
+
+
+def test_no_divergence_load_is_said() -> None:
+    """Where eigenvalues touch zero a secant method found none, and its exception left the program."""
+    scene = following(two_freedoms(lambda u, f2, c: u**3 / 3 - 0.5 * c.P * u**2 + 0.5 * f2, (-0.3, 0.4)))
+    diagram = trace(scene, Discretization("auto", 4, 3), Plan())
+    assert any("No divergence load was found" in said for said in diagram.warnings)
