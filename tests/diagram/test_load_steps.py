@@ -2,56 +2,32 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
-import classics
 import pytest
 import ufl
-from hard.snapping import RANGE, extremes, turning
+from hard.paths import MESH, bends, imperfect, snapping
 from hard.two_freedoms import scene as two_freedoms
 
-from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, clamped, free, trace
+from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, trace
 
 pytestmark = pytest.mark.alone
-MESH = Discretization("auto", 6, 5)
 
 
 @pytest.mark.parametrize("down", [False, True])
 @pytest.mark.parametrize(("load", "share"), [(3.0, 0.02), (4.0, 0.1), (5.0, 0.2)])
 def test_a_path_ends_at_its_fold(load: float, share: float, down: bool) -> None:
     """Beyond it there is one equilibrium, stable, and Newton's method finds it: the rod was said to be stable."""
-    span = (RANGE, -RANGE) if down else (-RANGE, RANGE)
-    fold = (min if down else max)(extremes(load, share))
-    diagram = trace(turning(load, share, span), Discretization("auto", 8, 6), Plan(depth=0, error_bars=False))
-    (said,) = diagram.warnings
-    found = re.search(r"= ([-0-9.e]+) could not be followed", said)
-    assert found is not None and abs(float(found[1]) - fold) < 1e-5
-    assert all(p.load >= fold if down else p.load <= fold for p in diagram[0].points)
-    assert said in diagram[0].ended
-
-
-def imperfect(lateral: Callable[[Any], Any], most: float) -> Scene:
-    """A column whose thrust follows its tip in part, under a lateral load as well."""
-    ends = (
-        clamped(),
-        free(force=lambda c: (0.0, lateral(c), -0.8 * c.P), follower=lambda c: (0.0, 0.0, -0.2 * c.P)),
-    )
-    return classics.column("pushed", ends, (0.0, most), planar="e1", inertia=classics.BEAM, constants={"B2": 5.0})
+    assert snapping(load, share, down).right
 
 
 @pytest.mark.parametrize("most", [5.0, 8.0])
 @pytest.mark.parametrize("lateral", [1e-3, 1e-4, 1e-5, 1e-7])
 def test_an_imperfect_column_bends_and_does_not_diverge(lateral: float, most: float) -> None:
-    """To one side, further and further; on the other side of the branch point the straight state is unstable."""
-    diagram = trace(imperfect(lambda c: lateral, most), MESH, Plan(depth=0, error_bars=False))
-    assert not diagram.special() and not diagram.warnings
-    assert all(p.stable for p in diagram[0].points)
-    below = [p.ordinate for p in diagram[0].points if p.load < 6.0]
-    assert all(a < b for a, b in pairwise(below))
+    found = bends(lateral, most)
+    assert found.right and not found.said
 
 
 @pytest.mark.parametrize(

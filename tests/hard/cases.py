@@ -10,6 +10,7 @@ from hard import (
     endurance,
     heavy,
     isolas,
+    paths,
     published,
     ranges,
     snapping,
@@ -173,6 +174,17 @@ SWEEPS = (
         )
         for kind in ("flutter", "divergence")
         for at, where, few in ((thrusts.BETWEEN, "", (1e-6, 1e-11)), (thrusts.AT_ROW, ", at a row", (1e-9,)))
+    ),
+    Case(
+        "a fold of the path", "beyond it Newton's method finds the state that the rod snaps to, stable, too", "the "
+        "sweep ends within 1e-5 of the fold, and says so", "extremes of an explicit angle by shooting", "tip load of a "
+        "cantilever whose clamp turns, share that follows", lambda given: paths.snapping(*given), ((3.0, 0.02),),
+        ((3.0, 0.02), (3.0, 0.05), (4.0, 0.1), (5.0, 0.02), (5.0, 0.2), (8.0, 0.1)),
+    ),
+    Case(
+        "an imperfect column", "the other side of the gap has the unstable straight state", "it bends to one side and "
+        "is stable; or a sentence that says where its path could not be followed", "symmetry", "lateral load",
+        paths.bends, (1e-3, 1e-7), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
     ),
 )  # fmt: skip
 PUBLISHED = (

@@ -1,0 +1,56 @@
+"""Hard because Newton's method finds another path: a sweep before a fold, and past an imperfect bifurcation."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from itertools import pairwise
+from math import inf
+from typing import Any
+
+import classics
+from hard.case import Measured, run, said
+from hard.snapping import RANGE, extremes, turning
+
+from rodfem import Diagram, Discretization, Scene, clamped, free
+
+MESH = Discretization("auto", 6, 5)
+NEAR = 1e-5
+"""Distance from a fold at which a sweep ends."""
+
+
+def ends_at(diagram: Diagram) -> float:
+    """Load beyond which a sweep says that its path could not be followed; nan where it does not say so."""
+    found = [re.search(r"= ([-+0-9.e]+) could not be followed", sentence) for sentence in diagram.warnings]
+    return next((float(one[1]) for one in found if one), float("nan"))
+
+
+def snapping(load: float, share: float, down: bool = False) -> Measured:
+    """A cantilever whose clamp turns, and whose load follows its tip by a ``share``: where the sweep ends."""
+    span = (RANGE, -RANGE) if down else (-RANGE, RANGE)
+    fold = (min if down else max)(extremes(load, share))
+    diagram = run(turning(load, share, span), Discretization("auto", 8, 6), error_bars=False)
+    beyond = [p for p in diagram[0].points if (p.load < fold if down else p.load > fold)]
+    apart = abs(ends_at(diagram) - fold)
+    if beyond or not apart < inf:
+        return Measured(inf, 1.0, (), f"{beyond} beyond {fold}, ended {diagram[0].ended}")
+    return Measured(apart, NEAR)
+
+
+def imperfect(lateral: Callable[[Any], Any], most: float) -> Scene:
+    """A column whose thrust follows its tip in part, under a lateral load as well."""
+    ends = (
+        clamped(),
+        free(force=lambda c: (0.0, lateral(c), -0.8 * c.P), follower=lambda c: (0.0, 0.0, -0.2 * c.P)),
+    )
+    return classics.column("pushed", ends, (0.0, most), planar="e1", inertia=classics.BEAM, constants={"B2": 5.0})
+
+
+def bends(lateral: float, most: float = 8.0) -> Measured:
+    """It bends to one side, further and further, and is stable; beyond the branch point straight states are not."""
+    diagram = run(imperfect(lambda c: lateral, most), MESH, error_bars=False)
+    to_one_side = all(a.ordinate < b.ordinate for a, b in pairwise(diagram[0].points) if b.load < 6.0)
+    stable = all(p.stable for p in diagram[0].points) and not diagram.special("divergence")
+    ended = diagram[0].ended == "end of range"
+    wrong = "" if to_one_side and stable else f"{diagram.special('divergence')}, {diagram[0].points}"
+    return Measured(0.0 if ended and not wrong else inf, 1.0, said(diagram), wrong)
