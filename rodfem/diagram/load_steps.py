@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.prediction import ROWS, predict_at_load
+from rodfem.continuation.prediction import ROWS, across_orbit, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.held import require_held
 from rodfem.errors import ConvergenceError
@@ -115,11 +115,14 @@ class LoadSteps:
 
     def _predicted(self, known: Sequence[Point], load: float) -> PETSc.Vec | None:
         """Equilibrium at a ``load`` to which the ``known`` ones lead; None where there is none."""
-        predicted = predict_at_load(self.solver.system, known, load)
+        system, last = self.solver.system, known[-1].x
+        predicted = predict_at_load(system, known, load)
+        if system.drifts:  # where a state is on its orbit is arbitrary: it stays there
+            across_orbit(system, last, predicted, system.new_vector())
         x, outcome = self.solver.at_load(predicted, load, nearby=True)
         if not outcome.converged:
             return None
-        off, step = (self._sizes(x - other) for other in (predicted, known[-1].x))
+        off, step = (self._sizes(x - other) for other in (predicted, last))
         if (off > np.maximum(ASTRAY * step, STILL)).any():
             return None
         require_held(self.solver, x)

@@ -200,7 +200,10 @@ def _change_of_functional(
 def _change_of_equations(
     state: Evaluation, single: list[Symmetry], changes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,); for one rank alone."""
+    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,); for one rank alone.
+
+    Across the columns of the multipliers that close a ring: what these have to change by follows from the rest.
+    """
     fields, residual = state.fields, state.covector()
     whole = residual.copy()  # a scalar has a copy in each cell: all of its equation
     whole[fields.copies] = residual[fields.copies].sum(axis=0)
@@ -211,8 +214,19 @@ def _change_of_equations(
     sizes += _summed(fields, np.array([abs(A) @ abs(whole) for A in back]))
     # each equation beside its own terms: that of a place has none as large as the stiffest strain's
     largest = sizes.max(axis=1, keepdims=True)
-    table, sizes = (x / np.where(largest > 0, largest, 1.0) for x in (table, sizes))
+    table, sizes, closing = (x / np.where(largest > 0, largest, 1.0) for x in (table, sizes, _closing(fields, tangent)))
+    across = np.linalg.qr(closing)[0]
+    table -= across @ (across.T @ table)
     return np.asarray(np.linalg.qr(table, mode="r")), np.linalg.norm(sizes, axis=0)
+
+
+def _closing(fields: Fields, tangent: Any) -> np.ndarray:
+    """Columns of the ``tangent`` of the multipliers that close a ring, (unknowns, number)."""
+    numbers = [i for i, x in enumerate(fields.unknown_scalars) if x.group.motion is Motion.CLOSING]
+    changes = np.zeros((len(numbers), len(fields.number)))
+    for change, i in zip(changes, numbers, strict=True):
+        change[fields.copies[:, i]] = 1.0
+    return _summed(fields, np.array([tangent @ change for change in changes]).reshape(changes.shape), copies=True)
 
 
 def _summed(fields: Fields, table: np.ndarray, *, copies: bool = False) -> np.ndarray:
