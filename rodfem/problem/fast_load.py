@@ -2,7 +2,8 @@
 
 Along a branch that does not move the steps are as long as the states allow, and pass whole periods of a force that is a
 sine of the load.  A range in which one of the functions is not the cubic through four of its values is halved; a step
-is to be no longer than the ranges that it leads into.
+is to be no longer than the ranges that it leads into.  Functions are looked at between which places interval arithmetic
+bounds them (:mod:`rodfem.problem.enclosure`): no peak is too narrow to be seen.
 """
 
 from __future__ import annotations
@@ -14,12 +15,15 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
+import ufl
 
 from rodfem.errors import SceneError
+from rodfem.problem.enclosure import refined
 from rodfem.problem.kinds import plain
 from rodfem.problem.local_state import OfConstants, functions_of_places, some_places, watched
 from rodfem.problem.roles import functions_of
-from rodfem.tolerances import ROUND_OFF
+from rodfem.problem.values import Symbol, Values
+from rodfem.tolerances import ROUND_OFF, TINY
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Point
@@ -33,11 +37,15 @@ POLYNOMIAL = 1e-9
 """Difference, relative to the variation over the whole range, up to which a function is a cubic."""
 CLOSE = 0.02
 """The same, up to which a cubic tells it."""
+SEEN = 501
+"""Loads at which a function is looked at, at least."""
 PIECES = 4
 """Ranges to begin with where a function is no cubic."""
 DEEPEST = 10
 """How many times each of them is halved: beyond that it is said that a function is not followed."""
 Numbers = Callable[[float], list[float]]
+Seen = tuple[np.ndarray, np.ndarray]
+"""Loads in ascending order, (n,), and the values of a function there, (n, m)."""
 
 
 class FastLoad:
@@ -51,8 +59,9 @@ class FastLoad:
         """Sample the functions of a ``scene`` that depend on its load, over a ``span``."""
         first, last = sorted(span)
         self.doubt, ends = "", {first, last}
-        for what, function in _numbers(scene):
-            worst = _halved(function, first, last, ends)
+        for what, function, expressions in _numbers(scene):
+            seen = _seen(function, expressions, np.linspace(first, last, SEEN))
+            worst = _halved(function, seen, ends)
             if worst and not self.doubt:
                 self.doubt = (
                     f"The {what} changes too fast with {scene.load} about {scene.load} = {worst[0]:.6g} to be followed "
@@ -71,9 +80,10 @@ class FastLoad:
         return float((away + self.high - self.low).min() / rate)
 
 
-def _halved(function: Numbers, first: float, last: float, ends: set[float]) -> list[float]:
+def _halved(function: Numbers, seen: Seen, ends: set[float]) -> list[float]:
     """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not."""
-    size, off = _told(function, first, last)
+    first, last = float(seen[0][0]), float(seen[0][-1])
+    size, off = _told(function, first, last, seen)
     if not np.any(off > POLYNOMIAL * size):  # nor where it is not defined, nan
         return []
     edges = np.linspace(first, last, PIECES + 1).tolist()
@@ -83,7 +93,7 @@ def _halved(function: Numbers, first: float, last: float, ends: set[float]) -> l
     ends |= set(edges)
     while todo:
         low, high, depth = todo.pop()
-        _, off = _told(function, low, high)
+        _, off = _told(function, low, high, seen)
         if not np.any(off > CLOSE * size):
             continue
         if depth == DEEPEST:
@@ -95,16 +105,29 @@ def _halved(function: Numbers, first: float, last: float, ends: set[float]) -> l
     return sorted(left)
 
 
-def _told(function: Numbers, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+def _told(function: Numbers, low: float, high: float, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
     """How much a ``function`` varies between two loads, and how far from a cubic, beyond round-off, by component."""
     known, asked = (np.array([function(low + t * (high - low)) for t in places]) for places in (KNOWN, ASKED))
-    cubic = np.vander(ASKED, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
+    inside = slice(*np.searchsorted(seen[0], [low, high], side="right"))
+    there, asked = np.append(ASKED, (seen[0][inside] - low) / (high - low)), np.vstack([asked, seen[1][inside]])
+    cubic = np.vander(there, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
     values, off = np.vstack([known, asked]), abs(cubic - asked).max(axis=0)
     return np.ptp(values, axis=0), np.maximum(off - ROUND_OFF * abs(values).max(axis=0), 0.0)
 
 
-def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
-    """Functions that depend on the load, in words, each as the numbers that it returns at a load."""
+def _seen(function: Numbers, expressions: list[tuple[Values, Symbol]], loads: np.ndarray) -> Seen:
+    """A ``function`` at the ``loads``, and where its ``expressions`` have to be looked at besides; none if unknown."""
+    for values, load in expressions:
+        known = values({load: loads})
+        size = float(abs(known[np.isfinite(known)]).max(initial=0.0))
+        loads = refined(values.expression, load, loads, max(size, TINY))
+    if expressions:
+        return loads, np.stack([values({load: loads}) for values, load in expressions], axis=1)
+    return loads, np.array([function(load) for load in loads.tolist()])
+
+
+def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers, list[tuple[Values, Symbol]]]]:
+    """Functions that depend on the load: in words, as the numbers that each returns at a load, and as expressions."""
     point, rod = some_places(scene)
     found: list[tuple[str, OfConstants]] = [(what, f) for what, f, role in functions_of(scene) if role.call == "f(c)"]
     found += [(what, partial(f, x)) for what, f, x in functions_of_places(scene)]
@@ -116,7 +139,18 @@ def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
         except SceneError:
             continue
         if scene.load in names:
-            yield what, partial(_values, function, scene, point.s)
+            yield what, partial(_values, function, scene, point.s), _expressions(function, scene, point.s)
+
+
+def _expressions(function: OfConstants, scene: Scene, s: float) -> list[tuple[Values, Symbol]]:
+    """What a ``function`` returns at ``s`` as expressions of the load; none where it needs a number for that."""
+    load = Symbol()
+    try:
+        values = function(scene.constants(load, s=s))
+        parts = values if isinstance(values, (tuple, list)) else [values]
+        return [(Values(ufl.as_ufl(0.0 if x is None else x)), load) for x in parts]
+    except Exception:  # of UFL's own, and of what compares the load in Python
+        return []
 
 
 def _values(function: OfConstants, scene: Scene, s: float, load: float) -> list[float]:

@@ -1,18 +1,21 @@
-"""Hard because Newton's method finds another path: a sweep before a fold, and past an imperfect bifurcation."""
+"""Hard because a sweep may lose its path: before a fold, past an imperfect bifurcation, on an orbit, at a peak."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
-from math import inf
+from math import acos, inf, log, pi, sqrt
 from typing import Any
 
 import classics
+import ufl
 from hard.case import Measured, run, said
 from hard.snapping import RANGE, extremes, turning
 
-from rodfem import Diagram, Discretization, Scene, clamped, free
+from forms import loads
+from rodfem import Diagram, Discretization, Ordinate, Ring, Scene, clamped, free
 
 MESH = Discretization("auto", 6, 5)
 NEAR = 1e-5
@@ -54,3 +57,35 @@ def bends(lateral: float, most: float = 8.0) -> Measured:
     ended = diagram[0].ended == "end of range"
     wrong = "" if to_one_side and stable else f"{diagram.special('divergence')}, {diagram[0].points}"
     return Measured(0.0 if ended and not wrong else inf, 1.0, said(diagram), wrong)
+
+
+def floating_ring(waves: float, follows: bool) -> Scene:
+    """A ring with two ``waves`` of natural curvature, under a pressure as a load that follows or by its potential."""
+    load: dict[str, Any] = {"potential": lambda x, c: loads.pressure(x.r, x.dr, c.P)}
+    if follows:
+        load = {"follower": lambda c: (c.P, 0.0, 0.0), "inertia": classics.BEAM}
+    return classics.column(
+        "ring", Ring(), (0.0, 5.0), planar="e2", start=classics.circle, interval=(0.0, 2 * pi), constants={"e": waves},
+        energy=lambda v, k, c: 0.5 * ((k[1] - 1 - c.e * ufl.cos(2 * c.s)) ** 2 + k[0] ** 2 + k[2] ** 2),
+        ordinate=Ordinate("bending", None, of=lambda x, c: x.k[1] ** 2), **load,
+    )  # fmt: skip
+
+
+PEAK = 2.525
+"""Parameter at which the thrust is greatest, between two rows."""
+
+
+def peaked(width: float) -> Scene:
+    """The column under a thrust ``1 + 3 exp(-((P - PEAK)/width)^2)``."""
+
+    def thrust(part: float) -> Callable[[Any], Any]:
+        return lambda c: (0.0, 0.0, -part * (1 + 3 * ufl.exp(-(((c.P - PEAK) / width) ** 2))))
+
+    ends = clamped(), free(force=thrust(0.8), follower=thrust(0.2))
+    return replace(imperfect(lambda c: 0.0, 5.0), ends=ends)
+
+
+def critical(width: float) -> tuple[float, float]:
+    """Where the thrust is that at which the column diverges, ``cos P^(1/2) = -1/4``."""
+    half = width * sqrt(log(3 / (acos(-1 / 4) ** 2 - 1)))
+    return PEAK - half, PEAK + half
