@@ -28,11 +28,11 @@ def slender(mass: Callable[[Any], Any]) -> Inertia:
 
 
 def test_a_sweep_ends_before_a_negative_mass() -> None:
-    """The sweep has a row at P = 0.4."""
+    """It is from 0.39 on, and the rows are as near to one another there as such an edge asks for."""
     ends = clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))
     (branch,) = trace(column("sweep", ends, (0.0, 5.0), inertia=slender(dented(0.4, 0.01))), MESH, Plan())
-    assert "A mass or rotary inertia of -1 at P = 0.4 is negative: give zero or more" in branch.ended
-    assert 0.3 < branch.points[-1].load < 0.4
+    assert re.search(r"A mass or rotary inertia of -1 at P = 0\.39\d* is negative: give zero or more", branch.ended)
+    assert 0.38 < branch.points[-1].load < 0.39 + 1e-9
 
 
 @pytest.mark.parametrize(
