@@ -2,8 +2,9 @@
 
 Along a branch that does not move the steps are as long as the states allow, and pass whole periods of a force that is a
 sine of the load.  A range in which one of the functions is not the cubic through four of its values is halved; a step
-is to be no longer than the ranges that it leads into.  Functions are looked at between which places interval arithmetic
-bounds them (:mod:`rodfem.problem.enclosure`): no peak is too narrow to be seen.
+is to be no longer than the ranges that it leads into.  Between the loads at which they are looked at expressions of UFL
+are bounded by interval arithmetic (:mod:`rodfem.problem.enclosure`): no peak is too narrow to be seen.  Of a function
+without such bounds, one that compares the load in Python, a peak between :data:`SEEN` loads is not.
 """
 
 from __future__ import annotations
@@ -116,7 +117,7 @@ def _told(function: Numbers, low: float, high: float, seen: Seen) -> tuple[np.nd
 
 
 def _seen(function: Numbers, expressions: list[tuple[Values, Symbol]], loads: np.ndarray) -> Seen:
-    """A ``function`` at the ``loads``, and where its ``expressions`` have to be looked at besides; none if unknown."""
+    """A ``function`` at the ``loads``, and where its ``expressions``, if there are any, have to be looked at besides."""
     for values, load in expressions:
         known = values({load: loads})
         size = float(abs(known[np.isfinite(known)]).max(initial=0.0))
