@@ -114,7 +114,7 @@ class LoadSteps:
         return self._predicted([replace(last, x=y, load=beside), last], load) if outcome.converged else None
 
     def _predicted(self, known: Sequence[Point], load: float) -> PETSc.Vec | None:
-        """Equilibrium at a ``load``, where the ``known`` ones lead; None where there is none, or only one that is not."""
+        """Equilibrium at a ``load`` to which the ``known`` ones lead; None where none is found, or another one."""
         system, last = self.solver.system, known[-1].x
         predicted = predict_at_load(system, known, load)
         if system.drifts:  # where a state is on its orbit is arbitrary: it stays there

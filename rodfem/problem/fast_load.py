@@ -117,7 +117,7 @@ def _told(function: Numbers, low: float, high: float, seen: Seen) -> tuple[np.nd
 
 
 def _seen(function: Numbers, expressions: list[tuple[Values, Symbol]], loads: np.ndarray) -> Seen:
-    """A ``function`` at the ``loads``, and where its ``expressions``, if there are any, have to be looked at besides."""
+    """A ``function`` at the ``loads``, and where its ``expressions``, if any, have to be looked at besides."""
     for values, load in expressions:
         known = values({load: loads})
         size = float(abs(known[np.isfinite(known)]).max(initial=0.0))
