@@ -200,6 +200,25 @@ def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.silent
 
 
+@pytest.mark.parametrize(("excess", "differs"), [(0.0, False), (1e-3, True)])
+def test_energies_where_the_ordinate_is_zero(monkeypatch: pytest.MonkeyPatch, excess: float, differs: bool) -> None:
+    """By symmetry, on any mesh: its bar is round-off, but the energies of coarse meshes differ by 2.5e-6."""
+    trace, traces = comparison.trace, []
+
+    def raised(*given: object) -> object:
+        diagram = trace(*given)
+        if not traces:
+            for s in diagram[0].special:
+                s.point.energy *= 1 + excess
+        traces.append(diagram)
+        return diagram
+
+    monkeypatch.setattr(comparison, "trace", raised)
+    found = compared(scene(34, 174), 174, depth=0)
+    assert [sentence for sentence in found.differs if "energies" not in sentence] == []
+    assert bool(found.differs) == differs
+
+
 def test_a_scene_is_the_same_whatever_else_is_asked_for() -> None:
     first, again = scene(3, 5), scene(3, 5)
     assert (first.name, first.parameters, first.span) == (again.name, again.parameters, again.span)
