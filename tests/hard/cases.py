@@ -186,6 +186,17 @@ SWEEPS = (
         "is stable; or a sentence that says where its path could not be followed", "symmetry", "lateral load",
         paths.bends, (1e-3, 1e-7), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
     ),
+    Case(
+        "a peak of the load between two rows", "nothing of it is seen at any row", SAID,
+        "cos(P^(1/2)) = -1/4, the thrust 1 + 3 exp(-x^2)", "width of the peak", paths.peak, (1e-2, 1e-3, 1e-6),
+        (0.3, 0.1, 1e-2, 1e-3, 1e-4, 1e-6),
+    ),
+    Case(
+        "a floating ring under loads that follow", "nothing holds it, and Newton's method may turn it at random",
+        "every state to 1e-6; or a sentence that says where its path could not be followed", "that under a pressure "
+        "with a potential", "waves of natural curvature, elements", paths.floats, ((1e-1, 6), (1e-3, 8)),
+        tuple((waves, elements) for waves in (1e-1, 1e-2, 1e-3) for elements in (6, 8, 11)),
+    ),
 )  # fmt: skip
 PUBLISHED = (
     Case(

@@ -11,7 +11,7 @@ from typing import Any
 
 import classics
 import ufl
-from hard.case import Measured, run, said
+from hard.case import Change, Measured, compare, run, said
 from hard.snapping import RANGE, extremes, turning
 
 from forms import loads
@@ -20,6 +20,8 @@ from rodfem import Diagram, Discretization, Ordinate, Ring, Scene, clamped, free
 MESH = Discretization("auto", 6, 5)
 NEAR = 1e-5
 """Distance from a fold at which a sweep ends."""
+SAME = 1e-6
+"""Relative difference of the bending energies of a ring that two formulations load."""
 
 
 def ends_at(diagram: Diagram) -> float:
@@ -71,6 +73,17 @@ def floating_ring(waves: float, follows: bool) -> Scene:
     )  # fmt: skip
 
 
+def floats(given: tuple[float, int]) -> Measured:
+    """A ring of so many ``waves`` and elements under loads that follow, beside that under a potential, at 3."""
+    waves, elements = given
+    mesh = Discretization("pointwise", elements, 6)
+    swept, traced = (run(floating_ring(waves, follows), mesh, error_bars=False, at=(3.0,)) for follows in (True, False))
+    a, b = ([s.point.ordinate for s in diagram.special("user")] for diagram in (swept, traced))
+    ended = swept[0].ended == traced[0].ended == "end of range"
+    apart = max((abs(x - y) / y for x, y in zip(a, b, strict=True)), default=inf) if len(a) == len(b) else inf
+    return Measured(apart if ended else inf, SAME, said(swept))
+
+
 PEAK = 2.525
 """Parameter at which the thrust is greatest, between two rows."""
 
@@ -89,3 +102,11 @@ def critical(width: float) -> tuple[float, float]:
     """Where the thrust is that at which the column diverges, ``cos P^(1/2) = -1/4``."""
     half = width * sqrt(log(3 / (acos(-1 / 4) ** 2 - 1)))
     return PEAK - half, PEAK + half
+
+
+def peak(width: float) -> Measured:
+    """Both divergence loads beside the peak."""
+    diagram = run(peaked(width), MESH)
+    indices = (0, 1), (1, 0)
+    expected = [Change(load, *index) for load, index in zip(critical(width), indices, strict=True)]
+    return compare(diagram.special("divergence"), expected, said(diagram))
