@@ -40,6 +40,7 @@ TITLES = {
     "stiffness": "Stiffness, meshes, rotations",
     "bifurcations": "Bifurcations",
     "sweeps": "Flutter and divergence of a sweep",
+    "loci": "Loci in two parameters",
     "published": "Cases of the literature",
     "endurance": "Endurance",
 }

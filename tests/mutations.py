@@ -38,6 +38,7 @@ CHAIN = "tests/continuation/test_index_chain.py"
 MIXED = "tests/continuation/test_laws_of_mixed_ordinates.py"
 FOLLOW = "tests/continuation/test_continuation.py"
 LOCATE = "tests/continuation/test_locate.py"
+LOCI = "tests/hard/test_hard_loci.py"
 ERRORS = "tests/adaptivity/test_error_estimate.py"
 FILES = "tests/output/test_files.py tests/output/test_formats.py"
 KILLS = "tests/hard/test_files_after_a_kill.py"
@@ -354,8 +355,8 @@ FAULTS = {
     ),
     "places-of-one-mesh": Fault(
         "rodfem/codim2/locus.py",
-        "there = place(criterion, other, near, node.sought, node.windows).p",
-        "there = node.p",
+        "there, located_to = sought.p, sought.dp",
+        "there, located_to = node.p, sought.dp",
         "tests/codim2/test_places.py",
     ),
     "ends-of-folds-corrected": Fault(
@@ -944,7 +945,7 @@ FAULTS = {
     ),
     "pairs-taken-for-one-meet-at-one-load": Fault(
         "rodfem/diagram/collisions.py",
-        "noise.of_discriminant + split) /",
+        "noise.of_discriminant + clear.split) /",
         "noise.of_discriminant) /",
         CLOSE,
     ),
@@ -1336,6 +1337,48 @@ FAULTS = {
     ),
     "terminal-left-without-its-cursor": Fault(
         "rodfem/app/screen.py", "            self._progress.stop()\n", "", "tests/app/test_screen.py"
+    ),
+    "locus-of-a-mean-with-the-bar-of-one": Fault(
+        "rodfem/codim2/singular.py", "split = SPLIT * at.spread", "split = 0.0 * at.spread", LOCI
+    ),
+    "flutter-locus-of-a-mean-with-the-bar-of-one": Fault(
+        "rodfem/codim2/collision.py", "+ SPLIT * here.split", "+ 0.0 * here.split", LOCI
+    ),
+    "flutter-locus-of-a-mean": Fault("rodfem/codim2/collision.py", "if here.split > FEWER", "if False and here", LOCI),
+    "locus-across-a-gap": Fault(
+        "rodfem/codim2/curve.py", "if node.orientation != last.orientation and not", "if False and not", LOCI
+    ),
+    "every-crossing-of-loci-is-a-gap": Fault(
+        "rodfem/codim2/curve.py",
+        "                return False\n        return True\n",
+        "                return False\n        return False\n",
+        LOCI,
+    ),
+    "locus-through-an-imperfection": Fault(
+        "rodfem/codim2/singular.py", "if changed <= max(", "if True or changed <= max(", LOCI
+    ),
+    "drift-of-a-state-is-an-imperfection": Fault("rodfem/codim2/singular.py", "max(OFF * np", "max(0.0 * np", LOCI),
+    "states-drift-along-null-vectors": Fault(
+        "rodfem/codim2/singular.py",
+        "np.append(1.0, -self._aside(b, responded))",
+        "np.append(1.0, 0.0 * self._aside(b, responded))",
+        LOCI,
+    ),
+    "flutter-locus-by-eigenvalues-alone": Fault(
+        "rodfem/codim2/collision.py", "step = -noise.two_sided / slope", "step = 0.0", LOCI
+    ),
+    "closed-locus-goes-round-again": Fault("rodfem/codim2/curve.py", "CLOSED = 0.1", "CLOSED = 1e-4", LOCI),
+    "bar-of-a-locus-without-what-is-left": Fault(
+        "rodfem/codim2/locus.py", "[bound(*pair, rho)", "[bound(*pair, 0.0)", "tests/codim2/test_places.py"
+    ),
+    "modes-that-meet-without-round-off": Fault(
+        "rodfem/modes/finder.py",
+        "np.maximum(noise, FLOOR",
+        "np.maximum(0.0 * noise, FLOOR",
+        "tests/modes/test_modes.py",
+    ),
+    "modes-that-meet-have-no-square-root": Fault(
+        "rodfem/modes/finder.py", "MEET = 0.1", "MEET = np.inf", "tests/modes/test_modes.py"
     ),
 }
 

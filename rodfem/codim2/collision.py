@@ -15,20 +15,26 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.codim2.criterion import Destroyed
 from rodfem.codim2.others import UNSTABLE, beside_cluster
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
+from rodfem.stability.cluster_noise import noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF
 
 FIRST = 1e-4
 """First step of the secants, relative to the bounds."""
-SHARP, NOISE = 1e-12, 1e-8
+SHARP, NOISE = 1e-6, 1e-4
 """Steps of the secants that end them: by their own size, or where they no longer shrink."""
 DIFFERENCE = 1e-3
 """Step of the central differences of ``D``, relative to the bounds."""
+FEWER = 1e-5
+"""Pairs whose ``D`` differ by more than this, over the square of their mean, are not equal by a symmetry."""
+SPLIT = 1.1
+"""Times what the ``D`` of pairs differ by that each may be off: to first order."""
 
 
 class Collision:
@@ -64,14 +70,18 @@ class Collision:
             clearest = max((clearest, low, high), key=lambda m: m.spread)
         if not np.linalg.norm(gradient):
             raise ConvergenceError("the discriminant is constant")
+        if here.split > FEWER * max(omega2**2, system.scene.units.omega2**2):
+            raise Destroyed(f"its {here.cluster.size // 2} pairs of eigenvalues do not meet together any more")
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
-        dq = dq if dq @ forward >= 0 else -dq
+        orientation = 1 if dq @ forward >= 0 else -1
         system.line = self.plane.along(p, 0)
         system.set_load(x, float(p[0]))
         rest = beside_cluster(self.eigensolver.at(x), clearest.cluster.basis)
         return replace(
             node,
-            dp=dq * width,
+            dp=orientation * dq * width,
+            orientation=orientation,
+            located_to=node.located_to + SPLIT * here.split * abs(gradient) / (gradient @ gradient) * width,
             modes=as_vectors(system, clearest.cluster.basis),
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
             lower=int(np.sign(gradient[0])),
@@ -101,26 +111,42 @@ class Collision:
         return LocusPoint(p, x, forward * width, still, located, ordinate=ordinate, omega2=here.cluster.mean), here
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
-        """Zero of ``D`` on the system's line of parameters, by secants: t, its last change, the cluster, state.
+        """Zero of ``D`` on the system's line of parameters: t, its uncertainty, the cluster, state.
 
-        Secants end where they no longer shrink: ``D`` has a round-off of about ``eps mu^2``.
+        Secants take ``D`` from the eigenvalues, whose round-off is that of an eigensolver: they end near the zero, or
+        where they no longer shrink.  The last digits are by ``D`` of both subspaces, right and left.
         """
         t, other = 0.0, FIRST
         now, x = self._measured(t, x, cluster)
         at_other = self._measured(other, x, cluster)[0].discriminant
         before = np.inf
+        slope = (at_other - now.discriminant) / (other - t)
         for _ in range(12):
             if now.discriminant == at_other:
                 break
             step = -now.discriminant * (other - t) / (at_other - now.discriminant)
             if abs(step) < SHARP or (abs(step) < NOISE and abs(step) > 0.3 * before):
-                return t, abs(step), now, x
+                return self._by_both_sides(t, slope, now, x)
+            if abs(other - t) > SHARP:
+                slope = (at_other - now.discriminant) / (other - t)
             other, at_other, before = t, now.discriminant, abs(step)
             t += step
             if abs(t) > reach:
                 break
             now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
         raise ConvergenceError("two eigenvalues do not collide near by")
+
+    def _by_both_sides(
+        self, t: float, slope: float, now: Measured, x: PETSc.Vec
+    ) -> tuple[float, float, Measured, PETSc.Vec]:
+        """Correct a zero of ``D`` near ``t``, where its ``slope`` is known, twice; the last change is a doubt."""
+        step = 0.0
+        for _ in range(2):
+            noise = noise_of(self.eigensolver.at(x), now)
+            step = -noise.two_sided / slope
+            t += step
+            now, x = self._measured(t, x, now.cluster)
+        return t, abs(step) + abs(noise.discriminant / slope), now, x
 
     def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
         """The cluster at ``t`` on the system's line of parameters, and the state there."""

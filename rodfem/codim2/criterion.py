@@ -9,6 +9,11 @@ from petsc4py import PETSc
 
 from rodfem.codim2.parameter_plane import LocusPoint, Tangent
 from rodfem.continuation.static_solver import StaticSolver
+from rodfem.errors import ConvergenceError
+
+
+class Destroyed(ConvergenceError):
+    """The special point changes its kind, or ends, along the locus; the message says why."""
 
 
 class Criterion(Protocol):

@@ -9,15 +9,13 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.codim2.along import COARSE, WIDE, place, shifted
-from rodfem.codim2.criterion import Criterion
+from rodfem.codim2.criterion import Criterion, Destroyed
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Sought, between, predict
-from rodfem.codim2.singular import Destroyed
 from rodfem.continuation.convexity_between import lost_between
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.roots import zero_between
-from rodfem.tolerances import unit
 
 LOCATED = 1e-8
 """Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
@@ -31,8 +29,14 @@ CERTAIN = 10.0
 """Uncertainties of a parameter by which it changes towards a turning point: less is the round-off of a constant."""
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
 """The end of a curve of flutter: its double eigenvalue vanishes."""
-CLOSED = 1e-9
-"""Difference of ordinates that a closed curve may end with, over their size, where they do not change along it."""
+CLOSED = 0.1
+"""Distance of the beginning of a closed curve from the cubic between two nodes that it is between, over theirs."""
+RESOLVED = 1e-6
+"""Arclength of the steps by which a crossing of two curves is told from a turn before the other one."""
+TURNED = 0.7
+"""Cosine of the angle by which a curve has turned that does not lead across another one."""
+CROSSES = "another curve of its kind crosses it"
+"""What is said of a row beyond a crossing."""
 
 
 @dataclass
@@ -56,7 +60,9 @@ class Tracer:
 
     def run(self, start: LocusPoint) -> Half:
         """Follow to an end."""
-        half, history, step = Half([start]), [start], self.steps.first
+        half, history, step = Half([start], ended=start.ended), [start], self.steps.first
+        if half.ended:
+            return half
         ahead = start.p + AHEAD * start.dp
         over = self.plane.outside(ahead)
         if over is not None:
@@ -75,14 +81,14 @@ class Tracer:
                     half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
                     return half
                 continue
-            half.ended = self._lost_convexity(last, node) or self._between(half, last, node)
+            half.ended = node.ended or self._lost_convexity(last, node) or self._between(half, last, node)
             if half.ended:
                 return half
             half.nodes.append(node)
             if bound:
                 half.ended = bound
                 return half
-            if len(history) > 10 and self._closes(start, last, node):
+            if len(history) > 2 and self._closes(start, last, node):
                 half.nodes.append(start)
                 half.ended = "closed curve"
                 return half
@@ -126,6 +132,8 @@ class Tracer:
             if over is None:
                 if turn < 0.9 or node.s - last.s > 2 * step:
                     raise ConvergenceError("the curve bends too sharply")
+                if node.orientation != last.orientation and not self._leads_across(last, node):
+                    raise ConvergenceError("the curve turns before another one")
                 return node, self.criterion.length(p - node.p, x - node.x), ""
             p = node.p
         which, bound = over
@@ -140,6 +148,28 @@ class Tracer:
         if other is not None or node.s - last.s > 2 * step:
             raise ConvergenceError("it leaves near a corner of the bounds")
         return node, 0.0, self._bound(which, bound)
+
+    def _leads_across(self, a: LocusPoint, b: LocusPoint) -> bool:
+        """Whether the curve through ``a`` leads to ``b``, on another side of its tangent, across a second curve.
+
+        Two curves that nearly cross are the two sides of a gap: each turns, and a step may lead from one to the other.
+        In smaller and smaller steps towards the crossing it is seen which; down to :data:`RESOLVED` they are one point.
+        """
+        here, step = a, (b.s - a.s) / 2
+        while step > RESOLVED:
+            try:
+                p, x, dp, dx = predict([here], here.s + step)
+                node = self._after(here, self.criterion.correct(p, x, (dp, dx), here, 0.5 * step))
+            except ConvergenceError:
+                step /= 2
+                continue
+            if node.orientation != here.orientation or self._cosine(node, here.dp, here.dx) < 0.9:
+                step /= 2
+                continue
+            here = node
+            if here.s > b.s or self._cosine(here, a.dp, a.dx) < TURNED:
+                return False
+        return True
 
     def _bound(self, which: int, bound: float) -> str:
         return f"{self.plane.names[which]} = {bound:g}, its bound"
@@ -181,6 +211,8 @@ class Tracer:
             half.nodes.append(node)
         if a.rest != b.rest:
             half.marks[len(half.nodes)] = self.criterion.others
+        elif a.orientation != b.orientation:
+            half.marks[len(half.nodes)] = CROSSES
         return ""
 
     def _located(
@@ -264,11 +296,11 @@ class Tracer:
         """Whether the curve passes its beginning again between two nodes."""
         whole, part = (b.p - a.p) / self.plane.width, (start.p - a.p) / self.plane.width
         size = float(np.linalg.norm(whole))
-        if not size or not 0 < part @ whole <= size**2 or self._cosine(b, start.dp, start.dx) < 0.5:
+        if not size or not 0 < part @ whole <= size**2:
             return False
-        aside = abs(part[0] * whole[1] - part[1] * whole[0]) / size
-        still = CLOSED * unit(start.ordinate, one=self.criterion.solver.units.ordinate)
-        return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + still
+        p, x, dp, dx = between(a, b, a.s + (part @ whole) / size**2 * (b.s - a.s))
+        near = self.criterion.length(p - start.p, x - start.x) < CLOSED * (b.s - a.s)
+        return near and self._cosine(start, dp, dx) > 0.5
 
 
 def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.adaptivity.ordinate_bound import bound
 from rodfem.codim2.along import place
 from rodfem.codim2.collision import Collision
 from rodfem.codim2.criterion import Criterion
@@ -35,7 +36,7 @@ from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.nonsmooth import Nonsmooth, Reasons
-from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number
 from rodfem.output.files import mesh_of, save_json
@@ -437,6 +438,7 @@ def _estimate(
     transfer = Transfer(solver.system, richer.system)
     other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
     criterion: Criterion | None = None
+    rho = halved(solver.system.fields.discretization.degree)
     for row in rows:
         node = nodes[row]
         x = transfer(node.x, state=True)
@@ -450,9 +452,12 @@ def _estimate(
             along = nodes[min(row + 1, len(nodes) - 1)].p - nodes[max(row - 1, 0)].p
         try:
             if node.sought is None:
-                there = criterion.correct(node.p, x, (along, None), near, 0.1).p
+                found = criterion.correct(node.p, x, (along, None), near, 0.1)
+                there, located_to = found.p, found.located_to
             else:
-                there = place(criterion, other, near, node.sought, node.windows).p
-            error[row] = np.maximum(abs(there - node.p), node.located_to)
+                sought = place(criterion, other, near, node.sought, node.windows)
+                there, located_to = sought.p, sought.dp
+            each = zip(node.p, there, node.located_to + located_to, strict=True)
+            error[row] = [bound(*pair, rho) for pair in each]
         except ConvergenceError:
             error[row] = np.inf

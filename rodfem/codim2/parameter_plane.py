@@ -38,9 +38,10 @@ class LocusPoint:
     folds ``coupling`` (2,) is the derivative of the equations in the two parameters along the null vector, in units of
     the bounds, and ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue.  ``modes`` are the null
     vectors, or a basis of the double eigenvalue's invariant subspace; ``left`` the left null vectors where they are
-    others.  ``located_to`` (2,) are the uncertainties of the parameters, and ``ordinate`` is the scene's.  A turning
-    point or an end is ``sought`` along the curve, and was found in ``windows`` of these half widths (see
-    :mod:`rodfem.codim2.along`); others are not.
+    others.  ``orientation`` is the side of the tangent, -1 or 1, on which the defining function grows: it changes only
+    where two curves cross.  ``ended`` says why the curve ends here, empty where it does not.  ``located_to`` (2,) are
+    the uncertainties of the parameters, and ``ordinate`` is the scene's.  A turning point or an end is ``sought`` along
+    the curve, and was found in ``windows`` of these half widths (see :mod:`rodfem.codim2.along`); others are not.
     """
 
     p: np.ndarray
@@ -57,12 +58,14 @@ class LocusPoint:
     coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))
     modes: list[PETSc.Vec] = field(default_factory=list)
     left: list[PETSc.Vec] = field(default_factory=list)
+    orientation: int = 0
+    ended: str = ""
     sought: Sought | None = None
     windows: tuple[float, ...] = ()
 
     def reversed(self) -> LocusPoint:
         """The same point with the opposite tangent."""
-        return replace(self, dp=-self.dp, dx=-self.dx)
+        return replace(self, dp=-self.dp, dx=-self.dx, orientation=-self.orientation)
 
 
 class Plane:

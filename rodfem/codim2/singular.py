@@ -21,10 +21,10 @@ Chaos 1 (1991) 493-520).  It is regular also at a *cusp*, where ``phi.S_phi phi 
 ``phi.F_a = phi.F_b = 0`` is it not: there the fold ends on a branch point.
 
 *Branch point*: ``phi.F_a = phi.F_b = 0`` all along the curve, because of a symmetry that ``phi`` breaks.  Then ``F +
-beta psi = 0``, ``psi.(x - x0) = 0`` and ``tr G = 0`` are regular in ``(x, beta, a, b)``, and ``beta = 0``: the equation
-``psi.(x - x0) = 0`` keeps the state symmetric, and ``beta`` is the imperfection that a parameter would have to make up
-for.  Where it does not vanish the parameter destroys the branch point.  Null vectors that a symmetry relates are
-several columns of ``psi``, and ``G`` is a multiple of the identity.
+beta psi = 0``, ``psi.x = 0`` and ``tr G = 0`` are regular in ``(x, beta, a, b)``, and ``beta = 0``: the equation
+``psi.x = 0``, for the part of ``x`` that breaks the symmetry, keeps the state symmetric, and ``beta`` is the
+imperfection that a parameter would have to make up for.  Where it does not vanish the parameter destroys the branch
+point.  Null vectors that a symmetry relates are several columns of ``psi``, and ``G`` is a multiple of the identity.
 
 *Divergence* under loads without a potential: ``S`` is not symmetric.  The columns of the border are near ``M`` times
 the left null vectors, its rows near ``M`` times the right ones, and with ``W`` the solution of the transposed bordered
@@ -42,6 +42,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.codim2.criterion import Destroyed
 from rodfem.codim2.others import UNSTABLE, VANISHED, beside_zero
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
 from rodfem.continuation.branch_solver import BranchSolver
@@ -60,15 +61,20 @@ IMPERFECT = 1e-7
 """An imperfection above this, of the rod's lowest bending eigenvalue, is not round-off."""
 FEWER = 1e-5
 """Null vectors whose eigenvalues differ by more than this, of the same, are not related by a symmetry."""
-
-
-class Destroyed(ConvergenceError):
-    """The special point changes its kind, or ends, along the locus; the message says why."""
+SPLIT = 1.1
+"""Times what such eigenvalues differ by that each may be off: to first order."""
+CANCELLED, ACROSS = 1e-6, 1e-9
+"""A coupling with the null vectors that is not zero by symmetry: over the sum of its terms, and over their sizes."""
+OFF, NONE = 1e-5, 1e-12
+"""One along the curve that is none: over that across it, and over the lowest bending eigenvalue."""
 
 
 @dataclass
 class _Linear:
-    """Linearisation at a state: residual solve, responses to both parameters, right and left null vectors, G_z."""
+    """Linearisation at a state: residual solve, responses to both parameters, right and left null vectors, G_z.
+
+    ``coupled`` tells of either parameter whether its derivative has a part along the left null vectors.
+    """
 
     s0: PETSc.Vec
     b0: np.ndarray
@@ -81,6 +87,7 @@ class _Linear:
     grad_x: PETSc.Vec
     grad_p: np.ndarray
     rest: int
+    coupled: tuple[bool, ...] = ()
 
 
 class Singular:
@@ -168,7 +175,7 @@ class Singular:
         old: _Linear | None = None
         before, total = np.inf, 0.0
         for _ in range(12):
-            now = self._linear(p, x, origin[1], old)
+            now = self._linear(p, x, old)
             along = row_p @ (p - origin[0]) + (row_x.dot(x - origin[1]) if row_x else 0.0)
             dp, dx = self._step(now, row_p, row_x, along, scale)
             size = self.length(dp, dx)
@@ -224,7 +231,7 @@ class Singular:
                 system.set_load(image, 0.0)
         return columns, image
 
-    def _linear(self, p: np.ndarray, x: PETSc.Vec, reference: PETSc.Vec, old: _Linear | None) -> _Linear:
+    def _linear(self, p: np.ndarray, x: PETSc.Vec, old: _Linear | None) -> _Linear:
         """Linearise at a point; with ``old`` its derivatives serve again."""
         system, bordered, k = self.system, self.bordered, len(self.psi)
         columns = self._columns(p, x, None)[0] if old is None else []
@@ -236,23 +243,24 @@ class Singular:
             raise ConvergenceError("the stored energy is not defined there")
         saddle = self.saddle.at(x)
         rest = bordered.factor(saddle.matrix, self.psi, self.phi)
-        gauge = np.zeros(k)
-        if not self.fold:  # psi.(x - x0) = 0 keeps the state symmetric: beta, in b0, then is the imperfection
-            gone = x - reference
-            gauge = np.array([-w.dot(gone) for w in self.phi])
-        s0, b0 = bordered.solve(-equations, gauge)
+        # psi.dx = 0 keeps the state symmetric where it is no fold: beta, in b0, then is the imperfection
+        s0, b0 = bordered.solve(-equations, np.zeros(k))
         solved = [bordered.solve(None, e) for e in np.eye(k)]
         v, G = [w for w, _ in solved], np.array([row for _, row in solved])
         # where a symmetry relates the null vectors G is a multiple of the identity: one equation, its trace
         g = float(np.trace(G)) / k
-        spread = float(abs(G - g * np.eye(k)).max())
+        spread = float(np.linalg.norm(G - g * np.eye(k), 2))
         if old is not None:
             return _Linear(s0, b0, old.response, old.b, v, old.w, g, spread, old.grad_x, old.grad_p, rest)
         responses = [bordered.solve(-column, np.zeros(k)) for column in columns]
         w = self._left(saddle, v)
         grad_x, grad_p = self._gradient(p, x, v, w)
         b = np.array([row for _, row in responses])
-        return _Linear(s0, b0, [y for y, _ in responses], b, v, w, g, spread, grad_x, grad_p, rest)
+        coupled = tuple(any(_along(left, column) for left in w) for column in columns)
+        if not self.fold:
+            responded = np.array([grad_x.dot(y) for y, _ in responses]) + grad_p
+            s0 = combine([s0, *v], np.append(1.0, -self._aside(b, responded)))
+        return _Linear(s0, b0, [y for y, _ in responses], b, v, w, g, spread, grad_x, grad_p, rest, coupled)
 
     def _left(self, saddle: Factored, v: list[PETSc.Vec]) -> list[PETSc.Vec]:
         """Left null vectors of a state, those of the columns of ``psi``; the right ones ``v`` by symmetry."""
@@ -277,10 +285,11 @@ class Singular:
 
     def _node(self, p: np.ndarray, x: PETSc.Vec, along: Tangent, last: np.ndarray) -> LocusPoint:
         """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
-        at = self._linear(p, x, x, None)
+        at = self._linear(p, x, None)
         scale = self.saddle.scale
+        broken = "{} is an imperfection that destroys the branch point"
         if not self.fold and abs(at.b0).max() > IMPERFECT * scale:
-            raise Destroyed(f"{self.plane.names[1]} is an imperfection that destroys the branch point")
+            raise Destroyed(broken.format(self.plane.names[1]))
         if at.spread > FEWER * scale:
             raise Destroyed(f"its {len(self.psi)} zero eigenvalues do not vanish together any more")
         width = self.plane.width
@@ -299,20 +308,48 @@ class Singular:
         size = self.length(dp, dx)
         forward = along[0] / width**2 @ dp + ((self.metric * dx).dot(along[1]) if along[1] else 0.0)
         size = size if forward >= 0 else -size
+        coupled = [] if self.fold else self._imperfections(at, dp / width)
         dx.scale(1.0 / size)
+        # each of several eigenvalues vanishes no farther across the curve than their mean by what they differ
+        split = SPLIT * at.spread * abs(g) / max(g @ g, TINY) * width if len(at.v) > 1 else 0.0
         return LocusPoint(
             p,
             x,
             dp / size,
             dx,
-            self._located(p, last),
+            self._located(p, last) + split,
             ordinate=self.solver.shape.ordinate(x),
+            ended=broken.format(coupled[-1]) if coupled else "",
+            orientation=1 if size > 0 else -1,
             rest=self._negative(p, x, at.rest) if self.turned is None else self._others(p, x),
             curvature=float(curvature) if self.fold else 0.0,
             coupling=coupling if self.fold else np.zeros(2),
             modes=at.v,
             left=[] if self.turned is None else at.w,
         )
+
+    def _aside(self, b: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """How far a state is off along each of the null vectors, (k,), by the coupling ``b`` (2, k) that this brings.
+
+        No equation but that keeps a state from drifting along them: ``b`` is ``u`` times the ``gradient`` (2,) of
+        ``tr G / k``, which changes by ``u^2``.  Any other ``b`` is no drift, and left.
+        """
+        across = gradient * self.plane.width
+        off = across @ (b * self.plane.width[:, None]) / max(across @ across, TINY)
+        rest = np.linalg.norm(b * self.plane.width[:, None] - np.outer(across, off))
+        return np.where(rest <= OFF * np.linalg.norm(across) * np.linalg.norm(off), off, 0.0)
+
+    def _imperfections(self, at: _Linear, along: np.ndarray) -> list[str]:
+        """Parameters that have a part along the null vectors, which destroys the branch point ``along`` the curve.
+
+        A state that is off by a little of a null vector has such a part as well, but across the curve: it is that of
+        the gradient of ``G``.
+        """
+        b = at.b * self.plane.width[:, None]
+        changed = abs(along @ b).max() / np.linalg.norm(along)
+        if changed <= max(OFF * np.linalg.norm(b), NONE * self.saddle.scale):
+            return []
+        return [name for name, is_so in zip(self.plane.names, at.coupled, strict=True) if is_so]
 
     def _located(self, p: np.ndarray, last: np.ndarray) -> np.ndarray:
         """Uncertainties of both parameters, across the curve, by their ``last`` changes."""
@@ -342,6 +379,15 @@ class Singular:
         self.system.line = self.plane.along(p, 0)
         self.system.set_load(x, float(p[0]))
         return beside_zero(self.frequencies.at(x), len(self.phi))
+
+
+def _along(left: PETSc.Vec, column: PETSc.Vec) -> bool:
+    """Whether a ``column`` has a part along a ``left`` null vector that neither symmetry nor round-off explains."""
+    terms, sizes = left.copy(), column.copy()
+    terms.abs()
+    sizes.abs()
+    part = abs(left.dot(column))
+    return bool(part > max(CANCELLED * terms.dot(sizes), ACROSS * left.norm() * column.norm()))
 
 
 def null_vectors(saddle: Inertia, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:

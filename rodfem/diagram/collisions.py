@@ -227,7 +227,6 @@ def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: f
     """
     found = locate_flutter(measured, cluster, load, width)
     noise, clear = measured.noise(found.clear, found.cluster), measured(found.clear, found.cluster)
-    split = float(abs((clear.values - clear.cluster.mean) ** 2 - clear.discriminant).max())
-    moved = (noise.of_discriminant + split) / abs(found.slope)
-    left = noise.of_mean + split / max(2 * float(np.sqrt(abs(clear.discriminant))), TINY)
+    moved = (noise.of_discriminant + clear.split) / abs(found.slope)
+    left = noise.of_mean + clear.split / max(2 * float(np.sqrt(abs(clear.discriminant))), TINY)
     return replace(found, uncertainty=found.uncertainty + moved, left=found.left + left)

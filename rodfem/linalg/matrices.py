@@ -55,11 +55,16 @@ def local_rows(matrix: PETSc.Mat) -> sp.csr_matrix:
 
 def rounding(matrix: PETSc.Mat, v: PETSc.Vec, x: PETSc.Vec) -> float:
     """Change of ``v.Sx`` by independent relative errors eps of all entries of a ``matrix`` S."""
+    return rounding_of(matrix, v.array_r, x.array_r)
+
+
+def rounding_of(matrix: PETSc.Mat, v: np.ndarray, x: np.ndarray) -> float:
+    """The same for ``v`` and ``x`` (n,), real or complex, by the n values of each on this rank."""
     comm, known = matrix.comm.tompi4py(), shared(matrix)
     rows = local_rows(matrix) if known is None else known.matrix
     entries = sp.csr_matrix((abs(rows.data) ** 2, rows.indices, rows.indptr), shape=rows.shape)
-    squares = np.concatenate(comm.allgather(abs(x.array_r) ** 2))
-    return float(EPS * np.sqrt(comm.allreduce(float(abs(v.array_r) ** 2 @ times(entries, squares)))))
+    squares = np.concatenate(comm.allgather(abs(x) ** 2))
+    return float(EPS * np.sqrt(comm.allreduce(float(abs(v) ** 2 @ times(entries, squares)))))
 
 
 def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:

@@ -12,13 +12,19 @@ from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.nonsmooth import Nonsmooth, Reasons
 from rodfem.fem.transfer import Transfer, halved, richer_system
+from rodfem.linalg.matrices import rounding
 from rodfem.modes.eigenmotions import Eigenmotions, stack
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.stability.assessment import Assessor, Verdict
+from rodfem.stability.cluster_noise import DRAWN
+from rodfem.stability.inertia import NOISE
 from rodfem.stability.left_right import moving, two_sided
+from rodfem.stability.symmetric import SymmetricPencil
 
 FLOOR = 5e-12
 """Least uncertainty of an eigenvalue by round-off, relative to the greatest one (rings of 32 elements: 2e-12)."""
+MEET = 0.1
+"""Change of an eigenvalue from mesh to mesh, over its distance from the next, above which both have a square root."""
 
 
 class ModeFinder(Eigenmotions):
@@ -35,49 +41,53 @@ class ModeFinder(Eigenmotions):
         """Assess the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
         verdict = self.assessor(x, method, number)
         sample = self.motions.sample(x)
-        found = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
+        found, noise = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
         errors, reasons = np.full(len(found["value"]), np.nan), Reasons([], [])
         values = found["value"][: len(found["value"]) - found["motion"].count(SYMMETRY)]
         if self._nonsmooth is not None:
             reasons = self._nonsmooth(x)
         if self.error_bars and not reasons:
-            errors[: len(values)] = self._errors(x, values)
+            errors[: len(values)] = self._errors(x, values, noise)
         unit = sample["q"] / np.linalg.norm(sample["q"], axis=1, keepdims=True)
         state = {"load": self.system.scalar(x), "s": sample["s"], "r": sample["r"], "q": unit}
         return verdict, Modes(**state, error=errors, note=reasons.sentence if reasons else "", **found)
 
-    def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> dict[str, Any]:
-        """Modes from the vectors of a verdict, orthonormal in the mass, and the symmetries'."""
+    def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> tuple[dict[str, Any], np.ndarray]:
+        """Modes from the vectors of a verdict, orthonormal in the mass, the symmetries', and round-off of those."""
         if not verdict.vectors:
             raise InputError("Counting alone finds no modes: choose another method than 'count'.")
-        turned = self.turned(x, verdict.values, verdict.vectors, self.assessor.symmetric.at(x).mass)
+        pencil = self.assessor.symmetric.at(x)
+        turned = self.turned(x, verdict.values, verdict.vectors, pencil.mass)
+        noise = _rounded(pencil, turned.vectors[: len(verdict.values)], verdict.values)
         weights = [self.motions.dual(x, y) for y in turned.duals]
         none = np.zeros(len(turned.vectors) - len(verdict.values))
         right = stack(turned.motions)
-        return {
+        found = {
             "value": np.append(verdict.values, none),
             "residual": np.append(verdict.errors, none * np.nan),
             "motion": turned.names,
             **dict(zip(("displacement", "rotation"), right, strict=True)),
             **dict(zip(LEFT, (*right, *stack(weights)), strict=True)),
         }
+        return found, noise
 
-    def _pairs(self, x: PETSc.Vec, number: int) -> dict[str, Any]:
-        """Right and left modes of the eigenvalues nearest zero, biorthonormal in the mass."""
+    def _pairs(self, x: PETSc.Vec, number: int) -> tuple[dict[str, Any], np.ndarray]:
+        """Right and left modes of the eigenvalues nearest zero, biorthonormal in the mass, and round-off of these."""
         found = two_sided(self.assessor.nonsymmetric.at(x), number)
         right, sign = self.signed([self.complex(x, column) for column in found.right.T])
         left = [self.complex(x, k * column) for k, column in zip(sign, found.left.T, strict=True)]
         weights = [self.complex(x, k * column, dual=True) for k, column in zip(sign, found.weighed.T, strict=True)]
-        return {
+        modes = {
             "value": found.values,
             "residual": found.errors,
             "motion": found.kinds,
             **dict(zip(("displacement", "rotation"), stack(right), strict=True)),
             **dict(zip(LEFT, (*stack(left), *stack(weights)), strict=True)),
         }
+        return modes, found.noise
 
-    def _errors(self, x: PETSc.Vec, values: np.ndarray) -> np.ndarray:
-        """Bounds from the eigenvalues of the same state on a richer discretisation; inf where there is none."""
+    def _errors(self, x: PETSc.Vec, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """Bounds by the eigenvalues of the same state on a richer mesh, and their ``noise``; inf where it has none."""
         if self._richer is None:
             richer = richer_system(self.system)
             solver = StaticSolver(richer)
@@ -89,11 +99,28 @@ class ModeFinder(Eigenmotions):
             return np.full(len(values), np.inf)
         number = len(values)
         if assessor.conservative:
-            others = assessor(y, number=number).values
+            verdict = assessor(y, number=number)
+            others = verdict.values
+            noise = noise + _rounded(assessor.symmetric.at(y), verdict.vectors, others)
         else:  # each with that of the same rank: what is nearest to a value may be another mode, the more so far off
             found = assessor.nonsymmetric.at(y).near_zero(2 * number)
             others = np.empty(number, dtype=complex)
             others[np.argsort(abs(values), kind="stable")] = found.values[moving(found, number)]
-        rho = halved(self.system.fields.discretization.degree)
-        left = FLOOR * max(self.system.scene.units.omega2, float(abs(values).max()))
-        return np.array([bound(v, other, left, rho) for v, other in zip(values, others, strict=True)])
+        left = np.maximum(noise, FLOOR * max(self.system.scene.units.omega2, float(abs(values).max())))
+        rho, out = halved(self.system.fields.discretization.degree), np.empty(number)
+        for i, (value, other) in enumerate(zip(values, others, strict=True)):
+            # eigenvalues that meet have a square root: of it more is left than of what is below
+            apart = min([abs(2 * value.imag), *abs(np.delete(values, i) - value)][not value.imag :], default=np.inf)
+            meet = not assessor.conservative and abs(other - value) > MEET * apart
+            out[i] = bound(value, other, left[i], np.sqrt(rho) if meet else rho)
+        return out
+
+
+def _rounded(pencil: SymmetricPencil, vectors: list[PETSc.Vec], values: np.ndarray) -> np.ndarray:
+    """Uncertainty of eigenvalues of a ``pencil``: round-off of its matrix, to first order, and of the eigensolver."""
+    out = []
+    for v, value in zip(vectors, values, strict=True):
+        square = v.dot(pencil.mass * v).real
+        off = abs(v.dot(pencil.matrix * v).real / square - value)
+        out.append(NOISE * rounding(pencil.matrix, v, v) / square + DRAWN * off)
+    return np.array(out)

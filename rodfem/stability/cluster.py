@@ -56,6 +56,11 @@ class Measured:
         """Distance of the eigenvalues from their mean, relative: how well they and their vectors are told apart."""
         return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), TINY))
 
+    @property
+    def split(self) -> float:
+        """By how much the ``D`` of pairs that are taken for one may differ; round-off where there is one pair."""
+        return float(abs((self.values - self.cluster.mean) ** 2 - self.discriminant).max())
+
 
 def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]) -> Cluster:
     """Cluster of the ``chosen`` ones of eigenvalues found at a state, closed under conjugation."""

@@ -37,6 +37,7 @@ class ClusterNoise(NamedTuple):
 
     What the eigensolver left open of the two, ``mean_left`` and ``discriminant_left``, is added to it.  The ``square``
     is ``|B|^2 / k``: the magnitude of ``D`` where vectors are orthogonal, much more where they are nearly one.
+    ``two_sided`` is ``D`` by both bases, which has less of that error than the eigenvalues have.
     """
 
     mean: float
@@ -44,6 +45,7 @@ class ClusterNoise(NamedTuple):
     mean_left: float
     discriminant_left: float
     square: float
+    two_sided: float
 
     @property
     def of_mean(self) -> float:
@@ -81,4 +83,4 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     inside = B - off * np.eye(size)
     discriminant = float(np.trace(inside @ inside)) / size
     left = abs(off), abs(discriminant - measured.discriminant)
-    return ClusterNoise(of(W), of(2 * W @ B.T), *left, float((inside**2).sum()) / size)
+    return ClusterNoise(of(W), of(2 * W @ B.T), *left, float((inside**2).sum()) / size, discriminant)

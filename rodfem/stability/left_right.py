@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodfem.errors import ConvergenceError
+from rodfem.linalg.matrices import local_rows, rounding_of
 from rodfem.stability import mode_type
+from rodfem.stability.cluster_noise import DRAWN
 from rodfem.stability.frequencies import Frequencies
+from rodfem.stability.inertia import NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 SAME = 1e-6
@@ -23,7 +26,9 @@ class TwoSided:
     """Eigenvalues ``values`` (k,) nearest zero of non-negative imaginary part, backward ``errors``, motions ``kinds``.
 
     ``right`` X and ``left`` Z (n, k) on this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and
-    positive, ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.
+    positive, ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.  The ``noise`` (k,) of the eigenvalues is what
+    round-off of the matrix may make of them, to first order, and what the eigensolver left: near a double one, where
+    left and right vectors are nearly orthogonal, it is as much more as they are.
     """
 
     values: np.ndarray
@@ -32,6 +37,7 @@ class TwoSided:
     right: np.ndarray
     left: np.ndarray
     weighed: np.ndarray
+    noise: np.ndarray
 
 
 def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
@@ -57,6 +63,8 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
     X, Z = alone(pencil, right.vectors[:, chosen]), left.vectors[:, partners]
     Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ pencil.weighed(X)).T)
     values = right.values[chosen]
+    quotients = comm.allreduce(np.sum(Z * (local_rows(pencil.matrix) @ np.concatenate(comm.allgather(X))), axis=0))
+    rounded = np.array([rounding_of(pencil.matrix, z, x) for z, x in zip(Z.T, X.T, strict=True)])
     return TwoSided(
         np.where(abs(values.imag) < REAL * abs(values), values.real, values),
         right.errors[chosen],
@@ -64,6 +72,7 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
         X,
         Z,
         pencil.weighed(Z),
+        NOISE * rounded + DRAWN * abs(quotients - values),
     )
 
 

@@ -89,11 +89,11 @@ def test_a_double_zero_counts_as_the_row_before_it(number: int, index: list[int]
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_a_coarse_mesh_displaces_turning_points_along_the_curve(number: int) -> None:
-    """The bar is the difference from a finer mesh whose own error is some 1e-5 of that."""
+    """The bar is the difference from a finer mesh, whose own error is some 1e-5 of that and may be 1/32."""
     mark, exact = (("turns in P", TURNS_IN_LOAD), ("turns in share", TURNS_IN_SHARE))[number]
     found = of_column(FLUTTER, number, 2, 4)
     row = marked(found, mark, exact)
-    assert abs(found.values[row] - exact) == pytest.approx(found.error[row], rel=1e-3)
+    assert abs(found.values[row] - exact) == pytest.approx((1 - 1 / 32) * found.error[row], rel=1e-3)
 
 
 def test_stiffness_with_a_minimum() -> None:

@@ -10,6 +10,7 @@ from hard import (
     endurance,
     heavy,
     isolas,
+    loci,
     paths,
     published,
     ranges,
@@ -198,6 +199,46 @@ SWEEPS = (
         tuple((waves, elements) for waves in (1e-1, 1e-2, 1e-3) for elements in (6, 8, 11)),
     ),
 )  # fmt: skip
+TO_ITS_BAR = "every row within its uncertainty, and the curve ends, with a sentence, where its special point does"
+LOCI = (
+    *(
+        Case(
+            f"a gap between two loci of {kind}s", "a step leads across it to the other curve, which is a locus, too",
+            "every row on one curve, to 1e-9, with its turning point; or a sentence that says what is not decided",
+            "P^2 = b^2 + d^2", "d, in bounds of 0.3", partial(loci.gap, kind), few, widths,
+        )
+        for kind, few, widths in (
+            ("branch point", (2e-2, 1e-4, 0.0), (0.1, 2e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 0.0)),
+            ("fold", (3e-3,), (0.05, 2e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)),
+        )
+    ),
+    *(
+        Case(
+            f"a {kind} of both planes that becomes two", "their mean is a curve as well, as smooth", TO_ITS_BAR, source,
+            "n, of stiffnesses 1 and 1 + e^n", partial(loci.split, kind), few, (2, 3, 4, 6),
+        )
+        for kind, source, few in (
+            ("branch point", "Euler, pi^2/4", (4,)),
+            ("divergence", "cos P^(1/2) = -1/4", (2,)),
+            ("flutter", "Beck, by the characteristic equation", (2,)),
+        )
+    ),
+    Case(
+        "a parameter that is an imperfection", "beside it there is no branch point, however small it is", TO_ITS_BAR,
+        "Euler, pi^2/4", "half width of the interval of a force across", loci.imperfect, (1e-2, 1e-8),
+        tuple(10.0**-i for i in range(2, 12)),
+    ),
+    Case(
+        "flutter on a foundation", "frequencies of a million whose difference is ten", TO_ITS_BAR, "Beck; no uniform "
+        "foundation changes the load (Smith & Herrmann 1972)", "greatest stiffness", loci.founded, (1e5,),
+        (1e2, 1e3, 1e4, 1e5, 1e6),
+    ),
+    Case(
+        "a small closed locus", "hardly more than a step of the bounds", "followed once round, to 1e-9",
+        "P^2 + b^2 = d^2", "d, in bounds of 0.3", loci.island, (5e-3,), (0.2, 0.1, 0.05, 2e-2, 1e-2, 5e-3),
+    ),
+)  # fmt: skip
+
 PUBLISHED = (
     Case(
         "critical loads with closed forms", "three meshes, from a coarse one, and both formulations", EXACT,
@@ -321,6 +362,7 @@ CASES = {
     "stiffness": STIFFNESS,
     "bifurcations": BIFURCATIONS,
     "sweeps": SWEEPS,
+    "loci": LOCI,
     "published": PUBLISHED,
     "endurance": ENDURANCE,
 }

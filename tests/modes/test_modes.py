@@ -125,6 +125,26 @@ def test_beck_column(P: float, near: complex) -> None:
     np.testing.assert_allclose(overlap, np.eye(3), atol=1e-8)
 
 
+NEAR_FLUTTER: dict[float, tuple[complex, ...]] = {
+    20.05094361897376: (121.49409035459695, 121.19106101892271),
+    20.05095261897376: (121.39042983816877, 121.29460355207321),
+    20.05095360897376: (121.34730152058704, 121.33771889149413),
+    20.050954618973762: (121.34250358586762 + 0.04791314260919833j,),
+}
+"""Loads 1e-5 to 1e-8 beside Beck's, and omega^2: roots of his characteristic equation, by mpmath with 40 digits."""
+
+
+@pytest.mark.parametrize("elements", [4, 6])
+@pytest.mark.parametrize("load", NEAR_FLUTTER)
+def test_bars_where_frequencies_meet(load: float, elements: int) -> None:
+    """Round-off, and the mesh's error, under a square root: 4e-8 where round-off of the values alone is 6e-10."""
+    solver, x = state(classics.beck(span=(19.5, 20.5)), Discretization("auto", elements, 6), load)
+    modes = ModeFinder(solver)(x, 3)[1]
+    for exact in NEAR_FLUTTER[load]:
+        i = np.argmin(abs(modes.value - exact))
+        assert abs(modes.value[i] - exact) <= modes.error[i] < 1e-4 * abs(exact)
+
+
 @pytest.mark.parametrize(("elements", "degree"), [(3, 1), (2, 2), (2, 3), (2, 4)])
 def test_bars_on_coarse_meshes_are_those_of_the_same_mode(elements: int, degree: int) -> None:
     """Beck's column: the third mode of a coarse mesh is nearer to a higher one of the next mesh than to the third."""

@@ -1,0 +1,27 @@
+"""Every hard case of a locus in small: each row to its uncertainty, and the curve ends where its special point does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hard import loci
+from hard.case import Case
+from hard.cases import CASES
+from hard.test_hard_cases import APART
+
+pytestmark = pytest.mark.alone
+EVERY = [(case, value) for case in CASES[APART] for value in case.few]
+
+
+@pytest.mark.parametrize(("case", "value"), EVERY, ids=[f"{case.name}-{value}" for case, value in EVERY])
+def test_a_hard_locus(case: Case, value: Any) -> None:
+    found = case.measure(value)
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
+
+
+@pytest.mark.parametrize("width", [1e-5, 1e-6])
+def test_a_gap_that_is_not_resolved_is_said(width: float) -> None:
+    """Narrower than the least step: the curve ends before it, or the two are said to cross."""
+    found = loci.gap("branch point", width)
+    assert not found.right and any("no convergence" in said or "crosses it" in said for said in found.said)
