@@ -56,8 +56,9 @@ class Collision:
     ) -> LocusPoint:
         """Point of the curve on the line through ``p`` across ``tangent``; raises :class:`ConvergenceError`.
 
-        ``near`` is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.  ``p``
-        (2,) and the state ``x`` are the prediction; ``reach`` bounds how far ``x`` may move, in the metric.
+        Where pairs that met at once do not any more, that is a :class:`~rodfem.codim2.criterion.Destroyed`.  ``near``
+        is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.  ``p`` (2,) and
+        the state ``x`` are the prediction; ``reach`` bounds how far ``x`` may move, in the metric.
         """
         node, here = self._onto(p, x, tangent, near, reach)
         width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
