@@ -1338,6 +1338,12 @@ FAULTS = {
     "terminal-left-without-its-cursor": Fault(
         "rodfem/app/screen.py", "            self._progress.stop()\n", "", "tests/app/test_screen.py"
     ),
+    "a-piece-without-a-tangent-is-no-cubic": Fault(
+        "rodfem/continuation/states_between.py",
+        "x = solve_at(solver, lambda t: between(a, b, t), s)\n    except",
+        "x = solve_at(solver, lambda t: (a.x, a.tangent + b.tangent), s)\n    except",
+        "tests/hard/test_fuzz.py",
+    ),
     "locus-of-a-mean-with-the-bar-of-one": Fault(
         "rodfem/codim2/singular.py", "split = SPLIT * at.spread", "split = 0.0 * at.spread", LOCI
     ),

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import Knot, between, hermite
+from rodfem.continuation.prediction import Knot, between
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import NewtonResult, correct
 from rodfem.roots import zero_between
@@ -120,13 +120,13 @@ def midpoint(solver: BranchSolver, a: Point, b: Point) -> Point | None:
 def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point | None:
     """Point at arclength ``s`` between the points ``a`` and ``b`` of a branch of ``solver``; None where it is not."""
     try:
-        x = solve_at(solver, lambda t: hermite(a, b, t), s)
+        x = solve_at(solver, lambda t: between(a, b, t), s)
     except ConvergenceError:
         return None
     whole = solver.system.distance(a.x, b.x)
     if max(solver.system.distance(a.x, x), solver.system.distance(x, b.x)) > whole:
         return None
-    return solver.point(x, s, solver.tangent(solver.row(hermite(a, b, s)[1]), at=x))
+    return solver.point(x, s, solver.tangent(solver.row(between(a, b, s)[1]), at=x))
 
 
 class Solved(NamedTuple):

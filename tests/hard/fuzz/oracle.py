@@ -74,13 +74,13 @@ class Oracle:
     def squares(self, x: Any) -> np.ndarray:
         """Finite eigenvalues ``omega^2`` of a rod under loads without a potential, by their distance from zero.
 
-        ``noise`` is the largest difference, relative to it or to one unit, of one of the first few with another shift.
+        ``noise`` is the largest difference, relative to it or to one unit, of one of the first few with other shifts.
         Those that the round-off of ``K`` cannot tell from zero, whatever the shift, are zero.
         """
         K, Z, _, M = self._reduced(x)
         unit = self.system.scene.units.omega2
         found = []
-        for shift in (10.0 * unit, 7.0 * unit):
+        for shift in (10.0 * unit, 7.0 * unit, 4.0 * unit):
             inverse, w = np.linalg.eig(np.linalg.solve(Z.T @ (K + shift * M) @ Z, Z.T @ M @ Z))
             finite = abs(inverse) > 1e-9 * abs(inverse).max()
             values, vectors = 1.0 / inverse[finite] - shift, Z @ w[:, finite]
@@ -88,9 +88,9 @@ class Oracle:
             kinetic = abs((vectors.conj() * (M @ vectors)).sum(axis=0))
             values[abs(values) * kinetic <= OF_ENTRIES * entries] = 0.0
             found.append(values[np.argsort(abs(values))])
-        first, other = found
-        few = first[:FEW]
-        self.noise = float((abs(few[:, None] - other).min(axis=1) / np.maximum(abs(few), unit)).max(initial=0.0))
+        first, *others = found
+        few, size = first[:FEW, None], np.maximum(abs(first[:FEW]), unit)
+        self.noise = max(float((abs(few - other).min(axis=1) / size).max(initial=0.0)) for other in others)
         return first
 
     def _reduced(self, x: Any) -> tuple[np.ndarray, ...]:
