@@ -15,13 +15,15 @@ from hard.two_freedoms import scene as two_freedoms
 
 from forms import loads
 from forms.energy import bending_and_twist
-from rodfem import Diagram, Discretization, Parameter, clamped, free
+from rodfem import Diagram, Discretization, Parameter, StepControl, clamped, free
 from rodfem.codim2.curve import CROSSES
 from rodfem.codim2.locus import Locus
 
 MESH = Discretization("auto", 4, 6)
 UNIFORM = Discretization("auto", 4, 3)
 """Of a rod whose strains are."""
+LONG = StepControl(first=0.1, largest=0.3)
+"""Steps of a straight locus."""
 SPLIT = 0.5
 """Greatest parameter whose fourth power parts the bending stiffnesses."""
 
@@ -105,7 +107,7 @@ def founded(most: float) -> Measured:
         beck, planar="e1", parameters={**beck.parameters, "w": Parameter(0.0)},
         potential=lambda x, c: loads.spring(x.r, (0.0, c.w, 0.0)),
     )  # fmt: skip
-    found = located(run(scene, MESH), "w", (-1.0, most))
+    found = located(run(scene, MESH), "w", (-1.0, most), steps=LONG)
     return Measured(beyond(found, np.full(len(found.values), BECK)), 1.0, (), "" if len(found.values) > 2 else "short")
 
 
