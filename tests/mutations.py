@@ -1363,7 +1363,6 @@ FAULTS = {
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/singular.py", "if changed <= max(", "if True or changed <= max(", LOCI
     ),
-    "drift-of-a-state-is-an-imperfection": Fault("rodfem/codim2/singular.py", "max(OFF * np", "max(0.0 * np", LOCI),
     "states-drift-along-null-vectors": Fault(
         "rodfem/codim2/singular.py",
         "np.append(1.0, -self._aside(b, responded))",

@@ -220,7 +220,7 @@ LOCI = (
         for kind, source, few in (
             ("branch point", "Euler, pi^2/4", (4,)),
             ("divergence", "cos P^(1/2) = -1/4", (2,)),
-            ("flutter", "Beck, by the characteristic equation", (2,)),
+            ("flutter", "Beck, by the characteristic equation", (4,)),
         )
     ),
     Case(
