@@ -1382,9 +1382,6 @@ FAULTS = {
         "np.maximum(0.0 * noise, FLOOR",
         "tests/modes/test_modes.py",
     ),
-    "modes-that-meet-have-no-square-root": Fault(
-        "rodfem/modes/finder.py", "MEET = 0.1", "MEET = np.inf", "tests/modes/test_modes.py"
-    ),
 }
 
 

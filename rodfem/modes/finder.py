@@ -23,8 +23,6 @@ from rodfem.stability.symmetric import SymmetricPencil
 
 FLOOR = 5e-12
 """Least uncertainty of an eigenvalue by round-off, relative to the greatest one (rings of 32 elements: 2e-12)."""
-MEET = 0.1
-"""Change of an eigenvalue from mesh to mesh, over its distance from the next, above which both have a square root."""
 
 
 class ModeFinder(Eigenmotions):
@@ -107,13 +105,8 @@ class ModeFinder(Eigenmotions):
             others = np.empty(number, dtype=complex)
             others[np.argsort(abs(values), kind="stable")] = found.values[moving(found, number)]
         left = np.maximum(noise, FLOOR * max(self.system.scene.units.omega2, float(abs(values).max())))
-        rho, out = halved(self.system.fields.discretization.degree), np.empty(number)
-        for i, (value, other) in enumerate(zip(values, others, strict=True)):
-            # eigenvalues that meet have a square root: of it more is left than of what is below
-            apart = min([abs(2 * value.imag), *abs(np.delete(values, i) - value)][not value.imag :], default=np.inf)
-            meet = not assessor.conservative and abs(other - value) > MEET * apart
-            out[i] = bound(value, other, left[i], np.sqrt(rho) if meet else rho)
-        return out
+        rho = halved(self.system.fields.discretization.degree)
+        return np.array([bound(*each, rho) for each in zip(values, others, left, strict=True)])
 
 
 def _rounded(pencil: SymmetricPencil, vectors: list[PETSc.Vec], values: np.ndarray) -> np.ndarray:
