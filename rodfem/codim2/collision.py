@@ -10,6 +10,7 @@ given line of the plane by the secant method for ``D``, its tangent from central
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -27,8 +28,10 @@ from rodfem.tolerances import ROUND_OFF
 
 FIRST = 1e-4
 """First step of the secants, relative to the bounds."""
-SHARP, NOISE = 1e-6, 1e-4
+SHARP, NOISE = 1e-12, 1e-4
 """Steps of the secants that end them: by their own size, or where they no longer shrink."""
+FAR = 1e-6
+"""Step of the secants from which on they tell the slope of ``D``."""
 DIFFERENCE = 1e-3
 """Step of the central differences of ``D``, relative to the bounds."""
 FEWER = 1e-5
@@ -127,8 +130,8 @@ class Collision:
                 break
             step = -now.discriminant * (other - t) / (at_other - now.discriminant)
             if abs(step) < SHARP or (abs(step) < NOISE and abs(step) > 0.3 * before):
-                return self._by_both_sides(t, slope, now, x)
-            if abs(other - t) > SHARP:
+                return self._by_both_sides(t, abs(step), slope, now, x)
+            if abs(other - t) > FAR:
                 slope = (at_other - now.discriminant) / (other - t)
             other, at_other, before = t, now.discriminant, abs(step)
             t += step
@@ -138,16 +141,22 @@ class Collision:
         raise ConvergenceError("two eigenvalues do not collide near by")
 
     def _by_both_sides(
-        self, t: float, slope: float, now: Measured, x: PETSc.Vec
+        self, t: float, last: float, slope: float, now: Measured, x: PETSc.Vec
     ) -> tuple[float, float, Measured, PETSc.Vec]:
-        """Correct a zero of ``D`` near ``t``, where its ``slope`` is known, twice; the last change is a doubt."""
-        step = 0.0
-        for _ in range(2):
-            noise = noise_of(self.eigensolver.at(x), now)
-            step = -noise.two_sided / slope
-            t += step
-            now, x = self._measured(t, x, now.cluster)
-        return t, abs(step) + abs(noise.discriminant / slope), now, x
+        """Correct a zero of ``D`` near ``t``, where its ``slope`` is known, twice; the last change is a doubt.
+
+        Where left vectors are not found, as beside a double zero at times, it stays that of the eigenvalues, with the
+        ``last`` change of the secants.
+        """
+        found = t, last, now, x
+        with suppress(ConvergenceError):
+            for _ in range(2):
+                noise = noise_of(self.eigensolver.at(x), now)
+                step = -noise.two_sided / slope
+                t += step
+                now, x = self._measured(t, x, now.cluster)
+                found = t, abs(step) + abs(noise.discriminant / slope), now, x
+        return found
 
     def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
         """The cluster at ``t`` on the system's line of parameters, and the state there."""
