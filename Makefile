@@ -4,7 +4,7 @@ PYTHON := .venv/bin/python
 # Debian's own mpirun, whatever else may be first on PATH. More ranks than cores are fine here.
 MPIRUN := /usr/bin/mpirun.openmpi --oversubscribe
 # Seconds after which one run of the tests or the demo is stopped: ranks that wait for each other never end.
-LIMIT := 1800
+LIMIT := 3600
 # Whether `make docs` executes the lessons: force, or off where the tests have done so.
 LESSONS := force
 # Whether `make test` runs the tests marked long, too: yes.
