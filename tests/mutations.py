@@ -1360,6 +1360,9 @@ FAULTS = {
         "                return False\n        return False\n",
         LOCI,
     ),
+    "stable-side-beyond-a-crossing": Fault(
+        "rodfem/output/stable_region.py", "if crossed or not side", "if not side", LOCI
+    ),
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/singular.py", "if changed <= max(", "if True or changed <= max(", LOCI
     ),

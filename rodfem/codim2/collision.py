@@ -5,7 +5,8 @@ Two eigenvalues ``mu1``, ``mu2`` of the pencil ``S x = mu M x`` collide where ``
 a square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve as long as the
 gradient of ``D`` does not vanish: the boundary of flutter (Seyranian & Mailybaev, *Multiparameter
 Stability Theory with Mechanical Applications*, World Scientific 2003, chapters 2 and 5).  A point of it is found on a
-given line of the plane by the secant method for ``D``, its tangent from central differences.
+given line of the plane by the secant method for ``D``, its tangent from central differences.  Pairs that are equal by
+a symmetry have one ``D``; where they part, their mean is no boundary, and the curve ends.
 """
 
 from __future__ import annotations
@@ -143,10 +144,10 @@ class Collision:
     def _by_both_sides(
         self, t: float, last: float, slope: float, now: Measured, x: PETSc.Vec
     ) -> tuple[float, float, Measured, PETSc.Vec]:
-        """Correct a zero of ``D`` near ``t``, where its ``slope`` is known, twice; the last change is a doubt.
+        """Correct a zero of ``D`` near ``t`` twice, by its ``slope``: t, its uncertainty, the cluster, state.
 
-        Where left vectors are not found, as beside a double zero at times, it stays that of the eigenvalues, with the
-        ``last`` change of the secants.
+        The uncertainty is the last change and the round-off of ``D``.  Where left vectors are not found, as beside a
+        double zero at times, the zero stays that of the eigenvalues, uncertain by the ``last`` change of the secants.
         """
         found = t, last, now, x
         with suppress(ConvergenceError):

@@ -12,6 +12,7 @@ from rodfem.codim2.along import COARSE, WIDE, place, shifted
 from rodfem.codim2.criterion import Criterion, Destroyed
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Sought, between, predict
 from rodfem.continuation.convexity_between import lost_between
+from rodfem.continuation.kinds import CROSSES
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
@@ -35,8 +36,6 @@ RESOLVED = 1e-6
 """Arclength of the steps by which a crossing of two curves is told from a turn before the other one."""
 TURNED = 0.7
 """Cosine of the angle by which a curve has turned that does not lead across another one."""
-CROSSES = "another curve of its kind crosses it"
-"""What is said of a row beyond a crossing."""
 
 
 @dataclass

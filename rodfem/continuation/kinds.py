@@ -114,3 +114,6 @@ USER = Kind(
 END = Kind("end", "EP")
 KINDS = {str(kind): kind for kind in (BRANCH_POINT, FOLD, IMPERFECT, FLUTTER, DIVERGENCE, EVENT, USER, END)}
 """By name, in the order of legends."""
+
+CROSSES = "another curve of its kind crosses it"
+"""Mark of a row of a locus beyond a crossing, from which on the other side of the load has the lower index."""

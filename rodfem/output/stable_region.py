@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rodfem.continuation.kinds import CROSSES
+
 Floats = NDArray[np.float64]
 
 COUNT = 400
@@ -38,14 +40,15 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], cou
     Returns
     -------
     region
-        None where neither side is stable all along the locus, where it is not known which side is, or where the locus
-        has more than one load at a value of the second parameter.
+        None where neither side is stable all along the locus, as where another one crosses it, where it is not known
+        which side is, or where the locus has more than one load at a value of the second parameter.
     """
     columns, (load, other) = one["columns"], one["parameters"]
     x, y = (np.asarray(columns[name], dtype=float) for name in (other, load))
     side, low = one.get("lower"), [pair[0] for pair in columns["index"]]
     steps = np.diff(x)
-    if not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
+    crossed = any(mark["kind"] == CROSSES for mark in one["marks"])
+    if crossed or not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
         return None
     order = np.argsort(x)
     grid = np.linspace(x.min(), x.max(), count)
