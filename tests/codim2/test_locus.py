@@ -91,7 +91,9 @@ def test_buckling_of_the_straight_rod() -> None:
     assert known.sum() >= 5
     assert np.all(miss[known] <= 3 * found.error[known].sum(axis=1))
     assert found.error[known, 0].max() < 1e-9
-    assert found.error[known, 1].max() < 1e-8  # of turning points: along the curve, too
+    # Of turning points along the curve, too: the slope of a load known to some 1e-14 in a window of 0.016, over a
+    # curvature of 0.02.  That is another round-off on each machine: 2e-9 to 1.1e-8 were seen.
+    assert found.error[known, 1].max() < 5e-8
     assert found.ended == ("A = -3.1, its bound", "A = 1, its bound")
     assert (found.values[0, 1], found.values[-1, 1]) == (-3.1, 1.0)
     assert found.values[found.start] == pytest.approx([closed_form_hemitropic.loads(-3, 1, 1, 3)[1], -3.0], abs=1e-10)
