@@ -1354,6 +1354,12 @@ FAULTS = {
     "locus-across-a-gap": Fault(
         "rodfem/codim2/curve.py", "if node.orientation != last.orientation and not", "if False and not", LOCI
     ),
+    "a-gap-of-loci-is-a-crossing-for-sure": Fault(
+        "rodfem/codim2/curve.py",
+        'return f"{ended}, or turns back within {GAP:g} of the bounds from one"',
+        "return ended",
+        LOCI,
+    ),
     "every-crossing-of-loci-is-a-gap": Fault(
         "rodfem/codim2/curve.py",
         "                return False\n        return True\n",

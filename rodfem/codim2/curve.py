@@ -12,7 +12,7 @@ from rodfem.codim2.along import COARSE, WIDE, place, shifted
 from rodfem.codim2.criterion import Criterion, Destroyed
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Sought, between, predict
 from rodfem.continuation.convexity_between import lost_between
-from rodfem.continuation.kinds import CROSSES
+from rodfem.continuation.kinds import CROSSES, GAP
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
@@ -32,7 +32,7 @@ DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
 """The end of a curve of flutter: its double eigenvalue vanishes."""
 CLOSED = 0.1
 """Distance of the beginning of a closed curve from the cubic between two nodes that it is between, over theirs."""
-RESOLVED = 1e-6
+RESOLVED = 0.1 * GAP
 """Arclength of the steps by which a crossing of two curves is told from a turn before the other one."""
 TURNED = 0.7
 """Cosine of the angle by which a curve has turned that does not lead across another one."""
@@ -190,7 +190,8 @@ class Tracer:
         if a.coupling @ b.coupling < 0:
             sentence = "the fold ends on a branch point"
             coupling, end = lambda n: float(n.coupling @ a.coupling), lambda n: self._end_of_fold(n, a, b)
-            return self._last(half, a, b, coupling, sentence, end)
+            ended = self._last(half, a, b, coupling, sentence, end)
+            return f"{ended}, or turns back within {GAP:g} of the bounds from one"
         if a.omega2 * b.omega2 < 0:
             sentence = "the double eigenvalue vanishes: divergence"
             return self._last(

@@ -115,5 +115,7 @@ END = Kind("end", "EP")
 KINDS = {str(kind): kind for kind in (BRANCH_POINT, FOLD, IMPERFECT, FLUTTER, DIVERGENCE, EVENT, USER, END)}
 """By name, in the order of legends."""
 
-CROSSES = "another curve of its kind crosses it"
+GAP = 1e-5
+"""Gap between two loci, over the bounds of their parameters, that may be taken for a crossing: no step is shorter."""
+CROSSES = f"another curve of its kind crosses it, or comes within {GAP:g} of the bounds"
 """Mark of a row of a locus beyond a crossing, from which on the other side of the load has the lower index."""

@@ -38,7 +38,7 @@ def located(diagram: Diagram, name: str, interval: tuple[float, float], **given:
 def words(locus: Locus) -> tuple[str, ...]:
     """What a locus says of itself besides its ends at bounds."""
     marks = {mark.kind for mark in locus.marks if not mark.kind.startswith("turns")}
-    return (*sorted(marks), *(end for end in locus.ended if "bound" not in end and end != "closed curve"))
+    return (*sorted(marks), *(end for end in locus.ended if not end.endswith("its bound") and end != "closed curve"))
 
 
 def beyond(locus: Locus, exact: np.ndarray) -> float:

@@ -10,6 +10,8 @@ from hard.case import Case
 from hard.cases import CASES
 from hard.test_hard_cases import APART
 
+from rodfem.continuation.kinds import GAP
+
 pytestmark = pytest.mark.alone
 EVERY = [(case, value) for case in CASES[APART] for value in case.few]
 
@@ -20,8 +22,9 @@ def test_a_hard_locus(case: Case, value: Any) -> None:
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
+@pytest.mark.parametrize("kind", ["branch point", "fold"])
 @pytest.mark.parametrize("width", [1e-5, 1e-6])
-def test_a_gap_that_is_not_resolved_is_said(width: float) -> None:
-    """Narrower than the least step: the curve ends before it, or the two are said to cross."""
-    found = loci.gap("branch point", width)
-    assert not found.right and any("no convergence" in said or "crosses it" in said for said in found.said)
+def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
+    """Narrower than the least step: the curve ends before it, or a crossing is said to be one or such a gap."""
+    found = loci.gap(kind, width)
+    assert not found.right and any("no convergence" in said or f"within {GAP:g}" in said for said in found.said)
