@@ -1367,7 +1367,13 @@ FAULTS = {
         LOCI,
     ),
     "stable-side-beyond-a-crossing": Fault(
-        "rodfem/output/stable_region.py", "if crossed or not side", "if not side", LOCI
+        "rodfem/output/stable_region.py", "if passed(one).any() or not side", "if not side", LOCI
+    ),
+    "shade-goes-on-beyond-a-crossing": Fault(
+        "rodfem/output/plot_locus.py",
+        "np.where(crossings % 2, -1.0, 1.0)",
+        "np.ones(len(crossings))",
+        "tests/output/test_plot_diagram.py",
     ),
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/singular.py", "if changed <= max(", "if True or changed <= max(", LOCI

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from matplotlib.lines import Line2D
 from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
 from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, named, save, tex
-from rodfem.output.stable_region import WORDS, stable_region
+from rodfem.output.stable_region import WORDS, passed, stable_region
 from rodfem.output.view import POINT
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
@@ -158,7 +159,8 @@ def _write_indices(axes: Axes, one: Mapping[str, Any]) -> None:
 def _shade_stable_side(axes: Axes, one: Mapping[str, Any]) -> None:
     """Shade the side of a locus of branch points on which the index is zero, as far as rows tell: next to the curve.
 
-    The vanishing eigenvalues have one sign to the left of the oriented curve, and the other one to its right.
+    The vanishing eigenvalues have one sign to the left of the oriented curve, and the other one to its right, as far as
+    another curve crosses it.
     """
     places = axes.transData.transform(np.column_stack([one["columns"][name] for name in reversed(one["parameters"])]))
     along = np.gradient(places, axis=0) if len(places) > 1 else np.zeros_like(places)
@@ -166,10 +168,14 @@ def _shade_stable_side(axes: Axes, one: Mapping[str, Any]) -> None:
     upwards = normals[one["start"], 1]
     if not one.get("lower") or abs(upwards) < STEEP:
         return
-    beside = places + BAND * np.sign(upwards * one["lower"]) * normals
+    crossings = passed(one)
+    sides = np.sign(upwards * one["lower"]) * np.where(crossings % 2, -1.0, 1.0)
+    beside = places + BAND * sides[:, None] * normals
     stable = np.array([low == 0 for low, _ in one["columns"]["index"]])
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], stable, [False]]).astype(int)))
-    for a, b in zip(ends[::2], ends[1::2], strict=True):
+    ends = np.flatnonzero(np.diff(np.concatenate([[-1], np.where(stable, crossings, -1), [-1]])))
+    for a, b in pairwise(ends):
+        if not stable[a]:
+            continue
         outline = np.concatenate([places[a:b], beside[a:b][::-1]])
         axes.fill(*axes.transData.inverted().transform(outline).T, color=STABLE_SIDE, label="stable side", zorder=0)
 

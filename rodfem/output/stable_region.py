@@ -47,8 +47,7 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], cou
     x, y = (np.asarray(columns[name], dtype=float) for name in (other, load))
     side, low = one.get("lower"), [pair[0] for pair in columns["index"]]
     steps = np.diff(x)
-    crossed = any(mark["kind"] == CROSSES for mark in one["marks"])
-    if crossed or not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
+    if passed(one).any() or not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
         return None
     order = np.argsort(x)
     grid = np.linspace(x.min(), x.max(), count)
@@ -59,6 +58,19 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], cou
             between = side * (level - edge) > 0
             end = np.where(between & (side * (level - end) < 0), level, end)
     return StableRegion(grid, edge, end)
+
+
+def passed(one: Mapping[str, Any]) -> NDArray[np.int_]:
+    """Number of curves that cross a locus between its start and each row, (rows,): at each the two sides change places.
+
+    Parameters
+    ----------
+    one
+        Contents of the file of the locus.
+    """
+    rows, start = np.arange(len(one["columns"]["index"])), one["start"]
+    beyond = [mark["row"] for mark in one["marks"] if mark["kind"] == CROSSES]
+    return np.array([sum(start < at <= row or row <= at < start for at in beyond) for row in rows], dtype=int)
 
 
 def _levels(one: Mapping[str, Any], grid: Floats) -> list[Floats]:

@@ -13,6 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from rodfem.continuation.kinds import CROSSES
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
@@ -197,6 +198,31 @@ def test_the_stable_side_of_a_locus_is_shaded(folder: Path, monkeypatch: pytest.
     for spoiled in (one | {"lower": 0}, one | {"columns": columns | {"index": [[1, 2]] * 41}}):
         draw_locus([spoiled], folder / "locus.png")
         assert not drawn[-1].axes[0].patches
+
+
+def test_the_stable_side_is_the_other_one_beyond_a_crossing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``P^2 < A^2`` is unstable: of the line P = A what is above is stable from A = 0 on, and below before."""
+    t = np.linspace(-1.0, 1.0, 42)
+    mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
+    columns = {"P": t.tolist(), "A": t.tolist(), "index": [[0, 1]] * 42, "error": [[None, None]] * 42}
+    one = {
+        "kind": "branch point",
+        "parameters": ["P", "A"],
+        "columns": columns,
+        "labels": ["P", "A"],
+        "title": "by hand",
+    }
+    one |= {"discretization": mesh, "format": LOCUS.mark(), "bounds": [[-1, 1], [-1, 1]]}
+    drawn: list[Figure] = []
+    monkeypatch.setattr("rodfem.output.plot_locus.save", lambda figure, path: drawn.append(figure))
+    for start, beyond, lower in ((35, 20, 1), (5, 21, -1)):
+        draw_locus(
+            [one | {"start": start, "lower": lower, "marks": [{"row": beyond, "kind": CROSSES}]}], folder / "a.png"
+        )
+        places = [(0.5, 0.55), (0.5, 0.45), (-0.5, -0.45), (-0.5, -0.55)]
+        patches = drawn[-1].axes[0].patches
+        inside = [any(patch.get_path().contains_point(place) for patch in patches) for place in places]
+        assert inside == [True, False, False, True]
 
 
 def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
