@@ -141,6 +141,16 @@ def test_thrust_of_a_rod_that_bends_unlike_in_its_planes(rotary: float) -> None:
             assert abs(expected - value).min() < 1e-5 * abs(value)
 
 
+def with_mass_at_nose(m: float, stiffness: tuple[float, float, float], span: tuple[float, float]) -> Scene:
+    """A rod of mass 1 that a thrust at its tail accelerates, with a mass ``m`` at its nose."""
+    return replace(
+        floating((free(lambda c: (0.0, 0.0, c.P * m / (1 + m))), free(follower=lambda c: (0.0, 0.0, -c.P))), span,
+                 distributed=lambda c: (0.0, 0.0, c.P / (1 + m))),
+        attachments=(Attachment(0.0, mass=lambda c: m),),
+        energy=lambda v, k, c: bending_and_twist(k, stiffness),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("mesh", [MESH, Discretization("pointwise", 8, 5)])
 def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretization) -> None:
     """The compression is ``P (m + s)/(1 + m)``.  In each plane two eigenvalues are zero at all loads: by Galerkin.
@@ -171,13 +181,7 @@ def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretizat
         return float(((first - second) ** 2).real)
 
     expected = [brentq(vanishing, 30, 40), brentq(vanishing, 78, 79.5), brentq(discriminant, 79.5, 80.2)]
-    rod = replace(
-        floating((free(lambda c: (0.0, 0.0, c.P * m / (1 + m))), free(follower=lambda c: (0.0, 0.0, -c.P))),
-                 (30.0, 90.0), distributed=lambda c: (0.0, 0.0, c.P / (1 + m))),
-        attachments=(Attachment(0.0, mass=lambda c: m),),
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1000.0, 1000.0)),
-    )  # fmt: skip
-    found = rodfem.trace(rod, mesh)
+    found = rodfem.trace(with_mass_at_nose(m, (1.0, 1000.0, 1000.0), (30.0, 90.0)), mesh)
     assert [(s.kind.words, s.negative_before, s.negative_after) for s in found.special()] == [
         ("divergence", 0, 1), ("divergence", 1, 2), ("flutter", 2, 2),
     ]  # fmt: skip
@@ -185,6 +189,18 @@ def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretizat
         assert abs(s.point.load - load) < s.error_estimate + 1e-11 * load < 5e-8
         assert s.point.negative == min(s.negative_before, s.negative_after)
     assert not found.warnings
+
+
+def test_divergence_of_two_planes_that_bend_nearly_alike() -> None:
+    """Each plane at its stiffness times one load, both in one step, beside eigenvalues that are zero at all loads."""
+    ratio = 1.0005
+    found = rodfem.trace(with_mass_at_nose(1.0, (1.0, ratio, 1000.0), (30.0, 45.0)), MESH, Plan(depth=0))
+    first, second = found.special()
+    for number, special in enumerate((first, second)):
+        assert (special.kind.words, special.negative_before) == ("divergence", number)
+        assert special.negative_after == number + 1 and special.error_estimate < 1e-7
+    error = ratio * first.error_estimate + second.error_estimate
+    assert abs(second.point.load - ratio * first.point.load) < error and not found.warnings
 
 
 def test_ring_under_a_pressure_that_follows() -> None:
