@@ -1,35 +1,25 @@
-"""Following a curve of special points in a plane of parameters: steps, bounds, turning points, cusps, ends."""
+"""Following a curve of special points in a plane of parameters: steps, bounds, crossings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.along import COARSE, WIDE, place, shifted
+from rodfem.codim2.codim2_points import Codim2Points
 from rodfem.codim2.criterion import Criterion, Destroyed
-from rodfem.codim2.parameter_plane import LocusPoint, Plane, Sought, between, predict
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, between, predict
 from rodfem.continuation.convexity_between import lost_between
 from rodfem.continuation.kinds import CROSSES, GAP
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
-from rodfem.roots import zero_between
 
-LOCATED = 1e-8
-"""Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
 AHEAD = 1e-9
 """Arclength after which a curve that begins on a bound shows whether it leaves the plane."""
 REACH = 1e-6
 """Distance, in the metric, that a point on a bound may move by, however short the step."""
-BESIDE = 1e-3
-"""Share of the plane's width by which the last point may miss the two nodes that it is between."""
-CERTAIN = 10.0
-"""Uncertainties of a parameter by which it changes towards a turning point: less is the round-off of a constant."""
-DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
-"""The end of a curve of flutter: its double eigenvalue vanishes."""
 CLOSED = 0.1
 """Distance of the beginning of a closed curve from the cubic between two nodes that it is between, over theirs."""
 RESOLVED = 0.1 * GAP
@@ -53,6 +43,7 @@ class Tracer:
     def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl) -> None:
         """Steps are relative to the bounds of the plane."""
         self.criterion, self.plane, self.steps = criterion, plane, steps
+        self.points = Codim2Points(criterion, plane)
         scene = plane.system.scene
         varies = not scene.is_quadratic() or scene.energy_depends_on("s", *plane.names)
         self.convexity = Convexity(plane.system) if varies else None
@@ -80,7 +71,7 @@ class Tracer:
                     half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
                     return half
                 continue
-            half.ended = node.ended or self._lost_convexity(last, node) or self._between(half, last, node)
+            half.ended = node.ended or self._lost_convexity(last, node) or self._between(half, history, node)
             if half.ended:
                 return half
             half.nodes.append(node)
@@ -184,113 +175,21 @@ class Tracer:
         a, b = self.criterion.length(node.dp + dp, node.dx + dx), self.criterion.length(node.dp - dp, node.dx - dx)
         return (a * a - b * b) / 4
 
-    def _between(self, half: Half, a: LocusPoint, b: LocusPoint) -> str:
-        """Insert what lies between two nodes; a reason if the curve ends there."""
-        names = self.plane.names
-        if a.coupling @ b.coupling < 0:
-            sentence = "the fold ends on a branch point"
-            coupling, end = lambda n: float(n.coupling @ a.coupling), lambda n: self._end_of_fold(n, a, b)
-            ended = self._last(half, a, b, coupling, sentence, end)
-            return f"{ended}, or turns back within {GAP:g} of the bounds from one"
-        if a.omega2 * b.omega2 < 0:
-            sentence = "the double eigenvalue vanishes: divergence"
-            return self._last(
-                half, a, b, lambda n: n.omega2, sentence, lambda n: as_beside(self._placed(n, DOUBLE_ZERO), a)
-            )
-        found: list[tuple[LocusPoint, str]] = []
-        if a.curvature * b.curvature < 0:
-            cusps = self._located(a, b, lambda n: n.curvature, "cusp")
-            found = [(self._placed(n, self._reversal(a, b)), kind) for n, kind in cusps]
-        else:
-            for i in np.flatnonzero(a.dp * b.dp < 0):
-                turn = self._located(a, b, lambda n, i=i: float(n.dp[i]), f"turns in {names[i]}")  # type: ignore[misc]
-                sought = Sought(lambda n, i=i: float(n.p[i]), stationary=True)  # type: ignore[misc]
-                found += [(self._placed(n, sought), kind) for n, kind in turn if _moves(n, a, b, i)]
-        for node, kind in sorted(found, key=lambda item: item[0].s):
-            half.marks[len(half.nodes)] = kind
-            half.nodes.append(node)
-        if a.rest != b.rest:
+    def _between(self, half: Half, history: list[LocusPoint], node: LocusPoint) -> str:
+        """Insert what lies between the last node of a history and the next one; a reason if the curve ends there."""
+        last, before = history[-1], history[-2] if len(history) > 1 else None
+        rows, ended = self.points.between(last, node, before)
+        for row, kind in rows:
+            if kind:
+                half.marks[len(half.nodes)] = kind
+            half.nodes.append(row)
+        if ended:
+            return ended
+        if last.rest != node.rest:
             half.marks[len(half.nodes)] = self.criterion.others
-        elif a.orientation != b.orientation:
+        elif last.orientation != node.orientation:
             half.marks[len(half.nodes)] = CROSSES
         return ""
-
-    def _located(
-        self, a: LocusPoint, b: LocusPoint, f: Callable[[LocusPoint], float], kind: str
-    ) -> list[tuple[LocusPoint, str]]:
-        """Point between two others at which ``f`` vanishes; none where it cannot be located."""
-
-        def at(s: float) -> LocusPoint:
-            p, x, dp, dx = between(a, b, s)
-            return self.criterion.correct(p, x, (dp, dx), a)
-
-        try:
-            s = zero_between(lambda s: f(at(s)), a.s, b.s, LOCATED)
-            node = at(s)
-        except (ConvergenceError, ValueError):
-            return []
-        node.s = s
-        return [(node, kind)]
-
-    def _placed(self, node: LocusPoint, sought: Sought) -> LocusPoint:
-        """The point near ``node`` that is ``sought``, with uncertainties of its place along the curve, too."""
-        try:
-            found = place(self.criterion, self.plane, node, sought)
-            better = shifted(self.criterion, self.plane, node, found.s)
-        except ConvergenceError:
-            return replace(
-                node, located_to=node.located_to + COARSE * np.maximum(abs(node.dp), COARSE * self.plane.width)
-            )
-        located = better.located_to + found.dp
-        return replace(better, s=node.s + found.s, located_to=located, sought=sought, windows=found.windows)
-
-    def _end_of_fold(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
-        """The end near ``node`` of a fold on a branch point, by interpolation between its two sides.
-
-        No point can be corrected to it: there the curve of branch points passes, on which corrections may slide along.
-        Nor has the fold a tangent of its own there, but for the cubic between ``a`` and ``b``.
-        """
-        *_, dp, dx = between(a, b, node.s)
-        size = self.criterion.length(dp, dx)
-        node, sought = replace(node, dp=dp / size, dx=dx / size, rest=a.rest), self._reversal(a, b)
-        try:
-            found = place(self.criterion, self.plane, node, sought, WIDE)
-        except ConvergenceError:
-            return replace(node, located_to=np.maximum(abs(node.p - a.p), abs(node.p - b.p)))
-        end = found.interpolated(node)
-        end.ordinate = self.criterion.solver.shape.ordinate(end.x)
-        return replace(end, s=node.s + found.s, sought=sought, windows=found.windows)
-
-    def _reversal(self, a: LocusPoint, b: LocusPoint) -> Sought:
-        """Where both parameters turn back at once between two nodes, as at a cusp: what turns most is stationary."""
-        turned = (b.dp - a.dp) / self.plane.width**2
-        return Sought(lambda n: float(turned @ n.p), stationary=True)
-
-    def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
-        """Point between two neighbours at which a parameter has a value; none where it cannot be located.
-
-        The neighbours are ``a`` and ``b``; parameter number ``which`` (0 or 1) has the given ``value`` there.
-        """
-        return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
-
-    def _last(
-        self,
-        half: Half,
-        a: LocusPoint,
-        b: LocusPoint,
-        f: Callable[[LocusPoint], float],
-        sentence: str,
-        end: Callable[[LocusPoint], LocusPoint],
-    ) -> str:
-        """End at the point that ``end`` makes of one at which ``f`` vanishes."""
-        found = self._located(a, b, f, sentence)
-        where = (a.p + b.p) / 2
-        if found and not np.any(abs(found[0][0].p - where) > abs(b.p - a.p) + BESIDE * self.plane.width):
-            node = end(found[0][0])
-            half.marks[len(half.nodes)] = sentence
-            half.nodes.append(node)
-            where = node.p
-        return f"{sentence} near {', '.join(f'{n} = {v:.8g}' for n, v in zip(self.plane.names, where, strict=True))}"
 
     def _closes(self, start: LocusPoint, a: LocusPoint, b: LocusPoint) -> bool:
         """Whether the curve passes its beginning again between two nodes."""
@@ -301,14 +200,3 @@ class Tracer:
         p, x, dp, dx = between(a, b, a.s + (part @ whole) / size**2 * (b.s - a.s))
         near = self.criterion.length(p - start.p, x - start.x) < CLOSED * (b.s - a.s)
         return near and self._cosine(start, dp, dx) > 0.5
-
-
-def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:
-    """Whether a parameter at its extremum differs from that at the neighbours by more than its uncertainty."""
-    moved = max(abs(turn.p[which] - a.p[which]), abs(turn.p[which] - b.p[which]))
-    return bool(moved > CERTAIN * turn.located_to[which])
-
-
-def as_beside(end: LocusPoint, a: LocusPoint) -> LocusPoint:
-    """The end of a curve with the count of the node ``a`` before it: a double eigenvalue that is zero has no sign."""
-    return replace(end, rest=end.rest + len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0)))

@@ -340,7 +340,7 @@ def _crossings(tracer: Tracer, found: Curve, first: LocusPoint, level: float) ->
     for side in (found.nodes[: found.start][::-1], found.nodes[found.start + 1 :]):
         for a, b in pairwise(side):
             if (a.p[1] - level) * (b.p[1] - level) < 0:
-                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.crossed(a, b, 1, level)]
+                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.points.crossed(a, b, 1, level)]
     return crossings
 
 
