@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+Pair = tuple[float, float]
 TINY = 1e-300
 """Floor of a number that may be zero and is divided by, or has its root or logarithm taken: absolute."""
 NEGLIGIBLE = 1e-12
@@ -32,6 +33,8 @@ SAME_LOAD = 1e-9
 """Loads that differ by less than this, relative to the span, are one: that of a bound, or of a search."""
 SAME_STATE, SAME_SPECIAL = 1e-7, 1e-6
 """Equilibria, and special points, that agree to this in load, energy and stretch are one, up to a symmetry."""
+LOCATED = 10.0
+"""Uncertainties of a load on one mesh by which that of another special point differs at least."""
 DRIFT = 1e-6
 """Largest drift scalar of an equilibrium, over the lowest bending eigenvalue: beyond it a mesh breaks a symmetry."""
 
@@ -49,3 +52,13 @@ def round_off(value: float, one: float) -> float:
 def same_place(x: Any, s: float, length: float) -> Any:
     """Whether arclengths ``x``, a number or an array, are ``s`` to round-off, on a rod of this ``length``."""
     return np.isclose(x, s, rtol=0, atol=SAME_PLACE * length)
+
+
+def same_special(special: Pair, located_to: float, place: Pair, one: Pair) -> bool:
+    """Whether two special points on one mesh, each a load and an ordinate, are one; ``one`` has their natural sizes.
+
+    Loads are as near as the first one is ``located_to``, a few times: others may be nearer than ordinates are known.
+    """
+    (load, ordinate), (of_load, of_ordinate) = special, one
+    near = abs(load - place[0]) <= LOCATED * (located_to + round_off(load, of_load))
+    return near and abs(ordinate - place[1]) <= SAME_SPECIAL * unit(ordinate, place[1], one=of_ordinate)

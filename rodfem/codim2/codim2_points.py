@@ -34,6 +34,8 @@ DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
 """The end of a curve of flutter: its double eigenvalue vanishes."""
 NO_COUPLING = 1e-9
 """Coupling with one parameter that is none, over that with the other one, both in units of the bounds."""
+CLOSE = 1e-6
+"""Distance, in the metric, that a point may move by from where a parameter was found to have a value, to having it."""
 VANISHED = 0.05
 """Share that is left of a coupling where it vanishes: the place of that is known to less than the step."""
 ASIDE = 1e-2
@@ -91,7 +93,16 @@ class Codim2Points:
 
         The neighbours are ``a`` and ``b``; parameter number ``which`` (0 or 1) has the given ``value`` there.
         """
-        return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
+        found = [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
+        return [self._exactly(node, which, value) for node in found]
+
+    def _exactly(self, node: LocusPoint, which: int, value: float) -> LocusPoint:
+        """The point with this value of a parameter, close to ``node``; that itself where the curve turns back."""
+        axis = (np.arange(2) == which) * self.plane.width
+        try:
+            return self.criterion.correct(np.where(axis, value, node.p), node.x, (axis, None), node, CLOSE)
+        except ConvergenceError:
+            return node
 
     def _piece(self, a: LocusPoint, b: LocusPoint) -> list[Row]:
         """Cusp and turning points between two nodes, each at most once."""

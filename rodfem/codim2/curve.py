@@ -62,6 +62,7 @@ class Tracer:
             last = history[-1]
             try:
                 node, moved, bound = self._next(history, step)
+                half.ended = node.ended or self._lost_convexity(last, node) or self._between(half, history, node)
             except Destroyed as trouble:
                 half.ended = str(trouble)
                 return half
@@ -71,7 +72,6 @@ class Tracer:
                     half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
                     return half
                 continue
-            half.ended = node.ended or self._lost_convexity(last, node) or self._between(half, history, node)
             if half.ended:
                 return half
             half.nodes.append(node)
@@ -89,26 +89,46 @@ class Tracer:
         return half
 
     def _lost_convexity(self, last: LocusPoint, node: LocusPoint) -> str:
-        """Why a curve ends between two nodes, where the stored energy is not convex any more; empty where it is."""
+        """Why a curve ends between two nodes, where the stored energy is not convex any more; empty where it is.
+
+        The cubic between them is looked at, and where the energy is not convex on it the curve decides, to which a
+        point is corrected.  Raises :class:`ConvergenceError` where none can be.
+        """
         if self.convexity is None:
             return ""
+        convexity, system = self.convexity, self.plane.system
 
-        def state(t: float) -> PETSc.Vec:
-            p, x, *_ = between(last, node, last.s + t * (node.s - last.s))
+        def guess(t: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:
+            return between(last, node, last.s + t * (node.s - last.s))
+
+        def here(p: np.ndarray, x: PETSc.Vec) -> PETSc.Vec:
             system.line = self.plane.along(p, 0)
             system.set_load(x, float(p[0]))
             return x
 
-        system = self.plane.system
+        def corrected(t: float) -> LocusPoint:
+            p, x, dp, dx = guess(t)
+            try:
+                return node if t == 1.0 else self.criterion.correct(p, x, (dp, dx), last, node.s - last.s)
+            except ConvergenceError as trouble:
+                raise ConvergenceError(
+                    f"whether the stored energy stays convex near {self._at(p)} is open"
+                ) from trouble
+
+        def holds(t: float) -> bool:
+            point = corrected(t)
+            return convexity.holds(here(point.p, point.x))
+
         with self.plane.kept():
-            found = lost_between(self.convexity, state, lambda t: False)
-        if found.resolved and found.lost is None:
+            found = lost_between(convexity, lambda t: here(*guess(t)[:2]), holds)
+            if found.lost is not None:
+                return f"the stored energy is not convex any more near {self._at(corrected(found.lost).p)}"
+        if found.resolved:
             return ""
-        p, *_ = between(last, node, last.s + (found.lost or 0.0) * (node.s - last.s))
-        where = ", ".join(f"{name} = {v:.8g}" for name, v in zip(self.plane.names, p, strict=True))
-        if found.lost is None:
-            return f"the stored energy varies so fast that it may lose convexity unseen near {where}"
-        return f"the stored energy is not convex any more near {where}"
+        return f"the stored energy varies so fast that it may lose convexity unseen near {self._at(node.p)}"
+
+    def _at(self, p: np.ndarray) -> str:
+        return ", ".join(f"{name} = {v:.8g}" for name, v in zip(self.plane.names, p, strict=True))
 
     def _next(self, history: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:
         """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""

@@ -12,7 +12,6 @@ Arclength is measured with the parameters relative to the widths of their bounds
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -21,22 +20,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.ordinate_bound import bound
-from rodfem.codim2.along import place
-from rodfem.codim2.collision import Collision
-from rodfem.codim2.criterion import Criterion
 from rodfem.codim2.curve import Half, Tracer
+from rodfem.codim2.locus_errors import Errors, criterion_of, errors_of, without_smoothness
 from rodfem.codim2.others import unstable
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
-from rodfem.codim2.singular import Singular, null_vectors
+from rodfem.codim2.singular import null_vectors
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, KINDS
+from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, KINDS
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.fem.nonsmooth import Nonsmooth, Reasons
-from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number
 from rodfem.output.files import mesh_of, save_json
@@ -44,16 +38,18 @@ from rodfem.problem.units import Units
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.tolerances import SAME_SPECIAL, unit
+from rodfem.tolerances import NEGLIGIBLE, same_special
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
 BESIDE = 1e-3
 """Distance of a load beside a divergence load at which the unstable eigenvalues are counted, over the bounds."""
-CUSP = 1e-3
-"""Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
 
-AS_THEY_ARE = ("scene", "title", "kind", "ordinate_name", "start", "lower", "constants", "discretization", "note")
+COARSE = "This mesh does not resolve all states: errors of `at least` that may be larger; use more elements."
+"""Under the rows of a locus of which some are not resolved."""
+AS_THEY_ARE = tuple(
+    "scene title kind ordinate_name natural start lower planar unresolved constants discretization note".split()
+)
 """Entries of a file that are attributes of a locus."""
 
 
@@ -81,8 +77,8 @@ class Locus:
         The two parameters, the scene's load first, and their intervals.
     values
         Both parameters, (n, 2).
-    ordinate
-        The scene's ordinate, (n,).
+    ordinate, natural
+        The scene's ordinate, (n,), and its natural size, of which round-off is a part.
     index
         Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
         negative.  Under loads without a potential the number of unstable eigenvalues, of those nearest to zero.
@@ -98,6 +94,11 @@ class Locus:
         How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
         2); of turning points, cusps and ends how far those of that curve are, so also along it.  It is nan where it was
         not asked for, inf where the richer one does not find the point.
+    unresolved
+        Rows whose state, or null vector, the discretisation does not resolve, as far as that was examined, where errors
+        may exceed their bounds: all of them where it does not resolve the special point.
+    planar
+        Whether the rod is kept in a plane: the index is that of changes in it, and stability is not that in space.
     marks
         Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
         eigenvalue has passed through zero, not located.
@@ -126,11 +127,14 @@ class Locus:
     bounds: tuple[Interval, Interval]
     values: np.ndarray
     ordinate: np.ndarray
+    natural: float
     index: np.ndarray
     lower: int
     omega2: np.ndarray
     located_to: np.ndarray
     error: np.ndarray
+    unresolved: list[int]
+    planar: bool
     marks: list[Mark]
     start: int
     ended: tuple[str, str]
@@ -174,7 +178,7 @@ class Locus:
     @classmethod
     def read(cls, path: Path) -> Locus:
         """Read what :meth:`save` has written, but for the states; raises :class:`InputError` where that is missing."""
-        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", "lower"))
+        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", *AS_THEY_ARE[:-1]))
         columns, (first, second) = data["columns"], data["parameters"]
         tables: dict[str, Any] = {
             key: np.array(columns[key], dtype=float) for key in ("ordinate", "located_to", "error", "omega2")
@@ -210,23 +214,23 @@ class Locus:
         lines = [
             f"\nLocus of the {self.kind} in {self.names[0]} and {self.names[1]} (in parentheses the estimated error "
             "of the discretisation across the curve, where it was asked for; of the ordinate it was not)",
-            f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index",
+            f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index{' in its plane' * self.planar}",
         ]
         for i in shown:
-            pair = [
-                f"{v:.10g}" if np.isnan(e) else number(v, e) for v, e in zip(self.values[i], self.error[i], strict=True)
-            ]
+            each, resolved = zip(self.values[i], self.error[i], strict=True), i not in self.unresolved
+            pair = [f"{v:.10g}" if np.isnan(e) else number(v, e, resolved) for v, e in each]
+            ordinate = self.ordinate[i] if abs(self.ordinate[i]) > NEGLIGIBLE * self.natural else 0.0
             index = f"{self.index[i, 0]}|{self.index[i, 1]}" if self.index[i, 0] >= 0 else ""
             note = "start" if i == self.start else marks.get(i, "")
-            lines.append(f"  {pair[0]:<24} {pair[1]:<24} {self.ordinate[i] + 0.0:<14.8f} {index:<6} {note}".rstrip())
+            lines.append(f"  {pair[0]:<24} {pair[1]:<24} {ordinate:<14.8g} {index:<6} {note}".rstrip())
         lines.append(f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}")
-        return "\n".join([*lines, *filter(None, [self.note])])
+        return "\n".join([*lines, *filter(None, [self.note, COARSE * bool(self.unresolved)])])
 
 
 def _same(special: SpecialPoint, place: tuple[float, float], units: Units) -> bool:
     """Whether a special point of a scene of these natural sizes has the load and the ordinate of a ``place``."""
-    here = (special.point.load, place[0], units.load), (special.point.ordinate, place[1], units.ordinate)
-    return all(abs(x - y) <= SAME_SPECIAL * unit(x, y, one=one) for x, y, one in here)
+    point = special.point
+    return same_special((point.load, point.ordinate), special.located_to, place, (units.load, units.ordinate))
 
 
 class Curve(NamedTuple):
@@ -281,15 +285,21 @@ def locus(
     with system.clock.scope("locus"), plane.kept():
         system.line = plane.along(p, 0)
         guess = _guess(solver, special, p)
-        criterion = _criterion(solver, plane, special.kind, guess)
-        first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
+        criterion = criterion_of(solver, plane, special.kind, guess)
+        try:
+            first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
+        except ConvergenceError as trouble:
+            raise ConvergenceError(
+                f"The {special.kind} at {scene.load} = {p[0]:.8g} has no locus in {scene.load} and {parameter}: it is "
+                f"not found again there ({trouble}); use more elements."
+            ) from trouble
         tracer = Tracer(criterion, plane, steps)
         found = _both_sides(tracer, first)
         crossings = _crossings(tracer, found, first, float(p[1]))
-        error = _errors(solver, special.kind, plane, found, error_bars)
+        errors = errors_of(solver, special.kind, plane, found.nodes, found.marks, error_bars)
         lower = _lower_side(solver, plane, special, first)
-        reasons = _not_estimated(solver, plane, found.nodes, error)
-    located = _locus(solver, special, (plane.names, bounds), found, crossings, error, lower)
+        reasons = without_smoothness(solver, plane, found.nodes, errors.error)
+    located = _locus(solver, special, (plane.names, bounds), found, crossings, errors, lower)
     located.note = f"Locus of the {special.kind}: {reasons.sentence}" if reasons else ""
     return located
 
@@ -300,12 +310,13 @@ def _locus(
     plane: tuple[tuple[str, str], tuple[Interval, Interval]],
     found: Curve,
     crossings: list[tuple[float, float]],
-    error: np.ndarray,
+    errors: Errors,
     lower: int,
 ) -> Locus:
     """The curve that was found in a ``plane``, its names and bounds, with what a file of it says about the scene."""
     scene, nodes, (names, bounds) = solver.system.scene, found.nodes, plane
     rest, k = np.array([n.rest for n in nodes]), _changing(special, nodes[found.start])
+    unresolved = list(range(len(nodes))) if special.resolved is False else errors.unresolved
     load, other = (scene.parameters[name] for name in names)
     return Locus(
         scene=scene.name,
@@ -317,11 +328,14 @@ def _locus(
         bounds=bounds,
         values=np.array([n.p for n in nodes]),
         ordinate=np.array([n.ordinate for n in nodes]),
+        natural=solver.units.ordinate,
         index=np.stack([rest, np.where(rest >= 0, rest + k, -1)], axis=1),
         lower=lower,
         omega2=np.array([n.omega2 for n in nodes]),
         located_to=np.array([n.located_to for n in nodes]),
-        error=error,
+        error=errors.error,
+        unresolved=unresolved,
+        planar=bool(scene.planar),
         marks=[Mark(kind, row) for row, kind in sorted(found.marks.items())],
         start=found.start,
         ended=found.ended,
@@ -342,26 +356,6 @@ def _crossings(tracer: Tracer, found: Curve, first: LocusPoint, level: float) ->
             if (a.p[1] - level) * (b.p[1] - level) < 0:
                 crossings += [(float(n.p[0]), n.ordinate) for n in tracer.points.crossed(a, b, 1, level)]
     return crossings
-
-
-def _errors(solver: StaticSolver, kind: str, plane: Plane, found: Curve, error_bars: int) -> np.ndarray:
-    """Estimated errors (n, 2) at so many rows and at the marked ones, nan elsewhere."""
-    error = np.full((len(found.nodes), 2), np.nan)
-    if error_bars:
-        rows = np.linspace(0, len(found.nodes) - 1, error_bars).round().astype(int).tolist()
-        _estimate(solver, kind, plane, found.nodes, sorted({*rows, *found.marks}), error)
-    return error
-
-
-def _not_estimated(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> Reasons:
-    """Take the errors of points in whose states an energy is not smooth within elements away, and say why."""
-    nonsmooth, reasons = Nonsmooth(solver.shape), Reasons([], [])
-    for row in np.flatnonzero(np.isfinite(error[:, 0])):
-        solver.system.line = plane.along(nodes[row].p, 0)
-        if here := nonsmooth(nodes[row].x):
-            error[row] = np.nan
-            reasons += here
-    return reasons
 
 
 def _both_sides(tracer: Tracer, first: LocusPoint) -> Curve:
@@ -397,13 +391,6 @@ def _guess(solver: StaticSolver, special: SpecialPoint, p: np.ndarray) -> LocusP
     )
 
 
-def _criterion(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
-    """Defining equations of the locus of a kind of special points, one of which is ``near``."""
-    if kind == FLUTTER:
-        return Collision(solver, plane)
-    return Singular(solver, plane, near.modes, kind == FOLD, near.left)
-
-
 def _changing(special: SpecialPoint, node: LocusPoint) -> int:
     """By how much the index changes across a locus at a node."""
     if special.kind == FLUTTER:  # two that have diverged are as unstable as a complex pair
@@ -425,39 +412,3 @@ def _lower_side(solver: StaticSolver, plane: Plane, special: SpecialPoint, node:
     if special.kind != BRANCH_POINT or special.test_function != "mu":
         return 0
     return int(-np.sign(change * special.point.slope))
-
-
-def _estimate(
-    solver: StaticSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: list[int], error: np.ndarray
-) -> None:
-    """Fill ``rows`` of ``error`` with the distance to the curve of a richer discretisation.
-
-    It is measured across the curve, but for turning points and ends to those of the other curve.
-    """
-    richer = type(solver)(richer_system(solver.system))
-    transfer = Transfer(solver.system, richer.system)
-    other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
-    criterion: Criterion | None = None
-    rho = halved(solver.system.fields.discretization.degree)
-    for row in rows:
-        node = nodes[row]
-        x = transfer(node.x, state=True)
-        modes, left = ([transfer(v, state=False) for v in side] for side in (node.modes, node.left))
-        dx = transfer(node.dx, state=False)
-        near = LocusPoint(node.p, x, node.dp, dx, node.p, omega2=node.omega2, modes=modes, left=left)
-        if criterion is None:
-            criterion = _criterion(richer, other, kind, near)
-        along = node.dp
-        if np.linalg.norm(along / plane.width) < CUSP:
-            along = nodes[min(row + 1, len(nodes) - 1)].p - nodes[max(row - 1, 0)].p
-        try:
-            if node.sought is None:
-                found = criterion.correct(node.p, x, (along, None), near, 0.1)
-                there, located_to = found.p, found.located_to
-            else:
-                sought = place(criterion, other, near, node.sought, node.windows)
-                there, located_to = sought.p, sought.dp
-            each = zip(node.p, there, node.located_to + located_to, strict=True)
-            error[row] = [bound(*pair, rho) for pair in each]
-        except ConvergenceError:
-            error[row] = np.inf

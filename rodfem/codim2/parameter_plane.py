@@ -116,13 +116,17 @@ class Plane:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Restore on exit all that a locus changes: the line of parameters and the phase conditions."""
-        system = self.system
-        before = system.line, system.phase
+        """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries.
+
+        A symmetry that the second parameter breaks is one of the scene all the same.
+        """
+        system, verification = self.system, self.system.verification
+        before, dropped, notices = (system.line, system.phase), {*verification.dropped}, [*verification.notices]
         try:
             yield
         finally:
             system.line, system.phase = before
+            verification.dropped, verification.notices = dropped, notices
 
 
 def predict(nodes: list[LocusPoint], s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:

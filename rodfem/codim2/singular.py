@@ -287,7 +287,7 @@ class Singular:
         """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
         at = self._linear(p, x, None)
         scale = self.saddle.scale
-        broken = "{} is an imperfection that destroys the branch point"
+        broken = "{} is an imperfection that destroys the branch point, or is one on this mesh alone"
         if not self.fold and abs(at.b0).max() > IMPERFECT * scale:
             raise Destroyed(broken.format(self.plane.names[1]))
         if at.spread > FEWER * scale:

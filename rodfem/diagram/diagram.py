@@ -214,6 +214,11 @@ class Diagram:
         """
         from rodfem.codim2.locus import STEPS, locus
 
+        if not any(special is mine for branch in self.branches for mine in branch.special):
+            raise InputError(
+                f"The special point at {self.scene.load} = {special.point.load:.8g} is not one of this diagram: give "
+                "one of diagram.special()."
+            )
         low, high = sorted(load or self.span)
         return locus(self.solvers[special.point.mesh], special, parameter, ((low, high), interval), steps or STEPS)
 

@@ -144,6 +144,8 @@ class Plan:
                 raise InputError(f"{name!r} is no second parameter: {choose}.")
             if name not in asked_for(scene):
                 raise InputError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
+            if a > b:
+                raise InputError(f"The interval of {name} is from {a:g} to {b:g}: give the lower one first.")
             if not a <= scene.parameters[name].value <= b or a == b:
                 raise InputError(
                     f"The interval of {name} from {a:g} to {b:g} does not hold its value "

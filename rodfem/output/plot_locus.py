@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
 from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, named, save, tex
-from rodfem.output.stable_region import WORDS, passed, stable_region
+from rodfem.output.stable_region import in_words, passed, plane_of, stable_region
 from rodfem.output.view import POINT
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
@@ -118,7 +118,7 @@ def _fill_stable_regions(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> list[
     filled = []
     for one in loci:
         if region := stable_region(one, loci):
-            axes.fill_between(*region, color=STABLE_SIDE, lw=0, zorder=-1, label=WORDS)
+            axes.fill_between(*region, color=STABLE_SIDE, lw=0, zorder=-1, label=in_words(one))
             filled.append(one)
     return filled
 
@@ -127,7 +127,7 @@ def _indices(loci: Sequence[Mapping[str, Any]]) -> list[Line2D]:
     """Entry of the legend for the indices beside the curves, if there are any."""
     pairs = [pair for one in loci for pair in one["columns"]["index"] if pair[0] >= 0]
     style = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
-    return [Line2D([], [], label="index on the two sides", **style)] if pairs else []
+    return [Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **style)] if pairs else []
 
 
 def _name(figure: Figure, axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
@@ -177,7 +177,12 @@ def _shade_stable_side(axes: Axes, one: Mapping[str, Any]) -> None:
         if not stable[a]:
             continue
         outline = np.concatenate([places[a:b], beside[a:b][::-1]])
-        axes.fill(*axes.transData.inverted().transform(outline).T, color=STABLE_SIDE, label="stable side", zorder=0)
+        axes.fill(
+            *axes.transData.inverted().transform(outline).T,
+            color=STABLE_SIDE,
+            label=f"stable side{plane_of(one)}",
+            zorder=0,
+        )
 
 
 def _footer(loci: Sequence[Mapping[str, Any]]) -> str:

@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 
 COUNT = 400
 """Values of the second parameter at which a region has its bounds."""
-WORDS = "stable, as far as these curves tell"
+IN_PLANE = " in its plane"
+"""After what is said of stability, or of an index, of a rod that is kept in a plane."""
 
 
 class StableRegion(NamedTuple):
@@ -58,6 +59,28 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], cou
             between = side * (level - edge) > 0
             end = np.where(between & (side * (level - end) < 0), level, end)
     return StableRegion(grid, edge, end)
+
+
+def plane_of(one: Mapping[str, Any]) -> str:
+    """What is to be said after ``stable`` or ``index`` of a locus: :data:`IN_PLANE`, or nothing.
+
+    Parameters
+    ----------
+    one
+        Contents of the file of the locus.
+    """
+    return IN_PLANE if one.get("planar") else ""
+
+
+def in_words(one: Mapping[str, Any]) -> str:
+    """What the region of a locus is, for legends.
+
+    Parameters
+    ----------
+    one
+        Contents of the file of the locus.
+    """
+    return f"stable{plane_of(one)}, as far as these curves tell"
 
 
 def passed(one: Mapping[str, Any]) -> NDArray[np.int_]:

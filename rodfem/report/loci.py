@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json
-from rodfem.output.digits import with_unit
+from rodfem.output.digits import number, with_unit
 from rodfem.output.plot_locus import LINES
-from rodfem.output.stable_region import stable_region
+from rodfem.output.stable_region import in_words, plane_of, stable_region
 from rodfem.report.labels import html_of
-from rodfem.tolerances import SAME_SPECIAL, unit
+from rodfem.tolerances import same_special
 
 NEEDED = ("parameters", "columns", "marks", "start", "labels", "kind", "bounds")
 REGION = 120
@@ -48,10 +48,9 @@ def _special_points(one: Mapping[str, Any], data: Mapping[str, Any]) -> list[lis
 
 def _same(special: Mapping[str, Any], place: Sequence[float], natural: Mapping[str, float]) -> bool:
     """Whether a special point has the load and the ordinate of a place, whose ``natural`` sizes an old file lacks."""
-    return all(
-        abs(special[name] - y) <= SAME_SPECIAL * unit(special[name], y, one=natural.get(name, 1.0))
-        for name, y in zip(("load", "ordinate"), place, strict=True)
-    )
+    one = natural.get("load", 1.0), natural.get("ordinate", 1.0)
+    here = special["load"], special["ordinate"]
+    return same_special(here, special.get("located_to") or 0.0, (place[0], place[1]), one)
 
 
 def _label(one: Mapping[str, Any]) -> str:
@@ -59,6 +58,17 @@ def _label(one: Mapping[str, Any]) -> str:
     words, unit = (str((one.get(name) or ("", ""))[1]).replace("$", "") for name in ("words", "units"))
     symbol = html_of(str(one["labels"][1]), always=True)
     return " ".join(filter(None, (escape(words), symbol, escape(with_unit("", unit).strip()))))
+
+
+def _readings(one: Mapping[str, Any], places: Iterable[tuple[float, float]]) -> list[list[str]]:
+    """Both parameters, the load last, of each row with an error as ``0.3216501 (3e-07)``; empty for others."""
+    errors: Sequence[Sequence[Any]] = one["columns"].get("error") or []
+    unresolved, found = {*one.get("unresolved", ())}, list[list[str]]()
+    for row, (x, y) in enumerate(places):
+        pair: Sequence[Any] = errors[row] if row < len(errors) else (None, None)
+        resolved = row not in unresolved
+        found.append([] if None in pair else [number(x, pair[1], resolved), number(y, pair[0], resolved)])
+    return found
 
 
 def _locus(path: Path, one: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, Any]:
@@ -81,6 +91,9 @@ def _locus(path: Path, one: Mapping[str, Any], data: Mapping[str, Any]) -> dict[
         "x": x,
         "load": y,
         "index": index,
+        "readings": _readings(one, zip(x, y, strict=True)),
+        "plane": plane_of(one),
+        "words": in_words(one),
         "marks": [{"row": row, "kind": kind} for row, kind in marks],
         "parameter": other,
         "label": _label(one),

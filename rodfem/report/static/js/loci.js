@@ -44,7 +44,7 @@ function listen() {
 function explain() {
   const has = (test) => data.loci.some((locus) => locus.index.some(test));
   legend.append(
-    ...(data.loci.some((locus) => locus.region) ? [item(area(REGION), "stable, as far as these curves tell")] : []),
+    ...(data.loci.some((locus) => locus.region) ? [item(area(REGION), data.loci[0].words)] : []),
     item(lineIcon(BLUE, STRIPE), "stable states of this diagram"),
     ...(has(bounds) ? [item(lineIcon("#555", 4), "index 0 on one side")] : []),
     ...(has(([low]) => low > 0) ? [item(lineIcon("#555", 2), "greater index on both sides")] : []),

@@ -1,6 +1,6 @@
 // The plane of the load and another parameter: loci, stable regions, and the line of the diagram with its states.
 
-import { data, digits, escaped } from "report/data";
+import { data, digits, escaped, rough } from "report/data";
 import { hover } from "report/diagram";
 import { draw, layout } from "report/plotting";
 import { STABLE, SYMBOLS } from "report/styles";
@@ -20,6 +20,9 @@ const region = ({ region: [x, edge, end] }) => ({
   mode: "lines", line: { width: 0 }, fill: "toself", fillcolor: REGION, hoverinfo: "skip",
 });
 
+// The other parameter and the load of a row, with the bounds of their errors where these are estimated.
+const reading = (locus, row) => (locus.readings[row].length ? locus.readings[row] : [rough(locus.x[row]), rough(locus.load[row])]);
+
 function curve(locus) {
   const shown = locus.special.map(([branch]) => data.branches[branch].name), here = `${escaped(locus.parameter)} = ${digits(locus.here)}`;
   const link = shown.length ? `<br><i>click: the ${escaped(locus.kind)} of ${escaped(shown[0])} at ${here}</i>` : "";
@@ -27,7 +30,7 @@ function curve(locus) {
     x: locus.x,
     y: locus.load,
     customdata: locus.load.map((load) => passed(locus, load)),
-    text: locus.index.map((pair, i) => `<b>${escaped(locus.kind)}</b>, ${escaped(locus.file.replace(".json", ""))}<br>${escaped(data.symbol)} = ${digits(locus.load[i])}, ${escaped(locus.parameter)} = ${digits(locus.x[i])}${pair[0] < 0 ? "" : `<br>index ${pair[0]} on one side, ${pair[1]} on the other`}${link}`),
+    text: locus.index.map((pair, i) => `<b>${escaped(locus.kind)}</b>, ${escaped(locus.file.replace(".json", ""))}<br>${escaped(data.symbol)} = ${escaped(reading(locus, i)[1])}, ${escaped(locus.parameter)} = ${escaped(reading(locus, i)[0])}${pair[0] < 0 ? "" : `<br>index${locus.plane} ${pair[0]} on one side, ${pair[1]} on the other`}${link}`),
     hovertemplate: "%{text}<extra></extra>",
     mode: "lines",
     line: { color: locus.colour, width: locus.index.some(bounds) ? 4 : 2, dash: LINES[locus.kind] ?? "solid" },
@@ -54,9 +57,9 @@ function labels([low, high]) {
     taken.push([x[i] - 0.5 * WIDE * width, load[i] + side * BESIDE * height], [x[i] + 0.5 * WIDE * width, load[i] + side * BESIDE * height]);
     found.push(label(x[i], load[i], lower < 0 ? kind : `${kind} ${lower}|${higher}`, colour, 13 * side));
   }
-  for (const { region: [x, edge, end] } of data.loci.filter((locus) => locus.region)) {
+  for (const { region: [x, edge, end], plane } of data.loci.filter((locus) => locus.region)) {
     const i = Math.round(0.5 * x.length), middle = 0.5 * (edge[i] + end[i]);
-    if (Math.abs(edge[i] - end[i]) > 4 * TALL * height) found.push(label(x[i], middle, "stable: index 0", "#1d6b52", 0, "rgba(255,255,255,0)"));
+    if (Math.abs(edge[i] - end[i]) > 4 * TALL * height) found.push(label(x[i], middle, `stable${plane}: index 0`, "#1d6b52", 0, "rgba(255,255,255,0)"));
   }
   return found;
 }
