@@ -39,6 +39,7 @@ MIXED = "tests/continuation/test_laws_of_mixed_ordinates.py"
 FOLLOW = "tests/continuation/test_continuation.py"
 LOCATE = "tests/continuation/test_locate.py"
 LOCI = "tests/hard/test_hard_loci.py"
+IN_WORDS = "tests/codim2/test_locus_in_words.py"
 ERRORS = "tests/adaptivity/test_error_estimate.py"
 FILES = "tests/output/test_files.py tests/output/test_formats.py"
 KILLS = "tests/hard/test_files_after_a_kill.py"
@@ -342,40 +343,52 @@ FAULTS = {
         "rodfem/codim2/singular.py", "if sharp and others > 0:", "if False:", "tests/codim2/test_locus.py"
     ),
     "turning-points-by-differences": Fault(
-        "rodfem/codim2/curve.py",
+        "rodfem/codim2/codim2_points.py",
         "found += [(self._placed(n, sought), kind)",
         "found += [(n, kind)",
         "tests/codim2/test_places.py",
     ),
     "bars-across-loci-only": Fault(
-        "rodfem/codim2/curve.py",
+        "rodfem/codim2/codim2_points.py",
         "located = better.located_to + found.dp",
         "located = better.located_to",
         "tests/codim2/test_places.py",
     ),
     "places-of-one-mesh": Fault(
-        "rodfem/codim2/locus.py",
+        "rodfem/codim2/locus_errors.py",
         "there, located_to = sought.p, sought.dp",
         "there, located_to = node.p, sought.dp",
         "tests/codim2/test_places.py",
     ),
     "ends-of-folds-corrected": Fault(
-        "rodfem/codim2/curve.py", "end = found.interpolated(node)", "end = replace(node)", "tests/codim2/test_places.py"
+        "rodfem/codim2/codim2_points.py",
+        "end = found.interpolated(node)",
+        "end = replace(node)",
+        "tests/codim2/test_places.py",
     ),
     "double-zeros-by-their-sign": Fault(
-        "rodfem/codim2/curve.py",
+        "rodfem/codim2/codim2_points.py",
         "as_beside(self._placed(n, DOUBLE_ZERO), a)",
         "self._placed(n, DOUBLE_ZERO)",
         "tests/codim2/test_places.py",
     ),
     "ends-of-folds-counted": Fault(
-        "rodfem/codim2/curve.py", ", dx=dx / size, rest=a.rest)", ", dx=dx / size)", "tests/codim2/test_locus.py"
+        "rodfem/codim2/codim2_points.py",
+        ", dx=dx / size, rest=a.rest)",
+        ", dx=dx / size)",
+        "tests/codim2/test_locus.py",
     ),
     "special-points-of-small-loads-are-one": Fault(
-        "rodfem/codim2/locus.py", "unit(x, y, one=one)", "unit(x, y, one=1.0)", "tests/codim2/test_locus.py"
+        "rodfem/codim2/locus.py",
+        "place, (units.load, units.ordinate))",
+        "place, (1.0, 1.0))",
+        "tests/codim2/test_locus.py",
     ),
     "loci-of-small-loads-start-everywhere": Fault(
-        "rodfem/report/loci.py", "one=natural.get(name, 1.0)", "one=1.0", "tests/codim2/test_locus.py"
+        "rodfem/report/loci.py",
+        'natural.get("load", 1.0), natural.get(',
+        "1.0, dict().get(",
+        "tests/codim2/test_locus.py",
     ),
     "moments-without-a-natural-size": Fault(
         "rodfem/output/files.py", '"length", "force", "moment")', '"length", "force")', FILES
@@ -1213,7 +1226,7 @@ FAULTS = {
         "tests/diagram/test_sharp_in_state.py",
     ),
     "loci-have-bars-at-kinks": Fault(
-        "rodfem/codim2/locus.py",
+        "rodfem/codim2/locus_errors.py",
         "            error[row] = np.nan\n            reasons",
         "            reasons",
         "tests/diagram/test_sharp_in_state.py",
@@ -1354,8 +1367,80 @@ FAULTS = {
     "locus-across-a-gap": Fault(
         "rodfem/codim2/curve.py", "if node.orientation != last.orientation and not", "if False and not", LOCI
     ),
-    "a-gap-of-loci-is-a-crossing-for-sure": Fault(
+    "a-coupling-that-turns-ends-a-fold": Fault(
+        "rodfem/codim2/codim2_points.py",
+        "return bool(coupled.any() and (a.coupling * b.coupling < 0)[coupled].all())",
+        "return bool(a.coupling @ b.coupling < 0)",
+        LOCI,
+    ),
+    "a-coupling-that-is-left-ends-a-fold": Fault(
+        "rodfem/codim2/codim2_points.py",
+        "if not located or self._coupling_vanishes(located[0][0], a, b):",
+        "if True:",
+        LOCI,
+    ),
+    "cusps-hide-in-a-step": Fault(
+        "rodfem/codim2/codim2_points.py",
+        "        middle = self._hidden(a, b, before)\n",
+        "        middle = list[LocusPoint]()\n",
+        LOCI,
+    ),
+    "no-turn-beside-a-cusp": Fault(
+        "rodfem/codim2/codim2_points.py",
+        "if len(beside) == 2 else [[], []]",
+        "if False else [[], []]",
+        LOCI,
+    ),
+    "the-end-of-a-fold-has-no-bar": Fault(
+        "rodfem/codim2/codim2_points.py",
+        "np.maximum(abs(p - a.p), abs(p - b.p)) + a.located_to",
+        "a.located_to",
+        LOCI,
+    ),
+    "convexity-of-a-cubic-alone": Fault(
         "rodfem/codim2/curve.py",
+        "return convexity.holds(here(point.p, point.x))",
+        "return False",
+        LOCI,
+    ),
+    "a-locus-drops-symmetries-for-good": Fault(
+        "rodfem/codim2/parameter_plane.py",
+        "verification.dropped, verification.notices = dropped, notices",
+        "pass",
+        IN_WORDS,
+    ),
+    "close-special-points-are-on-one-locus": Fault(
+        "rodfem/tolerances.py",
+        "<= LOCATED * (located_to + round_off(load, of_load))",
+        "<= SAME_SPECIAL * unit(load, one=of_load)",
+        IN_WORDS,
+    ),
+    "stable-in-a-plane-is-stable": Fault(
+        "rodfem/codim2/locus.py",
+        "planar=bool(scene.planar)",
+        "planar=False",
+        IN_WORDS,
+    ),
+    "loci-of-unresolved-points-are-resolved": Fault(
+        "rodfem/codim2/locus.py",
+        "if special.resolved is False else errors.unresolved",
+        "if False else errors.unresolved",
+        LOCI,
+    ),
+    "rows-of-loci-are-resolved": Fault(
+        "rodfem/codim2/locus_errors.py",
+        "> RESOLVED_TO:",
+        "> 1e9:",
+        IN_WORDS,
+    ),
+    "bars-of-loci-stay-off-the-page": Fault(
+        "rodfem/report/loci.py",
+        "found.append([] if None in pair else",
+        "found.append([] if True else",
+        IN_WORDS,
+    ),
+    "a-gap-of-loci-is-a-crossing-for-sure": Fault(
+        "rodfem/codim2/codim2_points.py",
         'return f"{ended}, or turns back within {GAP:g} of the bounds from one"',
         "return ended",
         LOCI,
@@ -1389,7 +1474,7 @@ FAULTS = {
     ),
     "closed-locus-goes-round-again": Fault("rodfem/codim2/curve.py", "CLOSED = 0.1", "CLOSED = 1e-4", LOCI),
     "bar-of-a-locus-without-what-is-left": Fault(
-        "rodfem/codim2/locus.py", "[bound(*pair, rho)", "[bound(*pair, 0.0)", "tests/codim2/test_places.py"
+        "rodfem/codim2/locus_errors.py", "[bound(*pair, rho)", "[bound(*pair, 0.0)", "tests/codim2/test_places.py"
     ),
     "modes-that-meet-without-round-off": Fault(
         "rodfem/modes/finder.py",

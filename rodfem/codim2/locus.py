@@ -127,14 +127,11 @@ class Locus:
     bounds: tuple[Interval, Interval]
     values: np.ndarray
     ordinate: np.ndarray
-    natural: float
     index: np.ndarray
     lower: int
     omega2: np.ndarray
     located_to: np.ndarray
     error: np.ndarray
-    unresolved: list[int]
-    planar: bool
     marks: list[Mark]
     start: int
     ended: tuple[str, str]
@@ -145,6 +142,9 @@ class Locus:
     words: tuple[str, str] = ("", "")
     units: tuple[str, str] = ("", "")
     note: str = ""
+    natural: float = 1.0
+    planar: bool = False
+    unresolved: list[int] = field(default_factory=list)
 
     def passes(self, special: SpecialPoint, units: Units) -> bool:
         """Whether the curve passes the line of its start again at another special point.
@@ -178,7 +178,7 @@ class Locus:
     @classmethod
     def read(cls, path: Path) -> Locus:
         """Read what :meth:`save` has written, but for the states; raises :class:`InputError` where that is missing."""
-        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", *AS_THEY_ARE[:-1]))
+        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", "lower"))
         columns, (first, second) = data["columns"], data["parameters"]
         tables: dict[str, Any] = {
             key: np.array(columns[key], dtype=float) for key in ("ordinate", "located_to", "error", "omega2")

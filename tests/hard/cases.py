@@ -11,6 +11,7 @@ from hard import (
     heavy,
     isolas,
     loci,
+    loci_codim2,
     paths,
     published,
     ranges,
@@ -236,6 +237,31 @@ LOCI = (
     Case(
         "a small closed locus", "hardly more than a step of the bounds", "followed once round, to 1e-9",
         "P^2 + b^2 = d^2", "d, in bounds of 0.3", loci.island, (5e-3,), (0.2, 0.1, 0.05, 2e-2, 1e-2, 5e-3),
+    ),
+    Case(
+        "a cusp in wide bounds", "the normal of the curve turns by more than a right angle in a step",
+        "one cusp, within its error, and the whole curve", "27 P^2 = 4 b^3", "half width of the interval of b",
+        loci_codim2.cusp, (1e2,), (1.0, 1e1, 1e2, 1e3, 1e4),
+    ),
+    Case(
+        "two cusps in a step", "both parameters turn back twice", "both cusps and the turn between them, to 1e-7",
+        "swallowtail", "half their distance, in steps of 0.04", loci_codim2.two_cusps, (1e-2,),
+        (0.1, 3e-2, 2e-2, 1e-2, 5e-3, 2e-3),
+    ),
+    Case(
+        "folds that end on two branch points at once", "no solution locates the end: two vectors vanish there",
+        "an end within its error", "Michell's ring, C = 11/8 (Goriely 2006)", "bound of C", loci_codim2.end_on_ring,
+        (1.6,), (1.6, 2.2, 2.5),
+    ),
+    Case(
+        "a stiffness followed over decades", "cubics between points of the curve pass where it is negative",
+        "the whole curve, to 1e-9", "traced at the end", "greatest stretching stiffness of a ruler", loci_codim2.convex,
+        (1e6,), (1e2, 1e3, 1e4, 1e5, 1e6),
+    ),
+    Case(
+        "a ring whose stiffness varies", "a mesh of 8 elements breaks its symmetry of three waves", "double points "
+        "within their errors; or a sentence that the mesh may be the cause", "Fourier series",
+        "part that varies at the start", loci_codim2.modulated, (0.0, 0.1), (0.0, 0.05, 0.1, 0.2),
     ),
 )  # fmt: skip
 
