@@ -55,7 +55,9 @@ def same_place(x: Any, s: float, length: float) -> Any:
 
 
 def same_special(special: Pair, located_to: float, place: Pair, one: Pair) -> bool:
-    """Whether two special points on one mesh, each a load and an ordinate, are one; ``one`` has their natural sizes.
+    """Whether a ``special`` point and a ``place`` on one mesh, each a load and an ordinate, are one.
+
+    ``one`` has the natural sizes of loads and ordinates.
 
     Loads are as near as the first one is ``located_to``, a few times: others may be nearer than ordinates are known.
     """

@@ -1367,12 +1367,6 @@ FAULTS = {
     "locus-across-a-gap": Fault(
         "rodfem/codim2/curve.py", "if node.orientation != last.orientation and not", "if False and not", LOCI
     ),
-    "a-coupling-that-turns-ends-a-fold": Fault(
-        "rodfem/codim2/codim2_points.py",
-        "return bool(coupled.any() and (a.coupling * b.coupling < 0)[coupled].all())",
-        "return bool(a.coupling @ b.coupling < 0)",
-        LOCI,
-    ),
     "a-coupling-that-is-left-ends-a-fold": Fault(
         "rodfem/codim2/codim2_points.py",
         "if not located or self._coupling_vanishes(located[0][0], a, b):",
@@ -1441,8 +1435,8 @@ FAULTS = {
     ),
     "a-gap-of-loci-is-a-crossing-for-sure": Fault(
         "rodfem/codim2/codim2_points.py",
-        'return f"{ended}, or turns back within {GAP:g} of the bounds from one"',
-        "return ended",
+        'f"{ended}, or turns back within {GAP:g} of the bounds from one"',
+        "ended",
         LOCI,
     ),
     "every-crossing-of-loci-is-a-gap": Fault(

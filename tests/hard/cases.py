@@ -244,6 +244,11 @@ LOCI = (
         loci_codim2.cusp, (1e2,), (1.0, 1e1, 1e2, 1e3, 1e4),
     ),
     Case(
+        "a cusp between turning points", "the normal of the curve turns by more than two right angles in a step",
+        "cusp and turning points, to 1e-9", "P + b = 3 u^2, d (P - b) = -2 u^3", "d", loci_codim2.skew_cusp, (3e-3,),
+        (3e-2, 1e-2, 3e-3, 1e-3),
+    ),
+    Case(
         "two cusps in a step", "both parameters turn back twice", "both cusps and the turn between them, to 1e-7",
         "swallowtail", "half their distance, in steps of 0.04", loci_codim2.two_cusps, (1e-2,),
         (0.1, 3e-2, 2e-2, 1e-2, 5e-3, 2e-3),
@@ -261,7 +266,7 @@ LOCI = (
     Case(
         "a ring whose stiffness varies", "a mesh of 8 elements breaks its symmetry of three waves", "double points "
         "within their errors; or a sentence that the mesh may be the cause", "Fourier series",
-        "part that varies at the start", loci_codim2.modulated, (0.0, 0.1), (0.0, 0.05, 0.1, 0.2),
+        "part that varies at the start", loci_codim2.modulated, (0.0,), (0.0, 0.05, 0.1, 0.2),
     ),
 )  # fmt: skip
 

@@ -39,6 +39,18 @@ def cusp(width: float) -> Measured:
     return Measured(_marked(found, "cusp", (0.0, 0.0)) if whole else inf, 1.0, (), "" if whole else str(words(found)))
 
 
+def skew_cusp(part: float) -> Measured:
+    """Folds ``P + b = 3 u^2``, ``part (P - b) = -2 u^3``: turns in b and P at ``u = -+ part`` beside a cusp."""
+    potential = lambda u, f2, c: u**4 / 4 - (c.P + c.b) * u * u / 2 - part * (c.P - c.b) * u + f2 / 2  # noqa: E731
+    diagram = run(two_freedoms(potential, (0.2, -0.2), b=0.1), UNIFORM, error_bars=False)
+    found = diagram.locus(diagram.special("fold")[0], "b", (-1.0, 1.0), (-1.0, 1.0))
+    u = found.ordinate
+    whole = [mark.kind for mark in found.marks] == ["turns in b", "cusp", "turns in P"]
+    off = [abs(u[mark.row] - at) for mark, at in zip(found.marks, (-part, 0.0, part), strict=False)]
+    rows = abs(found.values - np.stack([3 * u * u - 2 * u**3 / part, 3 * u * u + 2 * u**3 / part], axis=1) / 2).max()
+    return Measured(max(rows, *off) if whole else inf, 1e-9, (), "" if whole else str(words(found)))
+
+
 def two_cusps(half: float) -> Measured:
     """Folds of ``u^5/5 + a u^3/3 + b u^2/2 - P u``, ``a = -6 half^2``: a swallowtail with cusps at ``u = -+ half``."""
     a = -6 * half**2

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hard import loci
+from hard import loci, loci_codim2
 from hard.case import Case
 from hard.cases import CASES
 from hard.test_hard_cases import APART
 
+from rodfem.codim2.locus import COARSE
 from rodfem.continuation.kinds import GAP
 
 pytestmark = pytest.mark.alone
@@ -28,3 +29,9 @@ def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
     """Narrower than the least step: the curve ends before it, or a crossing is said to be one or such a gap."""
     found = loci.gap(kind, width)
     assert not found.right and any("no convergence" in said or f"within {GAP:g}" in said for said in found.said)
+
+
+def test_a_locus_of_a_point_that_the_mesh_does_not_resolve_says_so() -> None:
+    """One of two eigenvalues that are one for the rod: its curve has another index, and errors beyond its bars."""
+    found = loci_codim2.modulated(0.1)
+    assert not found.right and COARSE in found.said
