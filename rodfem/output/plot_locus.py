@@ -35,7 +35,8 @@ start below which that has no side of the load."""
 AFTER, ASIDE = 0.3, 30.0
 """Share of its rows after which the indices of a curve stand, and their distance from it, in pixels."""
 LEGEND, BELOW = 3, (0.5, -0.14)
-"""Columns of the legend, and its place in shares of the axes: under them, as the whole plane may be shaded."""
+"""Columns of the legend, one less of a rod in its plane, whose words are more, and its place in shares of the axes:
+under them, as the whole plane may be shaded."""
 ROOM = 0.1
 """Share of the height above and below the curves, for the indices that stand beside them."""
 
@@ -81,7 +82,8 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
             if one not in filled:
                 _shade_stable_side(axes, one)
         handles = {handle.get_label(): handle for handle in (*axes.get_lines(), *axes.patches, *axes.collections)}
-        place = {"ncols": LEGEND, "loc": "upper center", "bbox_to_anchor": BELOW}
+        columns = LEGEND - 1 if plane_of(loci[0]) else LEGEND
+        place = {"ncols": columns, "loc": "upper center", "bbox_to_anchor": BELOW}
         entries = [*handles.values(), *_indices(loci)]
         axes.legend(handles=entries, fontsize=9.5, **place)
         figure.draw_without_rendering()  # the legend has taken its room: pixels are final
