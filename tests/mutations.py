@@ -1373,16 +1373,25 @@ FAULTS = {
         "if True:",
         LOCI,
     ),
+    "a-fold-that-passes-a-branch-point-ends": Fault(
+        "rodfem/codim2/codim2_points.py", " and (a.dp * b.dp < 0)[moves].all()", "", LOCI
+    ),
+    "a-passage-is-a-cusp": Fault(
+        "rodfem/codim2/codim2_points.py", "if self._coupling_vanishes(cusp, a, b, PASSED):", "if False:", LOCI
+    ),
+    "cusps-are-turns": Fault(
+        "rodfem/codim2/codim2_points.py", "beside[0].curvature * beside[1].curvature < 0", "False", LOCI
+    ),
     "cusps-hide-in-a-step": Fault(
         "rodfem/codim2/codim2_points.py",
-        "        middle = self._hidden(a, b, before)\n",
-        "        middle = list[LocusPoint]()\n",
+        "pairwise([a, *self._hidden(a, b, other), b])",
+        "pairwise([a, b])",
         LOCI,
     ),
     "no-turn-beside-a-cusp": Fault(
         "rodfem/codim2/codim2_points.py",
-        "if len(beside) == 2 else [[], []]",
-        "if False else [[], []]",
+        "        if len(beside) == 2 and depth:\n            sides",
+        "        if False:\n            sides",
         LOCI,
     ),
     "the-end-of-a-fold-has-no-bar": Fault(

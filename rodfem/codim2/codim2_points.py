@@ -2,7 +2,8 @@
 
 At a *cusp* of a fold its curvature vanishes and both parameters turn back, while the coupling of its null vector with
 the parameters does not vanish.  Where it does, in both of them at one place, the fold *ends on a branch point*: beyond
-it the curve is its own mirror image.  A double eigenvalue that vanishes ends a curve of flutter.
+it the curve is its own mirror image.  It may also *pass a branch point*, to other parameters.  A double eigenvalue that
+vanishes ends a curve of flutter.
 
 What changes sign between two nodes is located.  What changes it twice is looked for where a parabola or cubic through
 the nodes has its extremum: such a step is parted there.
@@ -36,13 +37,17 @@ NO_COUPLING = 1e-9
 """Coupling with one parameter that is none, over that with the other one, both in units of the bounds."""
 CLOSE = 1e-6
 """Distance, in the metric, that a point may move by from where a parameter was found to have a value, to having it."""
-VANISHED = 0.05
-"""Share that is left of a coupling where it vanishes: the place of that is known to less than the step."""
+VANISHED, PASSED = 0.05, 1e-3
+"""Share that is left of a coupling where it vanishes, at an end and beside a cusp: its place is known to no more."""
 ASIDE = 1e-2
 """Distance from a cusp, over that of the nodes, at which the tangent has the direction that it has beside it."""
 
 FLAT = 1e-12
 """Part of the unit tangent along a parameter, over its bounds, that is round-off: next to a cusp it has no sign."""
+PASSES = "the fold passes a branch point"
+"""Mark of a row at which the coupling vanishes as well, but the fold goes on."""
+DEPTH = 4
+"""Times that a step is parted for more cusps than one."""
 PARABOLAS = 8
 """Parabolas by which the least value of what may vanish twice in a step is sought."""
 
@@ -82,11 +87,7 @@ class Codim2Points:
         if a.omega2 * b.omega2 < 0:
             kind = "the double eigenvalue vanishes: divergence"
             return self._end(a, b, lambda n: n.omega2, kind, lambda n: as_beside(self._placed(n, DOUBLE_ZERO), a))
-        rows = list[Row]()
-        middle = self._hidden(a, b, before)
-        for p, q in pairwise([a, *middle, b]):
-            rows += self._piece(p, q) + [(q, "")] * (q is not b)
-        return rows, ""
+        return self._rows(a, b, before, DEPTH), ""
 
     def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
         """Point between two neighbours at which a parameter has a value; none where it cannot be located.
@@ -104,17 +105,39 @@ class Codim2Points:
         except ConvergenceError:
             return node
 
-    def _piece(self, a: LocusPoint, b: LocusPoint) -> list[Row]:
-        """Cusp and turning points between two nodes, each at most once."""
+    def _rows(self, a: LocusPoint, b: LocusPoint, other: LocusPoint | None, depth: int) -> list[Row]:
+        """What is between two nodes, beside an ``other`` one, in a step that may be parted ``depth`` times."""
+        rows = list[Row]()
+        for p, q in pairwise([a, *self._hidden(a, b, other), b]):
+            rows += self._piece(p, q, depth) + [(q, "")] * (q is not b)
+        return rows
+
+    def _piece(self, a: LocusPoint, b: LocusPoint, depth: int) -> list[Row]:
+        """What is between two nodes where the curvature has another sign at most once, or by pieces beside that."""
         if a.curvature * b.curvature >= 0:
-            return self._turns(a, b)
+            turns = self._turns(a, b)
+            for turn, _ in turns if depth else []:
+                beside = self._beside(turn, a, b)
+                if len(beside) == 2 and beside[0].curvature * beside[1].curvature < 0:  # a cusp, of an even number
+                    return self._rows(a, beside[0], None, 0) + self._piece(beside[0], b, depth - 1)
+            return turns
         cusps = self._located(a, b, lambda n: n.curvature, "cusp")
         if not cusps:
             return []
-        (cusp, kind), aside = cusps[0], ASIDE * (b.s - a.s)
-        beside = [self._at(a, b, s) for s in (cusp.s - aside, cusp.s + aside) if a.s < s < b.s]
-        turns = [self._turns(a, beside[0]), self._turns(beside[1], b)] if len(beside) == 2 else [[], []]
-        return [*turns[0], (self._placed(cusp, self._reversal(a, b)), kind), *turns[1]]
+        (cusp, kind), sides = cusps[0], list[list[Row]]([[], []])
+        beside = self._beside(cusp, a, b)
+        if len(beside) == 2 and depth:
+            sides = [self._rows(a, beside[0], beside[1], depth - 1), self._rows(beside[1], b, beside[0], depth - 1)]
+        if self._coupling_vanishes(cusp, a, b, PASSED):
+            # no solution locates it: corrections slide along the curve of branch points
+            passed = replace(cusp, located_to=cusp.located_to + np.maximum(abs(cusp.p - a.p), abs(cusp.p - b.p)))
+            return [*sides[0], (passed, PASSES), *sides[1]]
+        return [*sides[0], (self._placed(cusp, self._reversal(a, b)), kind), *sides[1]]
+
+    def _beside(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
+        """Points on both sides of a ``node`` between two others, as far as they are between these."""
+        aside = ASIDE * (b.s - a.s)
+        return [self._at(a, b, s) for s in (node.s - aside, node.s + aside) if a.s < s < b.s]
 
     def _turns(self, a: LocusPoint, b: LocusPoint) -> list[Row]:
         """Points between two nodes at which a parameter has an extremum."""
@@ -179,19 +202,25 @@ class Codim2Points:
         return replace(better, s=node.s + found.s, located_to=located, sought=sought, windows=found.windows)
 
     def _reverses(self, a: LocusPoint, b: LocusPoint) -> bool:
-        """Whether the coupling with each of the parameters that has one changes its sign between two nodes."""
+        """Whether coupling and tangent change their signs between two nodes, in each parameter that has some.
+
+        Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.  Where it
+        goes on to others it passes the branch point.
+        """
         coupled = self._coupled(a, b)
-        return bool(coupled.any() and (a.coupling * b.coupling < 0)[coupled].all())
+        moves = np.minimum(abs(a.dp), abs(b.dp)) > FLAT * self.plane.width
+        turned = (a.coupling * b.coupling < 0)[coupled].all() and (a.dp * b.dp < 0)[moves].all()
+        return bool(coupled.any() and moves.any() and turned)
 
     def _coupled(self, a: LocusPoint, b: LocusPoint) -> np.ndarray:
         """Whether the null vector is coupled with each of the parameters (2,), round-off apart."""
         size = np.minimum(abs(a.coupling), abs(b.coupling))
         return np.asarray(size > NO_COUPLING * size.max())
 
-    def _coupling_vanishes(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> bool:
-        """Whether the coupling between two nodes vanishes at ``node``, in all parameters, and has not just turned."""
+    def _coupling_vanishes(self, node: LocusPoint, a: LocusPoint, b: LocusPoint, share: float = VANISHED) -> bool:
+        """Whether at most a ``share`` of the coupling at two nodes is left at ``node``, in all parameters."""
         size = np.minimum(abs(a.coupling), abs(b.coupling))
-        return bool((abs(node.coupling) <= VANISHED * size)[self._coupled(a, b)].all())
+        return bool((abs(node.coupling) <= share * size)[self._coupled(a, b)].all())
 
     def _end_of_fold(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
         """The end near ``node`` of a fold on a branch point, by interpolation between its two sides.

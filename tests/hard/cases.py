@@ -254,6 +254,14 @@ LOCI = (
         (0.1, 3e-2, 2e-2, 1e-2, 5e-3, 2e-3),
     ),
     Case(
+        "three cusps in a step", "the curvature has one sign more than it shows", "all three, to 1e-7", "butterfly",
+        "distance of the outer ones", loci_codim2.butterfly, (1e-2,), (5e-2, 2e-2, 1e-2),
+    ),
+    Case(
+        "folds that pass a branch point", "coupling and curvature vanish, as at an end and at a cusp",
+        "one curve, to 1e-9", "P - 3/2 d b = -(b + d P)^2/4", "d", loci_codim2.passes, (0.0, 0.2), (0.0, 0.1, 0.2),
+    ),
+    Case(
         "folds that end on two branch points at once", "no solution locates the end: two vectors vanish there",
         "an end within its error", "Michell's ring, C = 11/8 (Goriely 2006)", "bound of C", loci_codim2.end_on_ring,
         (1.6,), (1.6, 2.2, 2.5),

@@ -15,6 +15,7 @@ from scipy.linalg import eigh
 
 from forms import loads
 from rodfem import Discretization, Plan, Ring, trace
+from rodfem.codim2.codim2_points import PASSES
 from rodfem.codim2.locus import COARSE, Locus
 
 WAVES, MODES = 3, 40
@@ -63,6 +64,33 @@ def two_cusps(half: float) -> Measured:
     off = [abs(abs(at) - (half if kind == "cusp" else 0.0)) for kind, at in marks]
     rows = abs(found.values - np.stack([-3 * u**4 - a * u * u, -(4 * u**3 + 2 * a * u)], axis=1)).max()
     return Measured(max(rows, *off) if all_of_them else inf, 1e-7, (), "" if all_of_them else str(marks))
+
+
+def butterfly(half: float) -> Measured:
+    """Folds of ``u^6/6 + a u^4/4 - b u^2/2 - P u``, ``a = -20/6 half^2``: cusps at ``u = -half, 0, half``."""
+    a = -20 / 6 * half**2
+    potential = lambda u, f2, c: u**6 / 6 + c.a * u**4 / 4 - c.b * u * u / 2 - c.P * u + f2 / 2  # noqa: E731
+    diagram = run(two_freedoms(potential, (0.02, -0.02), a=a, b=0.005), UNIFORM, error_bars=False)
+    found = diagram.locus(diagram.special("fold")[0], "b", (-1.0, 1.0), (-1.0, 1.0))
+    at = sorted(float(found.ordinate[mark.row]) for mark in found.marks if mark.kind == "cusp")
+    off = max(map(abs, np.subtract(at, (-half, 0.0, half)))) if len(at) == 3 else inf
+    return Measured(off, 1e-7, (), "" if len(at) == 3 else str(found.marks))
+
+
+def passes(skew: float) -> Measured:
+    """Folds ``P - 1.5 skew b = -(b + skew P)^2/4`` pass a branch point: one curve, no cusp, no end."""
+    potential = lambda u, f2, c: (  # noqa: E731
+        u**4 / 4 - (c.P - 1.5 * skew * c.b) * u * u / 2 + (c.b + skew * c.P) * u**3 / 3 + f2 / 2
+    )
+    diagram = trace(two_freedoms(potential, (-0.1, 0.1), b=-0.2), UNIFORM, Plan(depth=1, error_bars=False))
+    found = diagram.locus(diagram.special("fold")[0], "b", (-1.0, 1.0), (-1.0, 1.0))
+    P, b = found.values.T
+    off = abs(P - 1.5 * skew * b + (b + skew * P) ** 2 / 4)
+    rows = [m.row for m in found.marks if m.kind == PASSES]
+    one = len(rows) == 1 and all(end.endswith("its bound") for end in found.ended) and "cusp" not in words(found)
+    away = np.delete(off, rows).max()
+    held = one and bool((abs(found.values[rows[0]]) <= found.located_to[rows[0]]).all())
+    return Measured(float(away) if held else inf, 1e-9, (), "" if held else str((found.marks, found.ended)))
 
 
 def end_on_ring(most: float) -> Measured:
