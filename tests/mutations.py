@@ -1367,12 +1367,6 @@ FAULTS = {
     "locus-across-a-gap": Fault(
         "rodfem/codim2/curve.py", "if node.orientation != last.orientation and not", "if False and not", LOCI
     ),
-    "a-coupling-that-is-left-ends-a-fold": Fault(
-        "rodfem/codim2/codim2_points.py",
-        "if not located or self._coupling_vanishes(located[0][0], a, b):",
-        "if True:",
-        LOCI,
-    ),
     "a-fold-that-passes-a-branch-point-ends": Fault(
         "rodfem/codim2/codim2_points.py", " and (a.dp * b.dp < 0)[moves].all()", "", LOCI
     ),
