@@ -41,7 +41,6 @@ VANISHED, PASSED = 0.05, 1e-3
 """Share that is left of a coupling where it vanishes, at an end and beside a cusp: its place is known to no more."""
 ASIDE = 1e-2
 """Distance from a cusp, over that of the nodes, at which the tangent has the direction that it has beside it."""
-
 FLAT = 1e-12
 """Part of the unit tangent along a parameter, over its bounds, that is round-off: next to a cusp it has no sign."""
 PASSES = "the fold passes a branch point"

@@ -112,7 +112,7 @@ class Tracer:
                 return node if t == 1.0 else self.criterion.correct(p, x, (dp, dx), last, node.s - last.s)
             except ConvergenceError as trouble:
                 raise ConvergenceError(
-                    f"whether the stored energy stays convex near {self._at(p)} is open"
+                    f"whether the stored energy stays convex near {self._words(p)} is open"
                 ) from trouble
 
         def holds(t: float) -> bool:
@@ -122,12 +122,13 @@ class Tracer:
         with self.plane.kept():
             found = lost_between(convexity, lambda t: here(*guess(t)[:2]), holds)
             if found.lost is not None:
-                return f"the stored energy is not convex any more near {self._at(corrected(found.lost).p)}"
+                return f"the stored energy is not convex any more near {self._words(corrected(found.lost).p)}"
         if found.resolved:
             return ""
-        return f"the stored energy varies so fast that it may lose convexity unseen near {self._at(node.p)}"
+        return f"the stored energy varies so fast that it may lose convexity unseen near {self._words(node.p)}"
 
-    def _at(self, p: np.ndarray) -> str:
+    def _words(self, p: np.ndarray) -> str:
+        """Both parameters by name."""
         return ", ".join(f"{name} = {v:.8g}" for name, v in zip(self.plane.names, p, strict=True))
 
     def _next(self, history: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:
