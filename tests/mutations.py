@@ -294,6 +294,30 @@ FAULTS = {
         "if least > 0.0 or t < 1.0 or holds(t):",
         "tests/continuation/test_convexity.py",
     ),
+    "convexity-in-units-of-one-end": Fault(
+        f"{CONTINUATION}convexity_between.py",
+        "convexity.scales(state(0.0), state(1.0))",
+        "convexity.scales(state(0.0))",
+        "tests/continuation/test_convexity.py",
+    ),
+    "convexity-at-places-of-a-grid-alone": Fault(
+        "rodfem/fem/convexity.py",
+        "b[believed] - slope[believed] ** 2 / (2 * curvature[believed])",
+        "b[believed]",
+        "tests/continuation/test_convexity.py",
+    ),
+    "parabolas-through-steps-are-believed": Fault(
+        "rodfem/fem/convexity.py",
+        " & (off <= EXPLAINED * (np.maximum(a, c) - b))",
+        "",
+        "tests/continuation/test_convexity.py",
+    ),
+    "masses-at-the-ends-of-the-rod": Fault(
+        "rodfem/problem/jumps.py",
+        "values = known(Values(expression), s, scene)[1]",
+        "values = known(Values(expression), s, scene)[1][[0, -1]]",
+        "tests/problem/test_scene_errors.py",
+    ),
     "planes-at-nine-loads": Fault(
         "rodfem/problem/plane.py",
         "if not all(vanishes(values[i]) for i in out):",

@@ -40,9 +40,9 @@ def lost_between(convexity: Convexity | None, state: State, holds: Callable[[flo
 
     ``holds(t)`` decides about an interpolated state along which it is not.
     """
-    if convexity is None or convexity.evaluate is None:
+    if convexity is None or not convexity.alters:
         return Between()
-    scales = convexity.scales(state(0.0))
+    scales = convexity.scales(state(0.0), state(1.0))
     margin = cache(lambda t: convexity.margin(state(t), scales))
     last, samples = 0.0, sampled(margin, 0.0, 1.0, (margin(0.0), margin(1.0)), lambda _: ROUND_OFF)
     for t, least in samples.in_order():

@@ -21,11 +21,26 @@ from rodfem.fem import form_compiler
 from rodfem.fem.literals import with_constants
 from rodfem.fem.system import System
 
+GRID = 25
+"""Places of an element, at equal distances, at which a material that varies along it is looked at besides."""
+EXPLAINED = 0.1
+"""Error of a parabola at the two places beside its three, relative to how much these vary, up to which it is believed.
+
+One through a jump is not: it has lower values than the function.
+"""
+
 
 class Convexity:
     """Evaluates the least eigenvalue of the second derivative of ``W`` along a state.
 
     At the Gauss points of each element and at its ends: strains are largest at a clamp or a joint more often than not.
+    A material that varies along the rod may be too soft between them: it is looked at on a grid besides, and at the
+    vertices of parabolas through the values there.
+
+    Attributes
+    ----------
+    alters, varies
+        Whether the second derivative depends on the state or the load, and on the arclength.
     """
 
     def __init__(self, system: System) -> None:
@@ -42,22 +57,27 @@ class Convexity:
         self.size = len(free) + 3
         entries = [hessian[i, j] for i in range(self.size) for j in range(self.size)]
         expression = apply_derivatives(apply_algebra_lowering(ufl.as_vector(entries)))
-        places = [*extract_coefficients(expression), *extract_type(expression, ufl.SpatialCoordinate)]
         self.evaluate = None
-        if not places:  # the same everywhere: checked with the scene
+        self.alters = bool(extract_coefficients(expression))
+        self.varies = bool(extract_type(expression, ufl.SpatialCoordinate))
+        if not self.alters and not self.varies:  # the same everywhere: checked with the scene
             return
         inside = (np.polynomial.legendre.leggauss(f.discretization.degree + 1)[0] + 1) / 2
         points = np.array([0.0, *inside, 1.0])
+        if self.varies:
+            points = np.append(points, np.linspace(0.0, 1.0, GRID))
         vector = with_constants(ufl.as_vector(entries), f.mesh)
         self.evaluate = form_compiler.expression(vector, points.reshape(-1, 1), f.mesh, f.owned_cells)
 
     def holds(self, x: PETSc.Vec) -> bool:
         """Whether the second derivative is positive definite along the whole rod at the state ``x``.
 
-        It is where Cholesky's factors exist; where not, the least eigenvalue decides.
+        It is where Cholesky's factors exist; where not, or between places, the least eigenvalue decides.
         """
         if self.evaluate is None:
             return True
+        if self.varies and not self.margin(x, self.scales(x)) > 0:
+            return False
         mine = True
         try:
             np.linalg.cholesky(self._matrices(x))
@@ -75,20 +95,43 @@ class Convexity:
         mine = (values[:, 0] / abs(values).max(axis=1)).min() if len(values) else 1.0
         return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
 
-    def scales(self, x: PETSc.Vec) -> np.ndarray:
-        """Roots of the diagonals of the second derivative at a state ``x`` where it is positive definite."""
-        return np.sqrt(np.einsum("pii->pi", self._matrices(x)))
+    def scales(self, *states: PETSc.Vec) -> np.ndarray:
+        """Roots of the largest diagonals of the second derivative on each element, at some states: (cells, 1, size).
+
+        Of one state alone they are too small where a strain has hardly any stiffness left: in units of these the other
+        strains are the least eigenvalue almost everywhere, and hide it.
+        """
+        diagonals = [abs(np.einsum("cpii->cpi", self._by_element(x))) for x in states]
+        return np.asarray(np.sqrt(np.max(diagonals, axis=0).max(axis=1, keepdims=True)))
 
     def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
-        """Least eigenvalue over the whole rod at the state ``x``, in units of the ``scales`` of a state nearby.
+        """Least eigenvalue over the whole rod at the state ``x``, in units of the ``scales`` of states nearby.
 
         So stiff strains do not hide bending, as they do from :meth:`lowest`, and it depends smoothly on the state.
         """
-        values = np.linalg.eigvalsh(self._matrices(x) / scales[:, :, None] / scales[:, None])
-        return float(self.system.comm.allreduce(float(values.min(initial=1.0)), op=MPI.MIN))
+        least = np.linalg.eigvalsh(self._by_element(x) / scales[..., None] / scales[..., None, :])[..., 0]
+        mine = least.min(initial=1.0)
+        if self.varies:
+            mine = min(mine, _vertices(least[:, -GRID:]).min(initial=1.0))
+        return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
+
+    def _by_element(self, x: PETSc.Vec) -> np.ndarray:
+        """Second derivatives by element of this rank and place on it, (cells, places, size, size)."""
+        matrices = self._matrices(x)
+        return matrices.reshape(self.system.fields.owned_cells, -1, self.size, self.size)
 
     def _matrices(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives at all places of this rank, symmetric, (places, size, size)."""
         assert self.evaluate is not None
         matrices = self.system.at(x).evaluate(self.evaluate).reshape(-1, self.size, self.size)
         return np.asarray((matrices + matrices.transpose(0, 2, 1)) / 2)
+
+
+def _vertices(values: np.ndarray) -> np.ndarray:
+    """Lowest values of parabolas through three of some ``values`` on elements, (cells, places), of those believed."""
+    a, b, c = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    slope, curvature = (c - a) / 2, a - 2 * b + c
+    before, after = (3 * a - 3 * b + c)[:, 1:] - values[:, :-3], (a - 3 * b + 3 * c)[:, :-1] - values[:, 3:]
+    off = np.maximum(np.pad(abs(before), ((0, 0), (1, 0))), np.pad(abs(after), ((0, 0), (0, 1))))
+    believed = (abs(slope) <= curvature) & (curvature > 0) & (off <= EXPLAINED * (np.maximum(a, c) - b))
+    return np.asarray(b[believed] - slope[believed] ** 2 / (2 * curvature[believed]))

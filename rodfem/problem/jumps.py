@@ -100,6 +100,12 @@ def known(f: Values, s: Symbol, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return more, values if len(more) == len(places) else f({s: more})
 
 
+def extremes(expression: Any, s: Symbol, scene: Scene) -> list[float]:
+    """Least and greatest value along the rod of an expression of the arclength ``s``, also where they are narrow."""
+    values = known(Values(expression), s, scene)[1]
+    return [float(np.nanmin(values)), float(np.nanmax(values))]
+
+
 def changes(expressions: list[Any], s: Symbol, scene: Scene, *, kinks: bool = False) -> Iterator[float]:
     """Arclengths inside the rod at which a comparison with the arclength changes, or what has ``kinks`` may have one.
 

@@ -20,6 +20,7 @@ from rodfem.errors import InputError, SceneError
 from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
+from rodfem.problem.jumps import extremes
 from rodfem.problem.kinds import check_scalar, real, reals
 from rodfem.problem.local_state import (
     STATES,
@@ -32,6 +33,7 @@ from rodfem.problem.local_state import (
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
 from rodfem.problem.symbols import check_expressions
+from rodfem.problem.values import Symbol
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -228,32 +230,32 @@ def trouble_with_inertia(scene: Scene, load: float | None) -> str:
     A rod under loads without a potential has an inertia.
     """
     masses, rotary = _inertia_at(scene, load)
-    at = "" if load is None else f" at {scene.load} = {load:g}"
+    there = "" if load is None else f" at {scene.load} = {load:g}"
     if min(masses + rotary) < 0:
         remedy = (
             "give zero or more" if load is None else f"give zero or more, or a range of {scene.load} in which it is"
         )
-        return f"A mass or rotary inertia of {min(masses + rotary):g}{at} is negative: {remedy}."
+        return f"A mass or rotary inertia of {min(masses + rotary):g}{there} is negative: {remedy}."
     beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
     if beyond:
-        return f"A mass or rotary inertia of {beyond[0]:g}{at} has powers that are no floats: use other units."
+        return f"A mass or rotary inertia of {beyond[0]:g}{there} has powers that are no floats: use other units."
     given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
     if scene.conservative or max(masses) > 0 or given:
         return ""
     return (
         f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter "
-        f"of motion, so give it an inertia{at}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+        f"of motion, so give it an inertia{there}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
     )
 
 
 def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
-    """Masses and rotary inertias of a scene at a ``load``, by default its own."""
+    """Masses and rotary inertias of a scene at a ``load``, by default its own: of the rod the extremes along it."""
     c = scene.constants(load)
     carried = [float(x.mass(c)) for x in scene.attachments if x.mass]
     turned = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    along = [scene.constants(load, s) for s in scene.samples()]
-    carried += [float(scene.inertia.rho_A(there)) for there in along]
-    turned += [float(x) for there in along for x in scene.inertia.rho_I(there)]
+    along = scene.constants(load, s := Symbol())
+    carried += extremes(scene.inertia.rho_A(along), s, scene)
+    turned += [x for of_axis in scene.inertia.rho_I(along) for x in extremes(of_axis, s, scene)]
     return carried, turned
 
 

@@ -12,6 +12,7 @@ from classics import SUPPORTS, column
 from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, StepControl, clamped, free, trace
 from rodfem.codim2.locus import locus
+from rodfem.continuation.convexity_between import lost_between
 from rodfem.errors import SceneError
 from rodfem.problem.local_state import Constants
 
@@ -72,6 +73,48 @@ def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
     (branch,) = trace(rod(narrow(lambda c: 1.0 - c.P, width)), MESH, Plan(depth=0, error_bars=False))
     assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
     assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.15
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
+def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
+    """What little stiffness there is left at one end of a step is no unit for that in the step."""
+    width = 1e-4
+    solver = Solver(rod(narrow(lambda c: 1.0 - c.P, width)), MESH).equilibria
+    low, high = 1.0 - width - beside * width, 1.1
+
+    def state(t: float) -> Any:
+        x = solver.start(0.0)
+        solver.system.set_load(x, low + t * (high - low))
+        return x
+
+    found = lost_between(solver.convexity, state, lambda t: False)
+    assert found.lost == pytest.approx((1.0 - width - low) / (high - low), abs=1e-9)
+
+
+@pytest.mark.parametrize("width", [pytest.param(1e-2, marks=pytest.mark.alone), 1e-3])
+def test_convexity_lost_between_the_places_of_the_quadrature(width: float) -> None:
+    """Twisting stiffness ``(s - 0.37)^2 + (P - 1)^2 - width^2``: negative within a width of 0.37, where P is near 1."""
+
+    def notch(v: Any, k: Any, c: Any) -> Any:
+        return bending_and_twist(k, (1.0, 2.0, (c.s - 0.37) ** 2 + (c.P - 1.0) ** 2 - width**2))
+
+    (branch,) = trace(rod(notch), MESH, Plan(depth=0, error_bars=False))
+    assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
+    with pytest.raises(SceneError, match=r"not convex somewhere along the state at P = 1\b"):
+        Solver(rod(notch), MESH).equilibrium(1.0)
+
+
+@pytest.mark.alone
+def test_a_step_and_a_kink_inside_an_element_are_convex() -> None:
+    """A parabola through a step has lower values than the step."""
+    for stiffness in (
+        lambda c: ufl.conditional(ufl.lt(c.s, 0.3), 1.0, 0.02),
+        lambda c: abs(c.s - 0.3) + 1e-4,
+    ):
+        scene = rod(lambda v, k, c: bending_and_twist(k, (1.0, 2.0, stiffness(c) * (1.0 + c.P))))  # noqa: B023
+        (branch,) = trace(scene, MESH, Plan(depth=0, error_bars=False))
+        assert branch.ended == "end of range"
 
 
 @pytest.mark.parametrize("width", [0.1, *(pytest.param(x, marks=pytest.mark.alone) for x in (0.01, 0.001))])
