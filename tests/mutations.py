@@ -294,6 +294,21 @@ FAULTS = {
         "if least > 0.0 or t < 1.0 or holds(t):",
         "tests/continuation/test_convexity.py",
     ),
+    "loci-take-steps-of-any-length": Fault(
+        "rodfem/codim2/curve.py",
+        "step = min(step, *(fast.room",
+        "step = min(step, step, *(10.0 + fast.room",
+        LOCI,
+    ),
+    "loci-say-nothing-of-what-is-too-fast": Fault(
+        "rodfem/codim2/locus.py",
+        'said = [tracer.doubt, reasons.sentence if reasons else ""]',
+        'said = [reasons.sentence if reasons else ""]',
+        LOCI,
+    ),
+    "loci-follow-polynomials-beyond-bends": Fault(
+        "rodfem/codim2/curve.py", "FAILURES = 2", "FAILURES = 200", "tests/codim2/test_locus.py"
+    ),
     "convexity-in-units-of-one-end": Fault(
         f"{CONTINUATION}convexity_between.py",
         "convexity.scales(state(0.0), state(1.0))",

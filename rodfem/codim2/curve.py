@@ -15,6 +15,7 @@ from rodfem.continuation.kinds import CROSSES, GAP
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
+from rodfem.problem.fast_load import FastLoad
 
 AHEAD = 1e-9
 """Arclength after which a curve that begins on a bound shows whether it leaves the plane."""
@@ -24,6 +25,8 @@ CLOSED = 0.1
 """Distance of the beginning of a closed curve from the cubic between two nodes that it is between, over theirs."""
 RESOLVED = 0.1 * GAP
 """Arclength of the steps by which a crossing of two curves is told from a turn before the other one."""
+FAILURES = 2
+"""Failures after each other from which a step follows the tangent of the last node alone."""
 TURNED = 0.7
 """Cosine of the angle by which a curve has turned that does not lead across another one."""
 
@@ -40,17 +43,25 @@ class Half:
 class Tracer:
     """Follows a curve from a node in the direction of its tangent."""
 
-    def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl) -> None:
-        """Steps are relative to the bounds of the plane."""
+    def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl, p: np.ndarray) -> None:
+        """Steps are relative to the bounds of the plane, and no longer than its functions allow on lines through p."""
         self.criterion, self.plane, self.steps = criterion, plane, steps
         self.points = Codim2Points(criterion, plane)
         scene = plane.system.scene
         varies = not scene.is_quadratic() or scene.energy_depends_on("s", *plane.names)
         self.convexity = Convexity(plane.system) if varies else None
+        values = dict(zip(plane.names, map(float, p), strict=True))
+        spans = [(float(low), float(high)) for low, high in plane.bounds]
+        self.fast = [FastLoad(scene, span, name, **values) for name, span in zip(plane.names, spans, strict=True)]
+
+    @property
+    def doubt(self) -> str:
+        """Sentences on functions that change too fast with a parameter to be followed; empty for none."""
+        return " ".join(filter(None, [fast.doubt for fast in self.fast]))
 
     def run(self, start: LocusPoint) -> Half:
         """Follow to an end."""
-        half, history, step = Half([start], ended=start.ended), [start], self.steps.first
+        half, history, step, failures = Half([start], ended=start.ended), [start], self.steps.first, 0
         if half.ended:
             return half
         ahead = start.p + AHEAD * start.dp
@@ -60,14 +71,16 @@ class Tracer:
             return half
         while len(history) < self.steps.most:
             last = history[-1]
+            step = min(step, *(fast.room(*at) for fast, *at in zip(self.fast, last.p, last.dp, strict=True)))
             try:
-                node, moved, bound = self._next(history, step)
+                # beyond a sharp bend the polynomial through the last nodes has another tangent than the curve
+                node, moved, bound = self._next(history if failures < FAILURES else history[-1:], step)
                 half.ended = node.ended or self._lost_convexity(last, node) or self._between(half, history, node)
             except Destroyed as trouble:
                 half.ended = str(trouble)
                 return half
             except ConvergenceError as trouble:
-                step /= 2
+                step, failures = step / 2, failures + 1
                 if step < self.steps.smallest:
                     half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
                     return half
@@ -83,8 +96,8 @@ class Tracer:
                 half.ended = "closed curve"
                 return half
             history.append(node)
-            order = min(len(history) - 1, 3) + 1
-            step = self.steps.after(step, moved, order)
+            order = min(len(history) - 1, 3) + 1 if failures < FAILURES else 2
+            step, failures = self.steps.after(step, moved, order), 0
         half.ended = f"{self.steps.most} points reached"
         return half
 

@@ -40,7 +40,7 @@ from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import NEGLIGIBLE, same_special
 
-STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
+STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
 BESIDE = 1e-3
 """Distance of a load beside a divergence load at which the unstable eigenvalues are counted, over the bounds."""
@@ -293,14 +293,15 @@ def locus(
                 f"The {special.kind} at {scene.load} = {p[0]:.8g} has no locus in {scene.load} and {parameter}: it is "
                 f"not found again there ({trouble}); use more elements."
             ) from trouble
-        tracer = Tracer(criterion, plane, steps)
+        tracer = Tracer(criterion, plane, steps, p)
         found = _both_sides(tracer, first)
         crossings = _crossings(tracer, found, first, float(p[1]))
         errors = errors_of(solver, special.kind, plane, found.nodes, found.marks, error_bars)
         lower = _lower_side(solver, plane, special, first)
         reasons = without_smoothness(solver, plane, found.nodes, errors.error)
     located = _locus(solver, special, (plane.names, bounds), found, crossings, errors, lower)
-    located.note = f"Locus of the {special.kind}: {reasons.sentence}" if reasons else ""
+    said = [tracer.doubt, reasons.sentence if reasons else ""]
+    located.note = " ".join(f"Locus of the {special.kind}: {words}" for words in said if words)
     return located
 
 

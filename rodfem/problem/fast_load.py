@@ -1,4 +1,4 @@
-"""How fast the functions of a scene change with the load: ranges of it in which a cubic tells each of them.
+"""How fast the functions of a scene change with a parameter: ranges of it in which a cubic tells each of them.
 
 Along a branch that does not move the steps are as long as the states allow, and pass whole periods of a force that is a
 sine of the load.  A range in which one of the functions is not the cubic through four of its values is halved; a step
@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
@@ -21,7 +21,7 @@ import ufl
 from rodfem.errors import SceneError
 from rodfem.problem.enclosure import refined
 from rodfem.problem.kinds import plain
-from rodfem.problem.local_state import OfConstants, functions_of_places, some_places, watched
+from rodfem.problem.local_state import Constants, OfConstants, functions_of_places, some_places, watched
 from rodfem.problem.roles import functions_of
 from rodfem.problem.values import Symbol, Values
 from rodfem.tolerances import ROUND_OFF, TINY
@@ -56,16 +56,19 @@ class FastLoad:
     not even on the smallest, and is empty where all are.
     """
 
-    def __init__(self, scene: Scene, span: tuple[float, float]) -> None:
-        """Sample the functions of a ``scene`` that depend on its load, over a ``span``."""
+    def __init__(self, scene: Scene, span: tuple[float, float], name: str = "", **values: float) -> None:
+        """Sample the functions of a ``scene`` that depend on its load, over a ``span``.
+
+        With a ``name`` that parameter takes its place.  Others have the ``values`` that are given.
+        """
         first, last = sorted(span)
-        self.doubt, ends = "", {first, last}
-        for what, function, expressions in _numbers(scene):
+        self.doubt, ends, name = "", {first, last}, name or scene.load
+        for what, function, expressions in _numbers(scene, name, values):
             seen = _seen(function, expressions, np.linspace(first, last, SEEN))
             worst = _halved(function, seen, ends)
             if worst and not self.doubt:
                 self.doubt = (
-                    f"The {what} changes too fast with {scene.load} about {scene.load} = {worst[0]:.6g} to be followed "
+                    f"The {what} changes too fast with {name} about {name} = {worst[0]:.6g} to be followed "
                     "in steps, or jumps there: special points may be missing; let the range end before it."
                 )
         loads = np.array(sorted(ends) if len(ends) > 2 else [])
@@ -73,11 +76,15 @@ class FastLoad:
 
     def reach(self, point: Point) -> float:
         """Largest step from a ``point`` of a branch, by the slope of the load there."""
-        rate = abs(point.slope)
+        return self.room(point.load, point.slope)
+
+    def room(self, load: float, slope: float) -> float:
+        """Largest step from a ``load`` that changes in steps by this ``slope``."""
+        rate = abs(slope)
         if not len(self.low) or not isfinite(rate) or rate == 0.0:
             return float("inf")
         # the same whichever way the branch goes: ranges are told by their distance and their length
-        away = np.maximum(0.0, np.maximum(self.low - point.load, point.load - self.high))
+        away = np.maximum(0.0, np.maximum(self.low - load, load - self.high))
         return float((away + self.high - self.low).min() / rate)
 
 
@@ -127,37 +134,40 @@ def _seen(function: Numbers, expressions: list[tuple[Values, Symbol]], loads: np
     return loads, np.array([function(load) for load in loads.tolist()])
 
 
-def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers, list[tuple[Values, Symbol]]]]:
-    """Functions that depend on the load: in words, as the numbers that each returns at a load, and as expressions."""
+def _numbers(
+    scene: Scene, name: str, values: dict[str, float]
+) -> Iterator[tuple[str, Numbers, list[tuple[Values, Symbol]]]]:
+    """Functions that depend on a parameter: in words, as the numbers that each returns, and as expressions of it."""
     point, rod = some_places(scene)
+    known = {**vars(scene.constants(s=point.s)), **values}
     found: list[tuple[str, OfConstants]] = [(what, f) for what, f, role in functions_of(scene) if role.call == "f(c)"]
     found += [(what, partial(f, x)) for what, f, x in functions_of_places(scene)]
     found.append(("stored energy", partial(scene.energy, rod.v, rod.k)))
     for what, function in found:
-        c, names = watched(scene.constants(s=point.s))
+        c, names = watched(Constants(**known))
         try:
             function(c)
         except SceneError:
             continue
-        if scene.load in names:
-            yield what, partial(_values, function, scene, point.s), _expressions(function, scene, point.s)
+        if name in names:
+            yield what, partial(_values, function, known, name), _expressions(function, known, name)
 
 
-def _expressions(function: OfConstants, scene: Scene, s: float) -> list[tuple[Values, Symbol]]:
-    """What a ``function`` returns at ``s`` as expressions of the load; none where it needs a number for that."""
-    load = Symbol()
+def _expressions(function: OfConstants, known: dict[str, Any], name: str) -> list[tuple[Values, Symbol]]:
+    """What a ``function`` returns as expressions of a parameter; none where it needs a number for that."""
+    symbol = Symbol()
     try:
-        values = function(scene.constants(load, s=s))
+        values = function(Constants(**{**known, name: symbol}))
         parts = values if isinstance(values, (tuple, list)) else [values]
-        return [(Values(ufl.as_ufl(0.0 if x is None else x)), load) for x in parts]
-    except Exception:  # of UFL's own, and of what compares the load in Python
+        return [(Values(ufl.as_ufl(0.0 if x is None else x)), symbol) for x in parts]
+    except Exception:  # of UFL's own, and of what compares the parameter in Python
         return []
 
 
-def _values(function: OfConstants, scene: Scene, s: float, load: float) -> list[float]:
-    """Numbers that a ``function`` of a scene's constants returns at a ``load`` and ``s``; nan for what it does not."""
+def _values(function: OfConstants, known: dict[str, Any], name: str, value: float) -> list[float]:
+    """Numbers that a ``function`` of constants returns for a ``value`` of one of them; nan for what it does not."""
     try:
-        values = function(scene.constants(load, s=s))
+        values = function(Constants(**{**known, name: value}))
     except SceneError:
         return [float("nan")]
     return [_number(x) for x in (values if isinstance(values, (tuple, list)) else [values])]

@@ -14,9 +14,11 @@ import classics
 import closed_form_hemitropic
 import numpy as np
 import pytest
+import ufl
 from closed_forms import double, flutter
 from demo_cases import explored as demo
 from demo_cases import scene as demo_scene
+from hard.two_freedoms import scene as two_freedoms
 from hemitropic_cases import explored, follower, specials
 from mpi4py import MPI
 from scipy.optimize import brentq
@@ -25,7 +27,7 @@ from shooting_solver import Problem, Rod
 from forms import loads
 from forms.energy import bending_and_twist
 from rodfem.app.run import run
-from rodfem.codim2.locus import Locus, locus
+from rodfem.codim2.locus import STEPS, Locus, locus
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
@@ -364,3 +366,14 @@ def test_what_is_zero_all_along_is_not_counted() -> None:
     load, k = np.array(found.values).T
     assert abs(load - pi**2 - k / pi**2).max() < 1e-9
     assert set(map(tuple, found.index.tolist())) == {(0, 1)}
+
+
+@pytest.mark.alone
+def test_a_locus_that_bends_sharply_is_followed() -> None:
+    """``P = 2 + sin(400 b)``: beyond a bend the polynomial through the last points has another tangent."""
+    potential = lambda u, f2, c: (2 + ufl.sin(400 * c.b) - c.P) * u * u / 2 + u**4 / 4 + f2 / 2  # noqa: E731
+    diagram = trace(two_freedoms(potential, (0.0, 4.0), b=0.1), Discretization("auto", 4, 3), Plan(error_bars=False))
+    special = diagram.special("branch point")[0]
+    found = locus(diagram.solvers[0], special, "b", ((0.0, 4.0), (0.0, 1.0)), replace(STEPS, most=40), error_bars=0)
+    assert found.ended == ("40 points reached", "40 points reached")
+    np.testing.assert_allclose(found.values[:, 0], 2 + np.sin(400 * found.values[:, 1]), atol=1e-8)

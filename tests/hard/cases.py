@@ -202,6 +202,12 @@ SWEEPS = (
 )  # fmt: skip
 TO_ITS_BAR = "every row within its uncertainty, and the curve ends, with a sentence, where its special point does"
 LOCI = (
+    Case(
+        "a peak of a locus between two steps", "on both sides the curve is a straight line, and steps are long",
+        "every row on the curve, to 1e-9, with its turning point; or a sentence that says what is not followed",
+        "P = 1 + exp(-t^2), t = (b - 0.5123)/d", "width d, in bounds of 1", loci.peak, (3e-3,),
+        (0.1, 1e-2, 3e-3, 1e-3, 1e-4, 1e-6),
+    ),
     *(
         Case(
             f"a gap between two loci of {kind}s", "a step leads across it to the other curve, which is a locus, too",
@@ -209,8 +215,8 @@ LOCI = (
             "P^2 = b^2 + d^2", "d, in bounds of 0.3", partial(loci.gap, kind), few, widths,
         )
         for kind, few, widths in (
-            ("branch point", (2e-2, 1e-4, 0.0), (0.1, 2e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 0.0)),
-            ("fold", (3e-3,), (0.05, 2e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)),
+            ("branch point", (2e-2, 1e-5, 0.0), (0.1, 2e-2, 3e-3, 1e-3, 1e-4, 1e-5, 3e-6, 1e-6, 0.0)),
+            ("fold", (3e-3, 1e-5), (0.05, 2e-2, 3e-3, 1e-3, 1e-4, 1e-5, 3e-6, 1e-6)),
         )
     ),
     *(

@@ -48,8 +48,10 @@ def skew_cusp(part: float) -> Measured:
     u = found.ordinate
     whole = [mark.kind for mark in found.marks] == ["turns in b", "cusp", "turns in P"]
     off = [abs(u[mark.row] - at) for mark, at in zip(found.marks, (-part, 0.0, part), strict=False)]
-    rows = abs(found.values - np.stack([3 * u * u - 2 * u**3 / part, 3 * u * u + 2 * u**3 / part], axis=1) / 2).max()
-    return Measured(max(rows, *off) if whole else inf, 1e-9, (), "" if whole else str(words(found)))
+    exact = np.stack([3 * u * u - 2 * u**3 / part, 3 * u * u + 2 * u**3 / part], axis=1) / 2
+    tangent = np.stack([3 * u - 3 * u * u / part, 3 * u + 3 * u * u / part], axis=1)
+    distance = abs(np.cross(found.values - exact, tangent)) / np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)
+    return Measured(max(distance.max(), *off) if whole else inf, 1e-9, (), "" if whole else str(words(found)))
 
 
 def two_cusps(half: float) -> Measured:

@@ -24,11 +24,17 @@ def test_a_hard_locus(case: Case, value: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", ["branch point", "fold"])
-@pytest.mark.parametrize("width", [1e-5, 1e-6])
+@pytest.mark.parametrize("width", [1e-6, 1e-7])
 def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
     """Narrower than the least step: the curve ends before it, or a crossing is said to be one or such a gap."""
     found = loci.gap(kind, width)
     assert not found.right and any("no convergence" in said or f"within {GAP:g}" in said for said in found.said)
+
+
+@pytest.mark.parametrize("width", [1e-4, 1e-6])
+def test_a_peak_that_is_not_followed_is_said(width: float) -> None:
+    found = loci.peak(width)
+    assert not found.right and any("changes too fast with b about b = 0.512" in said for said in found.said)
 
 
 def test_a_locus_of_a_point_that_the_mesh_does_not_resolve_says_so() -> None:
