@@ -44,7 +44,11 @@ class Tracer:
     """Follows a curve from a node in the direction of its tangent."""
 
     def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl, p: np.ndarray) -> None:
-        """Steps are relative to the bounds of the plane, and no longer than its functions allow on lines through p."""
+        """Follow a ``criterion`` in a ``plane``.
+
+        ``steps`` are relative to its bounds, and no longer than the functions of the scene allow on the two lines
+        through ``p`` (2,).
+        """
         self.criterion, self.plane, self.steps = criterion, plane, steps
         self.points = Codim2Points(criterion, plane)
         scene = plane.system.scene
