@@ -294,6 +294,12 @@ FAULTS = {
         "if least > 0.0 or t < 1.0 or holds(t):",
         "tests/continuation/test_convexity.py",
     ),
+    "functions-of-the-load-at-one-place": Fault(
+        "rodfem/problem/fast_load.py",
+        "for s in (None, *scene.samples()):",
+        "for s in (None,):",
+        "tests/diagram/test_fast_load.py",
+    ),
     "loci-take-steps-of-any-length": Fault(
         "rodfem/codim2/curve.py",
         "step = min(step, *(fast.room",

@@ -21,7 +21,7 @@ import ufl
 from rodfem.errors import SceneError
 from rodfem.problem.enclosure import refined
 from rodfem.problem.kinds import plain
-from rodfem.problem.local_state import Constants, OfConstants, functions_of_places, some_places, watched
+from rodfem.problem.local_state import Constants, OfConstants, some_places, watched
 from rodfem.problem.roles import functions_of
 from rodfem.problem.values import Symbol, Values
 from rodfem.tolerances import ROUND_OFF, TINY
@@ -138,19 +138,24 @@ def _numbers(
     scene: Scene, name: str, values: dict[str, float]
 ) -> Iterator[tuple[str, Numbers, list[tuple[Values, Symbol]]]]:
     """Functions that depend on a parameter: in words, as the numbers that each returns, and as expressions of it."""
-    point, rod = some_places(scene)
-    known = {**vars(scene.constants(s=point.s)), **values}
-    found: list[tuple[str, OfConstants]] = [(what, f) for what, f, role in functions_of(scene) if role.call == "f(c)"]
-    found += [(what, partial(f, x)) for what, f, x in functions_of_places(scene)]
-    found.append(("stored energy", partial(scene.energy, rod.v, rod.k)))
-    for what, function in found:
-        c, names = watched(Constants(**known))
-        try:
-            function(c)
-        except SceneError:
-            continue
-        if name in names:
-            yield what, partial(_values, function, known, name), _expressions(function, known, name)
+    for s in (None, *scene.samples()):  # along the rod its functions may be others
+        point, rod = some_places(scene, s=s)
+        known = {**vars(scene.constants(s=point.s)), **values}
+        found: list[tuple[str, OfConstants, bool]] = [("stored energy", partial(scene.energy, rod.v, rod.k), False)]
+        for what, function, role in functions_of(scene):
+            if s is None or role.along:
+                if role.call == "f(c)":
+                    found.append((what, function, False))
+                elif role.call == "f(x, c)":
+                    found.append((what, partial(function, rod if role.along else point), True))
+        for what, function, placed in found:  # one of a place may know the arclength by that
+            c, names = watched(Constants(**known))
+            try:
+                function(c)
+            except SceneError:
+                continue
+            if name in names and (s is None or placed or "s" in names):
+                yield what, partial(_values, function, known, name), _expressions(function, known, name)
 
 
 def _expressions(function: OfConstants, known: dict[str, Any], name: str) -> list[tuple[Values, Symbol]]:

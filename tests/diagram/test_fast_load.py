@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from math import asin, pi
+from dataclasses import replace
+from math import asin, log, pi, sqrt, tan
+from typing import Any
 
 import classics
 import numpy as np
 import pytest
 import ufl
+from scipy.optimize import brentq
 
 import rodfem
 from forms.energy import bending_and_twist
@@ -52,6 +55,25 @@ def test_ordinary_functions_bound_no_step() -> None:
         fast = FastLoad(column(lambda c, n=power: (1e-13, 2e-4, -(c.P**n))), (0.0, 4.0))
         assert not fast.doubt
         assert not len(fast.low)
+
+
+def test_a_notch_of_one_piece() -> None:
+    """At ``P = 0.5123`` four fifths of the column soften, ahead of its free end: 80 % of Euler's load is too much.
+
+    Its critical stiffness ``B`` solves ``tan(a k) tan((1 - a) l) = l/k``, ``k^2 = T``, ``l^2 = T/B``, ``a = 0.2``.
+    """
+    thrust, width = 0.2 * pi**2, 1e-3
+
+    def stiffness(c: Any) -> Any:
+        return ufl.conditional(ufl.lt(c.s, 0.2), 1.0, 1 - 0.9 * ufl.exp(-(((c.P - 0.5123) / width) ** 2)))
+
+    rod = column(lambda c: (0.0, 0.0, -thrust))
+    rod = replace(rod, energy=lambda v, k, c: bending_and_twist(k, (stiffness(c), 9.0, 1.0)), breaks=(0.2,))
+    k = sqrt(thrust)
+    B = brentq(lambda B: tan(0.2 * k) * tan(0.8 * k / sqrt(B)) - 1 / sqrt(B), 0.6, 1.0, xtol=1e-14)
+    off = width * sqrt(-log((1 - B) / 0.9))
+    loads = [s.point.load for s in rodfem.trace(rod, None, Plan(depth=0)).special("branch point")]
+    np.testing.assert_allclose(loads, [0.5123 - off, 0.5123 + off], rtol=0, atol=1e-9)
 
 
 @pytest.mark.alone
