@@ -300,6 +300,12 @@ FAULTS = {
         "for s in (None,):",
         "tests/diagram/test_fast_load.py",
     ),
+    "functions-of-both-parameters-are-not-looked-at": Fault(
+        "rodfem/problem/fast_plane.py",
+        "self.functions = list(numbers_of(scene, names))",
+        "self.functions = list[tuple[str, Numbers]]()",
+        LOCI,
+    ),
     "loci-take-steps-of-any-length": Fault(
         "rodfem/codim2/curve.py",
         "step = min(step, *(fast.room",
@@ -524,8 +530,8 @@ FAULTS = {
     ),
     "peaks-of-the-load-are-looked-for-in-few-places": Fault(
         "rodfem/problem/fast_load.py",
-        "loads = refined(values.expression, load, loads, max(size, TINY))",
-        "loads = loads[::125]",
+        "places = refined(expression.expression, symbol, places, max(size, TINY))",
+        "places = places[::125]",
         "tests/diagram/test_load_steps.py",
     ),
     "sweeps-leave-their-path": Fault(

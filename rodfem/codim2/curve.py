@@ -16,6 +16,7 @@ from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.problem.fast_load import FastLoad
+from rodfem.problem.fast_plane import FastPlane
 
 AHEAD = 1e-9
 """Arclength after which a curve that begins on a bound shows whether it leaves the plane."""
@@ -57,6 +58,7 @@ class Tracer:
         values = dict(zip(plane.names, map(float, p), strict=True))
         spans = [(float(low), float(high)) for low, high in plane.bounds]
         self.fast = [FastLoad(scene, span, name, **values) for name, span in zip(plane.names, spans, strict=True)]
+        self.oblique = FastPlane(scene, plane.names)
 
     @property
     def doubt(self) -> str:
@@ -152,6 +154,8 @@ class Tracer:
         """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""
         last = history[-1]
         p, x, dp, dx = predict(history, last.s + step)
+        if what := self.oblique.unfollowed(last.p, p):
+            raise ConvergenceError(f"the {what} changes too fast with both parameters, or jumps")
         over = self.plane.outside(p)
         if over is None:
             node = self._after(last, self.criterion.correct(p, x, (dp, dx), last, 0.5 * step))

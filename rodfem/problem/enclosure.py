@@ -49,7 +49,9 @@ class Answer(NamedTuple):
     possibly: np.ndarray
 
 
-def refined(expression: Any, s: Symbol, places: np.ndarray, size: float) -> np.ndarray:
+def refined(
+    expression: Any, s: Symbol, places: np.ndarray, size: float, others: dict[Symbol, tuple[float, float]] | None = None
+) -> np.ndarray:
     """Places, with those that a scalar ``expression`` needs besides to be known between them, in ascending order.
 
     Parameters
@@ -60,6 +62,8 @@ def refined(expression: Any, s: Symbol, places: np.ndarray, size: float) -> np.n
         Arclengths from one end of the rod to the other, of shape (n,).
     size
         Largest value of the expression at them.
+    others
+        Symbols besides that are linear in ``s``, each with its value at zero and its slope.
     """
     nodes = list(unique_post_traversal(scalar(expression)))
     a, b = float(places[0]), float(places[-1])
@@ -67,7 +71,7 @@ def refined(expression: Any, s: Symbol, places: np.ndarray, size: float) -> np.n
     low, high, found, number_of = ends[:-1], ends[1:], [places], 0
     while len(low) and number_of < MOST:
         try:
-            slope = _jet(nodes, s, Interval(low, high)).slope
+            slope = _jet(nodes, {s: (0.0, 1.0), **(others or {})}, Interval(low, high)).slope
         except NotImplementedError:  # a function without bounds, as those of Bessel
             return places
         length = high - low
@@ -81,9 +85,11 @@ def refined(expression: Any, s: Symbol, places: np.ndarray, size: float) -> np.n
     return np.unique(np.concatenate(found))
 
 
-def _jet(nodes: list[Any], s: Symbol, pieces: Interval) -> Jet:
-    """Bounds of the last of some ``nodes`` on pieces of the rod."""
-    known: dict[Any, Any] = {s: Jet(pieces, ONE)}
+def _jet(nodes: list[Any], symbols: dict[Symbol, tuple[float, float]], pieces: Interval) -> Jet:
+    """Bounds of the last of some ``nodes`` on pieces of the rod, by values and slopes of ``symbols`` as of zero."""
+    known: dict[Any, Any] = {
+        symbol: Jet(number(a) + number(slope) * pieces, number(slope)) for symbol, (a, slope) in symbols.items()
+    }
     with np.errstate(all="ignore"):
         for node in nodes:
             if node not in known:

@@ -44,9 +44,8 @@ PIECES = 4
 """Ranges to begin with where a function is no cubic."""
 DEEPEST = 10
 """How many times each of them is halved: beyond that it is said that a function is not followed."""
-Numbers = Callable[[float], list[float]]
-Seen = tuple[np.ndarray, np.ndarray]
-"""Loads in ascending order, (n,), and the values of a function there, (n, m)."""
+Function = Callable[[np.ndarray], np.ndarray]
+"""Components (n, m) for arguments (n,)."""
 
 
 class FastLoad:
@@ -63,9 +62,8 @@ class FastLoad:
         """
         first, last = sorted(span)
         self.doubt, ends, name = "", {first, last}, name or scene.load
-        for what, function, expressions in _numbers(scene, name, values):
-            seen = _seen(function, expressions, np.linspace(first, last, SEEN))
-            worst = _halved(function, seen, ends)
+        for what, numbers in numbers_of(scene, (name,), **values):
+            worst = _halved(lambda t, f=numbers: f(t[:, None]), _places(numbers, first, last), ends)  # type: ignore[misc]
             if worst and not self.doubt:
                 self.doubt = (
                     f"The {what} changes too fast with {name} about {name} = {worst[0]:.6g} to be followed "
@@ -88,56 +86,45 @@ class FastLoad:
         return float((away + self.high - self.low).min() / rate)
 
 
-def _halved(function: Numbers, seen: Seen, ends: set[float]) -> list[float]:
-    """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not."""
-    first, last = float(seen[0][0]), float(seen[0][-1])
-    size, off = _told(function, first, last, seen)
-    if not np.any(off > POLYNOMIAL * size):  # nor where it is not defined, nan
-        return []
-    edges = np.linspace(first, last, PIECES + 1).tolist()
-    size = np.maximum(size, np.ptp([function(load) for load in edges], axis=0))
-    todo = [(low, high, 0) for low, high in pairwise(edges)]
-    left = []
-    ends |= set(edges)
-    while todo:
-        low, high, depth = todo.pop()
-        _, off = _told(function, low, high, seen)
-        if not np.any(off > CLOSE * size):
-            continue
-        if depth == DEEPEST:
-            left.append((low + high) / 2)
-        else:
-            middle = (low + high) / 2
-            ends.add(middle)
-            todo += [(low, middle, depth + 1), (middle, high, depth + 1)]
-    return sorted(left)
+class Numbers:
+    """Numbers that a ``function`` of a scene's constants returns for values of some parameters."""
+
+    def __init__(self, function: OfConstants, known: dict[str, Any], names: tuple[str, ...]) -> None:
+        """Call it with symbols for the parameters with these ``names``, and else with the ``known`` values.
+
+        There are no ``expressions`` where it needs numbers, as one that compares a parameter in Python does.
+        """
+        self.function, self.known, self.names = function, known, names
+        self.symbols = [Symbol() for _ in names]
+        try:
+            values = function(Constants(**{**known, **dict(zip(names, self.symbols, strict=True))}))
+            parts = values if isinstance(values, (tuple, list)) else [values]
+            self.expressions = [Values(ufl.as_ufl(0.0 if x is None else x)) for x in parts]
+        except Exception:  # of UFL's own, too
+            self.expressions = []
+
+    def __call__(self, places: np.ndarray) -> np.ndarray:
+        """Numbers (n, m) for ``places`` (n, number of parameters); nan for what is not defined."""
+        if self.expressions:
+            at = dict(zip(self.symbols, places.T, strict=True))
+            return np.stack([values(at) for values in self.expressions], axis=1)
+        rows = [self._at(place) for place in places.tolist()]
+        wide = max(map(len, rows), default=1)
+        return np.array([row if len(row) == wide else [float("nan")] * wide for row in rows])
+
+    def _at(self, place: list[float]) -> list[float]:
+        try:
+            values = self.function(Constants(**{**self.known, **dict(zip(self.names, place, strict=True))}))
+        except SceneError:
+            return [float("nan")]
+        return [_number(x) for x in (values if isinstance(values, (tuple, list)) else [values])]
 
 
-def _told(function: Numbers, low: float, high: float, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
-    """How much a ``function`` varies between two loads, and how far from a cubic, beyond round-off, by component."""
-    known, asked = (np.array([function(low + t * (high - low)) for t in places]) for places in (KNOWN, ASKED))
-    inside = slice(*np.searchsorted(seen[0], [low, high], side="right"))
-    there, asked = np.append(ASKED, (seen[0][inside] - low) / (high - low)), np.vstack([asked, seen[1][inside]])
-    cubic = np.vander(there, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
-    values, off = np.vstack([known, asked]), abs(cubic - asked).max(axis=0)
-    return np.ptp(values, axis=0), np.maximum(off - ROUND_OFF * abs(values).max(axis=0), 0.0)
+def numbers_of(scene: Scene, names: tuple[str, ...], **values: float) -> Iterator[tuple[str, Numbers]]:
+    """Functions that depend on all parameters with these ``names``, in words, and their numbers.
 
-
-def _seen(function: Numbers, expressions: list[tuple[Values, Symbol]], loads: np.ndarray) -> Seen:
-    """A ``function`` at the ``loads``, and where its ``expressions``, if any, have to be looked at besides."""
-    for values, load in expressions:
-        known = values({load: loads})
-        size = float(abs(known[np.isfinite(known)]).max(initial=0.0))
-        loads = refined(values.expression, load, loads, max(size, TINY))
-    if expressions:
-        return loads, np.stack([values({load: loads}) for values, load in expressions], axis=1)
-    return loads, np.array([function(load) for load in loads.tolist()])
-
-
-def _numbers(
-    scene: Scene, name: str, values: dict[str, float]
-) -> Iterator[tuple[str, Numbers, list[tuple[Values, Symbol]]]]:
-    """Functions that depend on a parameter: in words, as the numbers that each returns, and as expressions of it."""
+    Other parameters have the ``values`` that are given.
+    """
     for s in (None, *scene.samples()):  # along the rod its functions may be others
         point, rod = some_places(scene, s=s)
         known = {**vars(scene.constants(s=point.s)), **values}
@@ -149,33 +136,72 @@ def _numbers(
                 elif role.call == "f(x, c)":
                     found.append((what, partial(function, rod if role.along else point), True))
         for what, function, placed in found:  # one of a place may know the arclength by that
-            c, names = watched(Constants(**known))
+            c, asked = watched(Constants(**known))
             try:
                 function(c)
             except SceneError:
                 continue
-            if name in names and (s is None or placed or "s" in names):
-                yield what, partial(_values, function, known, name), _expressions(function, known, name)
+            if asked.issuperset(names) and (s is None or placed or "s" in asked):
+                yield what, Numbers(function, known, names)
 
 
-def _expressions(function: OfConstants, known: dict[str, Any], name: str) -> list[tuple[Values, Symbol]]:
-    """What a ``function`` returns as expressions of a parameter; none where it needs a number for that."""
-    symbol = Symbol()
-    try:
-        values = function(Constants(**{**known, name: symbol}))
-        parts = values if isinstance(values, (tuple, list)) else [values]
-        return [(Values(ufl.as_ufl(0.0 if x is None else x)), symbol) for x in parts]
-    except Exception:  # of UFL's own, and of what compares the parameter in Python
+def _halved(function: Function, seen: np.ndarray, ends: set[float]) -> list[float]:
+    """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not.
+
+    It is looked at where it has been ``seen``, in ascending order, from one end to the other.
+    """
+    first, last = float(seen[0]), float(seen[-1])
+    off, size = told(function, first, last, seen)
+    if not np.any(off > POLYNOMIAL * size):  # nor where it is not defined, nan
         return []
+    edges = np.linspace(first, last, PIECES + 1)
+    size = np.maximum(size, np.ptp(function(edges), axis=0))
+    todo = [(low, high, 0) for low, high in pairwise(edges.tolist())]
+    left = []
+    ends |= set(edges.tolist())
+    while todo:
+        low, high, depth = todo.pop()
+        off, _ = told(function, low, high, seen)
+        if not np.any(off > CLOSE * size):
+            continue
+        if depth == DEEPEST:
+            left.append((low + high) / 2)
+        else:
+            middle = (low + high) / 2
+            ends.add(middle)
+            todo += [(low, middle, depth + 1), (middle, high, depth + 1)]
+    return sorted(left)
 
 
-def _values(function: OfConstants, known: dict[str, Any], name: str, value: float) -> list[float]:
-    """Numbers that a ``function`` of constants returns for a ``value`` of one of them; nan for what it does not."""
-    try:
-        values = function(Constants(**{**known, name: value}))
-    except SceneError:
-        return [float("nan")]
-    return [_number(x) for x in (values if isinstance(values, (tuple, list)) else [values])]
+def told(function: Function, low: float, high: float, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far a function is from a cubic, beyond round-off, and how much it varies, by component.
+
+    Parameters
+    ----------
+    function
+        Returns the components (n, m) for arguments (n,).
+    low, high
+        The ends of the range in which it is looked at.
+    seen
+        Arguments, in ascending order, at which it is compared with the cubic besides.
+    """
+    inside = seen[slice(*np.searchsorted(seen, [low, high], side="right"))]
+    known = function(low + KNOWN * (high - low))
+    asked = function(np.concatenate([low + ASKED * (high - low), inside]))
+    there = np.append(ASKED, (inside - low) / (high - low))
+    cubic = np.vander(there, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
+    values, off = np.vstack([known, asked]), abs(cubic - asked).max(axis=0)
+    return np.maximum(off - ROUND_OFF * abs(values).max(axis=0), 0.0), np.ptp(values, axis=0)
+
+
+def _places(numbers: Numbers, first: float, last: float) -> np.ndarray:
+    """Values of one parameter at which numbers have to be looked at."""
+    places = np.linspace(first, last, SEEN)
+    for expression in numbers.expressions:
+        (symbol,), values = numbers.symbols, expression({numbers.symbols[0]: places})
+        size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
+        places = refined(expression.expression, symbol, places, max(size, TINY))
+    return places
 
 
 def _number(value: object) -> float:

@@ -208,6 +208,12 @@ LOCI = (
         "P = 1 + exp(-t^2), t = (b - 0.5123)/d", "width d, in bounds of 1", loci.peak, (3e-3,),
         (0.1, 1e-2, 3e-3, 1e-3, 1e-4, 1e-6),
     ),
+    Case(
+        "a ridge across the plane", "on the lines of either parameter through the start it is elsewhere",
+        "every row on the curve, to 1e-9, with its turning points; or a sentence that says what is not followed",
+        "P = 1 + b + exp(-t^2)/2, t = (P - 3 b)/d", "width d, in bounds of 1", loci.ridge, (2e-2,),
+        (0.1, 2e-2, 5e-3, 2e-3, 1e-4),
+    ),
     *(
         Case(
             f"a gap between two loci of {kind}s", "a step leads across it to the other curve, which is a locus, too",

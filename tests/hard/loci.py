@@ -68,6 +68,25 @@ def peak(width: float) -> Measured:
     return Measured(off if turns else inf, 1e-9, (*words(found), *filter(None, [found.note])))
 
 
+def ridge(width: float) -> Measured:
+    """Branch points on ``P = 1 + b``, but for a ridge ``exp(-t^2)/2``, ``t = (P - 3 b)/width``: up, back, and up again.
+
+    On lines ``P = 1.1`` and ``b = 0.1`` through the start it is elsewhere.
+    """
+
+    def exact(P: Any, b: Any, exp: Callable[[Any], Any]) -> Any:
+        return 1 + b + exp(-(((P - 3 * b) / width) ** 2)) / 2 - P
+
+    potential = lambda u, f2, c: exact(c.P, c.b, ufl.exp) * u * u / 2 + u**4 / 4 + f2 / 2  # noqa: E731
+    diagram = run(two_freedoms(potential, (1.0, 1.2), b=0.1), UNIFORM, error_bars=False)
+    found = diagram.locus(diagram.special("branch point")[0], "b", (0.0, 1.0), (0.0, 4.0))
+    P, b = found.values.T
+    slope = 2 * (P - 3 * b) / width**2 * (exact(P, b, np.exp) + P - 1 - b)
+    distance = abs(exact(P, b, np.exp)) / np.hypot(1 + slope, 1 + 3 * slope)
+    whole = [mark.kind for mark in found.marks] == ["turns in P", "turns in b", "turns in b", "turns in P"]
+    return Measured(float(distance.max()) if whole else inf, 1e-9, (*words(found), *filter(None, [found.note])))
+
+
 def gap(kind: str, width: float) -> Measured:
     """``P^2 = b^2 + width^2``: two curves of branch points, or folds, that nearly cross; one of them is followed."""
     potential: Callable[[Any, Any, Any], Any] = {

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from hard import loci, loci_codim2
-from hard.case import Case
+from hard.case import Case, Measured
 from hard.cases import CASES
 from hard.test_hard_cases import APART
 
@@ -31,10 +32,17 @@ def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
     assert not found.right and any("no convergence" in said or f"within {GAP:g}" in said for said in found.said)
 
 
-@pytest.mark.parametrize("width", [1e-4, 1e-6])
-def test_a_peak_that_is_not_followed_is_said(width: float) -> None:
-    found = loci.peak(width)
-    assert not found.right and any("changes too fast with b about b = 0.512" in said for said in found.said)
+@pytest.mark.parametrize(
+    ("measure", "width", "words"),
+    [
+        (loci.peak, 1e-4, "changes too fast with b about b = 0.512"),
+        (loci.peak, 1e-6, "changes too fast with b about b = 0.512"),
+        (loci.ridge, 5e-3, "no convergence with steps of 1e-06"),
+    ],
+)
+def test_a_peak_that_is_not_followed_is_said(measure: Callable[[float], Measured], width: float, words: str) -> None:
+    found = measure(width)
+    assert not found.right and any(words in said for said in found.said)
 
 
 def test_a_locus_of_a_point_that_the_mesh_does_not_resolve_says_so() -> None:
