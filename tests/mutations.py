@@ -318,6 +318,9 @@ FAULTS = {
         'said = [reasons.sentence if reasons else ""]',
         LOCI,
     ),
+    "branches-follow-polynomials-beyond-bends": Fault(
+        f"{CONTINUATION}follow.py", "FAILURES = 2", "FAILURES = 200", "tests/hard/test_hard_cases.py"
+    ),
     "loci-follow-polynomials-beyond-bends": Fault(
         "rodfem/codim2/curve.py", "FAILURES = 2", "FAILURES = 200", "tests/codim2/test_locus.py"
     ),

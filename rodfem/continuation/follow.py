@@ -20,6 +20,8 @@ from rodfem.tolerances import SAME_LOAD
 
 ALIGNED = 0.9
 """Least cosine between the direction of a prediction and the tangent at the corrected point."""
+FAILURES = 2
+"""Failures after each other from which a step follows the tangent of the last point alone."""
 PILE = 64
 """Points of a branch after which the vectors that are not used any more are destroyed."""
 ON_BOUND = 1e-8
@@ -45,14 +47,15 @@ def follow(
     span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
     solver.corrector.restart()
-    missed = ""
+    missed, failures = "", 0
     while len(points) < steps.most:
         last = points[-1]
         if len(points) % PILE == 0:
             compat.destroy_garbage(system.comm)
         most = min(reach(last), steps.largest)
         step = min(step, most)
-        known = points
+        # beyond a sharp bend the polynomial through the last points has another tangent than the branch
+        known = points if failures < FAILURES or last.tangent is None else [last]
         if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
             known = [replace(last, tangent=solver.tangent(solver.row(last.tangent), at=last.x))]
         made = solver.step(known, last.arclength + step, (low, high), 0.5 * step)
@@ -72,10 +75,10 @@ def follow(
             point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energies)
             if steps.accepts(last, point):
                 yield point
-                order = 2 if system.damping else min(len(points) - 1, 3) + 1
-                step, missed = steps.after(step, made.outcome.moved, order), ""
+                order = 2 if len(known) == 1 else min(len(points) - 1, 3) + 1
+                step, missed, failures = steps.after(step, made.outcome.moved, order), "", 0
                 continue
-        step /= 2
+        step, failures = step / 2, failures + 1
         if step < min(steps.smallest, 0.01 * most):
             why = f"steps below {steps.smallest:g}"
             if last.zero > (drifts := system.active_drifts(last.x)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import erf, inf, log, pi
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,20 @@ def folds(apart: float) -> Measured:
     model = scene(lambda u, f2, c: 0.25 * u**4 - 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-0.1, 0.1), a=a)
     diagram = run(model, MESH)
     return compare(singular(diagram[0]), [Change(apart / 2, 0, 1), Change(-apart / 2, 1, 0)], said(diagram))
+
+
+def dent(width: float) -> Measured:
+    """A spring of stiffness ``1 - 2 exp(-t^2)``, ``t = (u - 0.5123)/width``: folds at ``t = -+log(2)^(1/2)``."""
+
+    def potential(u: Any, f2: Any, c: Any) -> Any:
+        t = (u - 0.5123) / width
+        return u * u / 2 - width**2 * (pi**0.5 * t * ufl.erf(t) + ufl.exp(-t * t)) + f2 / 2 - c.P * u
+
+    at = log(2) ** 0.5
+    load = width * (pi**0.5 * erf(at) - at)
+    diagram = run(scene(potential, (0.0, 1.0)), MESH)
+    expected = [Change(0.5123 + load, 0, 1), Change(0.5123 - load, 1, 0)]
+    return compare(singular(diagram[0]), expected, said(diagram))
 
 
 def cusp(a: float) -> Measured:
