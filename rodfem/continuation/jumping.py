@@ -68,27 +68,32 @@ def suspected(solver: BranchSolver, rows: Sequence[Point]) -> bool:
     return off / _length(known[-1], b) > GROWN * before
 
 
-def joined(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] = ()) -> bool:
-    """Whether equilibria join two rows ``a``, ``b`` that have tangents on the mesh of ``solver``.
+def halvings(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] = ()) -> int | None:
+    """How many times the piece between two rows is halved until equilibria join them; None where none do.
 
-    Halves whose defects do not vanish are halved again.  On one branch a defect decreases faster than its piece; that
-    of a jump stays.  One in proportion to its piece is that of a tangent along a symmetry, by which states do not move.
-    ``rates`` are defects over lengths of the pieces that this is a half of.
+    The rows ``a``, ``b`` have tangents on the mesh of ``solver``.  Halves whose defects do not vanish are halved again.
+    On one branch a defect decreases faster than its piece; that of a jump stays.  One in proportion to its piece is
+    that of a tangent along a symmetry, by which states do not move.  ``rates`` are defects over lengths of the pieces
+    that this is a half of.
     """
     middle = between(solver, a, b) if len(rates) < HALVINGS else None
     if middle is None:
-        return False
+        return None
     rows = (a, middle, b)
     off = defect(solver.system, rows, a, b)
     rates = (*rates, off / _length(a, b))
     recent = rates[-STEADY:]
     if off <= NEAR or (len(recent) == STEADY and max(recent) < PROPORTIONAL * min(recent)):
-        return True
+        return 1
     if rates[-1] > APART:
-        return False
-    return all(
-        defect(solver.system, rows, p, q) <= NEAR or joined(solver, p, q, rates) for p, q in ((a, middle), (middle, b))
-    )
+        return None
+    most = 0
+    for p, q in ((a, middle), (middle, b)):
+        more = 0 if defect(solver.system, rows, p, q) <= NEAR else halvings(solver, p, q, rates)
+        if more is None:
+            return None
+        most = max(most, more)
+    return 1 + most
 
 
 def _length(a: Point, b: Point) -> float:

@@ -12,7 +12,7 @@ from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.index_chain import Row, chained
-from rodfem.continuation.jumping import joined, suspected
+from rodfem.continuation.jumping import halvings, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.special_points import COUPLED, Taut, find_special, same_point
@@ -22,6 +22,8 @@ from rodfem.continuation.work import EnergyBalance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import clear_of_zero, resolve
 
+BENT, NARROWEST = 2, 6
+"""How many times a step that bends may be halved until it is one, and how many times steps are, at most, where not."""
 HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
 SHORTER = 2
@@ -123,7 +125,14 @@ class SpecialSearch:
         if len(rows) < 2 or self.solver.system.damping or any(p.tangent is None for p in rows):
             return
         a, b = rows[-2:]
-        if not suspected(self.solver, rows) or joined(self.solver, a, b):
+        divided = halvings(self.solver, a, b) if suspected(self.solver, rows) else 0
+        if divided is not None:
+            if divided > BENT:  # in a bend so narrow there may be pairs of special points
+                self._shorten(a, b, 2 ** min(divided, NARROWEST))
+                self.observer.warn(
+                    f"Between loads {a.load:.8g} and {b.load:.8g} the branch bends within a small part of a step: "
+                    f"special points may be missing there; {SMALLER_STEPS}."
+                )
             self._check_work(rows)
             return
         self._shorten(a, b)
@@ -256,13 +265,13 @@ class SpecialSearch:
                     raise gap
                 return
 
-    def _shorten(self, a: Point, b: Point) -> None:
+    def _shorten(self, a: Point, b: Point, parts: int = 8) -> None:
         """Shorten steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
         until, _, tries = self._short
         tries = tries + 1 if a.arclength < until else 1
         if tries <= SHORTER:
             length = b.arclength - a.arclength
-            self._short = b.arclength + length, length / 8, tries
+            self._short = b.arclength + length, length / parts, tries
             raise Unresolved
 
     def _examined(self, specials: list[SpecialPoint], ended: bool = False) -> list[SpecialPoint]:
