@@ -26,6 +26,7 @@ from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load
+from rodfem.diagram.hidden_changes import HiddenChanges
 from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.load_steps import LoadSteps
 from rodfem.diagram.missed_loads import missed_loads
@@ -94,6 +95,7 @@ class Sweep:
         branch.renumber()
         warn, kinks = self.observer.warn, Kinks([self.solver], self.observer, self._load)
         kinks.index(branch)
+        HiddenChanges([self.solver], self.observer, self._load).examine(branch)
         if self.plan.error_bars:
             self._error_bars(branch)
             kinks.error_bars(branch)

@@ -31,6 +31,7 @@ from rodfem.diagram.branch_ends import (
 )
 from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.finders import FINDERS
+from rodfem.diagram.hidden_changes import HiddenChanges
 from rodfem.diagram.images import image_of
 from rodfem.diagram.journal import Journal
 from rodfem.diagram.kinks import Kinks
@@ -85,6 +86,7 @@ class Tracer:
         self.invariants: dict[int, Invariants] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         self.kinks = Kinks(self.meshes.solvers, observer, self.scene.load)
+        self.hidden = HiddenChanges(self.meshes.solvers, observer, self.scene.load)
         said = observer if isinstance(observer, Recorder) else None
         self.book = Bookkeeper(journal or Journal(), self.meshes, self.gaps, self.branches, plan.events, said)
 
@@ -417,6 +419,7 @@ class Tracer:
             merge_doubles(branch)
         self._soft_modes(branch)
         self.kinks.index(branch)
+        self.hidden.examine(branch)
         branch.image = image_of(branch, self.solver)
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))

@@ -20,7 +20,7 @@ from ufl import classes
 from ufl.corealg.traversal import unique_post_traversal
 
 from rodfem.problem.intervals import Interval, chosen, hull, number
-from rodfem.problem.values import OTHER_NAMES, Symbol, scalar
+from rodfem.problem.values import OTHER_NAMES, Symbol, Values, scalar
 
 PIECES = 256
 """Pieces of the rod to begin with, about."""
@@ -30,9 +30,14 @@ MOST = 200_000
 """Places that are added: of what varies everywhere on so small a scale the elements say more."""
 ROUND_OFF = 4 * float(np.finfo(float).eps)
 """Length of a piece that is not halved, over the largest arclength."""
+NARROWEST = 2.0**-13
+"""Length of a piece of a line between two places that is not halved, over that of the line."""
 SPLIT = 0.4993
 """Part of a piece to one side of the place that divides it: no simple fraction of the rod is such a place."""
 ONE, ANY = number(1.0), Interval(np.asarray(-inf), np.asarray(inf))
+
+
+Places = dict[Symbol, np.ndarray]
 
 
 class Jet(NamedTuple):
@@ -71,7 +76,9 @@ def refined(
     low, high, found, number_of = ends[:-1], ends[1:], [places], 0
     while len(low) and number_of < MOST:
         try:
-            slope = _jet(nodes, {s: (0.0, 1.0), **(others or {})}, Interval(low, high)).slope
+            pieces = Interval(low, high)
+            lines = {x: Jet(number(p) + number(d) * pieces, number(d)) for x, (p, d) in (others or {}).items()}
+            slope = _jet(nodes, {s: Jet(pieces, ONE), **lines}, low.shape).slope
         except NotImplementedError:  # a function without bounds, as those of Bessel
             return places
         length = high - low
@@ -85,17 +92,59 @@ def refined(
     return np.unique(np.concatenate(found))
 
 
-def _jet(nodes: list[Any], symbols: dict[Symbol, tuple[float, float]], pieces: Interval) -> Jet:
-    """Bounds of the last of some ``nodes`` on pieces of the rod, by values and slopes of ``symbols`` as of zero."""
-    known: dict[Any, Any] = {
-        symbol: Jet(number(a) + number(slope) * pieces, number(slope)) for symbol, (a, slope) in symbols.items()
-    }
+class Chords:
+    """Values of an expression on straight lines between places, given by those of its symbols at both ends."""
+
+    def __init__(self, values: Values) -> None:
+        """List the nodes of the expression whose ``values`` they are."""
+        self.values, self._nodes = values, list(unique_post_traversal(values.expression))
+
+    def leave(self, a: Places, b: Places, beyond: np.ndarray, ends: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        """Whether on a line a value is not between those at its ends, by more than is allowed: (lines,).
+
+        Parameters
+        ----------
+        a, b
+            Values of all symbols at both ends of the lines.
+        beyond
+            Distance from the values at the ends that counts, by line.
+        ends
+            Values of the expression at ``a`` and ``b``.
+        """
+        lowest, highest = np.minimum(*ends) - beyond, np.maximum(*ends) + beyond
+        way = {symbol: b[symbol] - a[symbol] for symbol in self.values.symbols}
+        low, high, line = np.zeros(len(beyond)), np.ones(len(beyond)), np.arange(len(beyond))
+        number_of, found = 0, np.zeros(len(beyond), dtype=bool)
+        while len(line) and number_of < MOST:
+            middle = low + SPLIT * (high - low)
+            y = self.values({symbol: a[symbol][line] + middle * d[line] for symbol, d in way.items()})
+            found[line[(y < lowest[line]) | (y > highest[line])]] = True
+            known = {}
+            for symbol, d in way.items():
+                p, q = (a[symbol][line] + t * d[line] for t in (low, high))
+                known[symbol] = Jet(Interval(np.minimum(p, q), np.maximum(p, q)), Interval(d[line], d[line]))
+            try:
+                value, slope = _jet(self._nodes, known, line.shape)
+            except NotImplementedError:
+                return found
+            length = high - low  # from the middle it is farther to one end
+            least = y - length * np.maximum(-slope.low, slope.high)
+            most = y + length * np.maximum(-slope.low, slope.high)
+            told = (np.fmax(least, value.low) >= lowest[line]) & (np.fmin(most, value.high) <= highest[line])
+            open_ = ~told & ~found[line] & (length > NARROWEST)
+            low, high, middle, line = low[open_], high[open_], middle[open_], line[open_]
+            low, high, line = np.append(low, middle), np.append(middle, high), np.append(line, line)
+            number_of += len(line)
+        return found
+
+
+def _jet(nodes: list[Any], known: dict[Any, Any], shape: tuple[int, ...]) -> Jet:
+    """Bounds of the last of some ``nodes`` on pieces by those of the symbols that are ``known``; of that ``shape``."""
     with np.errstate(all="ignore"):
         for node in nodes:
             if node not in known:
                 known[node] = _bounded(node, [known[x] for x in node.ufl_operands])
     jet: Jet = known[nodes[-1]]
-    shape = pieces.low.shape
     return Jet(*(Interval(np.broadcast_to(x.low, shape), np.broadcast_to(x.high, shape)) for x in jet))
 
 

@@ -26,7 +26,7 @@ class Gradient:
         """Differentiate."""
         self.what = what
         symbols = [symbol for symbol in units if symbol in unique_pre_traversal(function)]
-        self._parts = [(units[symbol], Values(_derivative(function, symbol))) for symbol in symbols]
+        self._parts = [(units[symbol], Values(derivative(function, symbol))) for symbol in symbols]
 
     def __call__(self, places: Places) -> np.ndarray:
         """Derivatives times the units of what they are with respect to, all in those of the function: (n, places)."""
@@ -46,7 +46,8 @@ def gradients(scene: Scene) -> tuple[LocalState, list[Gradient]]:
     return at, found
 
 
-def _derivative(function: Any, symbol: Symbol) -> Any:
+def derivative(function: Any, symbol: Symbol) -> Any:
+    """Derivative of a ``function`` of a place with respect to one ``symbol`` of it."""
     return remove_complex_nodes(apply_derivatives(apply_algebra_lowering(ufl.diff(function, symbol))))
 
 
