@@ -53,8 +53,7 @@ class Tracer:
         self.criterion, self.plane, self.steps = criterion, plane, steps
         self.points = Codim2Points(criterion, plane)
         scene = plane.system.scene
-        varies = not scene.is_quadratic() or scene.energy_depends_on("s", *plane.names)
-        self.convexity = Convexity(plane.system) if varies else None
+        self.convexity = Convexity(plane.system, *plane.names)
         values = dict(zip(plane.names, map(float, p), strict=True))
         spans = [(float(low), float(high)) for low, high in plane.bounds]
         self.fast = [FastLoad(scene, span, name, **values) for name, span in zip(plane.names, spans, strict=True)]
@@ -113,7 +112,7 @@ class Tracer:
         The cubic between them is looked at, and where the energy is not convex on it the curve decides, to which a
         point is corrected.  Raises :class:`ConvergenceError` where none can be.
         """
-        if self.convexity is None:
+        if not self.convexity.alters:
             return ""
         convexity, system = self.convexity, self.plane.system
 

@@ -35,12 +35,12 @@ class Between(NamedTuple):
     resolved: bool = True
 
 
-def lost_between(convexity: Convexity | None, state: State, holds: Callable[[float], bool]) -> Between:
+def lost_between(convexity: Convexity, state: State, holds: Callable[[float], bool]) -> Between:
     """First ``t`` between 0 and 1 at which ``W`` is not convex along ``state(t)``, as it is along ``state(0)``.
 
     ``holds(t)`` decides about an interpolated state along which it is not.
     """
-    if convexity is None or not convexity.alters:
+    if not convexity.alters:
         return Between()
     scales = convexity.scales(state(0.0), state(1.0))
     margin = cache(lambda t: convexity.margin(state(t), scales))

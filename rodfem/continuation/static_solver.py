@@ -69,15 +69,13 @@ class StaticSolver:
         return Resultants(self.shape)
 
     @cached_property
-    def convexity(self) -> Convexity | None:
+    def convexity(self) -> Convexity:
         """Convexity of the stored energy, where it varies: from state to state, along the rod, or with the load."""
-        scene = self.system.scene
-        varies = not scene.is_quadratic() or scene.energy_depends_on("s", scene.load)
-        return Convexity(self.system) if varies else None
+        return Convexity(self.system, self.system.scene.load)
 
     def lost_convexity(self, x: PETSc.Vec) -> str:
         """Why a branch ends at the state ``x``, where the stored energy is not convex any more; empty where it is."""
-        return "" if self.convexity is None or self.convexity.holds(x) else self.not_convex(x)
+        return "" if self.convexity.holds(x) else self.not_convex(x)
 
     def not_convex(self, x: PETSc.Vec) -> str:
         """Why a branch ends at a state ``x`` along which the stored energy is not convex."""

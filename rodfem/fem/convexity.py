@@ -43,8 +43,8 @@ class Convexity:
         Whether the second derivative depends on the state or the load, and on the arclength.
     """
 
-    def __init__(self, system: System) -> None:
-        """Compile the second derivative."""
+    def __init__(self, system: System, *names: str) -> None:
+        """Compile the second derivative; the parameters with these ``names`` change, and no other one."""
         self.system = system
         e, f, scene = system.equations, system.fields, system.scene
         u, free = e.unknowns, scene.free_strains
@@ -58,7 +58,8 @@ class Convexity:
         entries = [hessian[i, j] for i in range(self.size) for j in range(self.size)]
         expression = apply_derivatives(apply_algebra_lowering(ufl.as_vector(entries)))
         self.evaluate = None
-        self.alters = bool(extract_coefficients(expression))
+        fields = set(extract_coefficients(ufl.as_vector([*values, *(k[i] for i in range(3))])))
+        self.alters = bool(fields & set(extract_coefficients(expression))) or scene.energy_depends_on(*names)
         self.varies = bool(extract_type(expression, ufl.SpatialCoordinate))
         if not self.alters and not self.varies:  # the same everywhere: checked with the scene
             return

@@ -35,8 +35,6 @@ from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
 ASIDE = 1e-6
 """Distance beside an end or a break at which the material is asked, relative to the rod's length."""
-QUADRATIC = 1e-9
-"""Third differences of the stored energy, relative to its values, below which it is quadratic in the strains."""
 
 SHORTEST = 1e-15
 """Length of a rod above which dolfinx makes a mesh of it: the round-off of one."""
@@ -474,17 +472,6 @@ class Scene(Contribution):
         strains = [UNDEFORMED[i] + float(v[i]) for i in range(3)]
         W = self.energy(ufl.as_vector(strains), ufl.as_vector([float(x) for x in k]), c)
         return float(ufl.as_ufl(W)(()))
-
-    def is_quadratic(self) -> bool:
-        """Whether the stored energy is a quadratic function of the strains, by third differences along lines."""
-        rng = np.random.default_rng(1)
-        free = np.isin(np.arange(3), self.free_strains)
-        for _ in range(2):
-            v, k = 0.05 * rng.uniform(-1, 1, size=(2, 3))
-            values = [self.energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
-            if abs(np.diff(values, 3)[0]) > QUADRATIC * max(map(abs, values)):
-                return False
-        return True
 
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""

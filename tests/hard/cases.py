@@ -100,7 +100,8 @@ BIFURCATIONS = (
     ),
     Case(
         "a dent beside the path", "the branch is a straight line, and no row shows that a second freedom softens", SAID,
-        "1 - 2 exp(-t^2), t = (u - 0.5123)/d", "width d", bifurcations.aside, (1e-2, 1e-4), (1e-1, 1e-2, 1e-3, 1e-4, 1e-6),
+        "1 - 2 exp(-t^2), t = (u - 0.5123)/d", "width d", bifurcations.aside, (1e-2, 1e-4),
+        (1e-1, 1e-2, 1e-3, 1e-4, 1e-6),
     ),
     Case(
         "a cusp", "a tangent that is nearly vertical, and no fold", EXACT,
