@@ -12,7 +12,7 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
-from ufl.algorithms.analysis import extract_coefficients, extract_type
+from ufl.algorithms.analysis import extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
@@ -58,8 +58,8 @@ class Convexity:
         entries = [hessian[i, j] for i in range(self.size) for j in range(self.size)]
         expression = apply_derivatives(apply_algebra_lowering(ufl.as_vector(entries)))
         self.evaluate = None
-        fields = set(extract_coefficients(ufl.as_vector([*values, *(k[i] for i in range(3))])))
-        self.alters = bool(fields & set(extract_coefficients(expression))) or scene.energy_depends_on(*names)
+        of_state = any(node.ufl_operands[1] == x.label() for node in extract_type(expression, ufl.classes.Variable))
+        self.alters = of_state or scene.energy_depends_on(*names)
         self.varies = bool(extract_type(expression, ufl.SpatialCoordinate))
         if not self.alters and not self.varies:  # the same everywhere: checked with the scene
             return
