@@ -295,15 +295,15 @@ FAULTS = {
         "tests/continuation/test_convexity.py",
     ),
     "functions-of-the-load-at-one-place": Fault(
-        "rodfem/problem/fast_load.py",
-        "for s in (None, *scene.samples()):",
-        "for s in (None,):",
+        "rodfem/problem/parameter_functions.py",
+        "return [*inside, *scene.samples()]",
+        "return [scene.interval[0] + 0.1 * scene.length]",
         "tests/diagram/test_fast_load.py",
     ),
     "functions-of-both-parameters-are-not-looked-at": Fault(
         "rodfem/problem/fast_plane.py",
-        "self.functions = list(numbers_of(scene, names))",
-        "self.functions = list[tuple[str, Numbers]]()",
+        "self.functions = list(parameter_functions(scene, names))",
+        "self.functions = list[tuple[str, ParameterFunction]]()",
         LOCI,
     ),
     "loci-take-steps-of-any-length": Fault(
@@ -539,7 +539,7 @@ FAULTS = {
     ),
     "peaks-of-the-load-are-looked-for-in-few-places": Fault(
         "rodfem/problem/fast_load.py",
-        "places = refined(expression.expression, symbol, places, max(size, TINY))",
+        "places = refined(expression.expression, symbol, places, max(size, TINY), fixed)",
         "places = places[::125]",
         "tests/diagram/test_load_steps.py",
     ),

@@ -93,8 +93,14 @@ class Codim2Points:
 
         The neighbours are ``a`` and ``b``; parameter number ``which`` (0 or 1) has the given ``value`` there.
         """
-        found = [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
-        return [self._exactly(node, which, value) for node in found]
+        return [self._exactly(node, which, value) for node in self.at_value(a, b, which, value)]
+
+    def at_value(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
+        """The same point to the arclength to which points are located, with its arclength.
+
+        ``a``, ``b``, ``which`` and ``value`` are those of :meth:`crossed`.
+        """
+        return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
 
     def _exactly(self, node: LocusPoint, which: int, value: float) -> LocusPoint:
         """The point with this value of a parameter, close to ``node``; that itself where the curve turns back."""

@@ -219,18 +219,31 @@ class Tracer:
     def _between(self, half: Half, history: list[LocusPoint], node: LocusPoint) -> str:
         """Insert what lies between the last node of a history and the next one; a reason if the curve ends there."""
         last, before = history[-1], history[-2] if len(history) > 1 else None
-        rows, ended = self.points.between(last, node, before)
-        for row, kind in rows:
-            if kind:
-                half.marks[len(half.nodes)] = kind
-            half.nodes.append(row)
-        if ended:
-            return ended
-        if last.rest != node.rest:
-            half.marks[len(half.nodes)] = self.criterion.others
-        elif last.orientation != node.orientation:
-            half.marks[len(half.nodes)] = CROSSES
+        for stop in (*self._turns(last, node), node):
+            rows, ended = self.points.between(last, stop, before)
+            for row, kind in rows:
+                if kind:
+                    half.marks[len(half.nodes)] = kind
+                half.nodes.append(row)
+            if ended:
+                return ended
+            if last.rest != stop.rest:
+                half.marks[len(half.nodes)] = self.criterion.others
+            elif last.orientation != stop.orientation:
+                half.marks[len(half.nodes)] = CROSSES
+            if stop is not node:
+                half.nodes.append(stop)
+            last, before = stop, last
         return ""
+
+    def _turns(self, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
+        """Points between two nodes where a function of a parameter has an extremum: other eigenvalues may, too."""
+        found = list[LocusPoint]()
+        for which, fast in enumerate(self.fast):
+            for value in fast.beside(np.array([a.p[which], b.p[which]])):
+                if (a.p[which] - value) * (b.p[which] - value) < 0:
+                    found += self.points.at_value(a, b, which, value)
+        return sorted(found, key=lambda n: n.s)
 
     def _closes(self, start: LocusPoint, a: LocusPoint, b: LocusPoint) -> bool:
         """Whether the curve passes its beginning again between two nodes."""

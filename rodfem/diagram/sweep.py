@@ -116,6 +116,7 @@ class Sweep:
             self.observer.warn(fast.doubt)
         between = np.linspace(fast.low, fast.high, FAST, endpoint=False).ravel()
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at, *between])
+        loads = np.unique([*loads, *fast.beside(loads)])
         loads = loads if a < b else loads[::-1]
         x, _ = first_state(self.solver, a)
         branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])

@@ -9,21 +9,15 @@ without such bounds, one that compares the load in Python, a peak between :data:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
 from itertools import pairwise
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import ufl
 
-from rodfem.errors import SceneError
 from rodfem.problem.enclosure import refined
-from rodfem.problem.kinds import plain
-from rodfem.problem.local_state import Constants, OfConstants, some_places, watched
-from rodfem.problem.roles import functions_of
-from rodfem.problem.values import Symbol, Values
+from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
 from rodfem.tolerances import ROUND_OFF, TINY
 
 if TYPE_CHECKING:
@@ -36,14 +30,22 @@ ASKED = np.array([0.113, 0.382, 0.487, 0.618, 0.873])
 """Where in a range the two are compared."""
 POLYNOMIAL = 1e-9
 """Difference, relative to the variation over the whole range, up to which a function is a cubic."""
-CLOSE = 0.02
-"""The same, up to which a cubic tells it."""
+CLOSE = 0.005
+"""Difference, relative to the variation over a piece, up to which a cubic tells a function there."""
 SEEN = 501
 """Loads at which a function is looked at, at least."""
 PIECES = 4
 """Ranges to begin with where a function is no cubic."""
 DEEPEST = 10
 """How many times each of them is halved: beyond that it is said that a function is not followed."""
+STEEP = 4.0
+"""Difference on the smallest ranges, over their part of the variation over the whole one, up to which it is a kink."""
+DISTINCT = 1e-6
+"""Distance of two loads, over the range, from which on they are two."""
+ASIDE = 1e-7
+"""Distance of a load from an extremum, over the range."""
+TURNS = 100
+"""Extrema of a component that are listed, at most."""
 Function = Callable[[np.ndarray], np.ndarray]
 """Components (n, m) for arguments (n,)."""
 
@@ -52,7 +54,8 @@ class FastLoad:
     """Ranges of the load, and by how much it may change in a step.
 
     ``low`` and ``high`` are the ends of the ranges, none where every function is a cubic; ``doubt`` says where one is
-    not even on the smallest, and is empty where all are.
+    not even on the smallest, and is empty where all are.  At ``turns`` one has an extremum: what comes and goes does so
+    there, however smooth it is.
     """
 
     def __init__(self, scene: Scene, span: tuple[float, float], name: str = "", **values: float) -> None:
@@ -62,8 +65,11 @@ class FastLoad:
         """
         first, last = sorted(span)
         self.doubt, ends, name = "", {first, last}, name or scene.load
-        for what, numbers in numbers_of(scene, (name,), **values):
-            worst = _halved(lambda t, f=numbers: f(t[:, None]), _places(numbers, first, last), ends)  # type: ignore[misc]
+        turns = set[float]()
+        for what, numbers in parameter_functions(scene, (name,), **values):
+            places = _places(numbers, first, last)
+            turns |= _turns(places, numbers(places[:, None]))
+            worst = _halved(lambda t, f=numbers: f(t[:, None]), places, ends)  # type: ignore[misc]
             if worst and not self.doubt:
                 self.doubt = (
                     f"The {what} changes too fast with {name} about {name} = {worst[0]:.6g} to be followed "
@@ -71,6 +77,18 @@ class FastLoad:
                 )
         loads = np.array(sorted(ends) if len(ends) > 2 else [])
         self.low, self.high = loads[:-1], loads[1:]
+        self.turns, self.width = sorted(turns), last - first
+
+    def beside(self, loads: np.ndarray) -> list[float]:
+        """Loads at extrema that are not at one of the ``loads`` (n,), nor at another one.
+
+        They are a little aside: an extremum may be a kink, where there are no derivatives.
+        """
+        found, apart = loads.tolist(), DISTINCT * self.width
+        for turn in (turn + ASIDE * self.width for turn in self.turns):
+            if min((abs(turn - load) for load in found), default=apart) >= apart:
+                found.append(turn)
+        return found[len(loads) :]
 
     def reach(self, point: Point) -> float:
         """Largest step from a ``point`` of a branch, by the slope of the load there."""
@@ -86,65 +104,6 @@ class FastLoad:
         return float((away + self.high - self.low).min() / rate)
 
 
-class Numbers:
-    """Numbers that a ``function`` of a scene's constants returns for values of some parameters."""
-
-    def __init__(self, function: OfConstants, known: dict[str, Any], names: tuple[str, ...]) -> None:
-        """Call it with symbols for the parameters with these ``names``, and else with the ``known`` values.
-
-        There are no ``expressions`` where it needs numbers, as one that compares a parameter in Python does.
-        """
-        self.function, self.known, self.names = function, known, names
-        self.symbols = [Symbol() for _ in names]
-        try:
-            values = function(Constants(**{**known, **dict(zip(names, self.symbols, strict=True))}))
-            parts = values if isinstance(values, (tuple, list)) else [values]
-            self.expressions = [Values(ufl.as_ufl(0.0 if x is None else x)) for x in parts]
-        except Exception:  # of UFL's own, too
-            self.expressions = []
-
-    def __call__(self, places: np.ndarray) -> np.ndarray:
-        """Numbers (n, m) for ``places`` (n, number of parameters); nan for what is not defined."""
-        if self.expressions:
-            at = dict(zip(self.symbols, places.T, strict=True))
-            return np.stack([values(at) for values in self.expressions], axis=1)
-        rows = [self._at(place) for place in places.tolist()]
-        wide = max(map(len, rows), default=1)
-        return np.array([row if len(row) == wide else [float("nan")] * wide for row in rows])
-
-    def _at(self, place: list[float]) -> list[float]:
-        try:
-            values = self.function(Constants(**{**self.known, **dict(zip(self.names, place, strict=True))}))
-        except SceneError:
-            return [float("nan")]
-        return [_number(x) for x in (values if isinstance(values, (tuple, list)) else [values])]
-
-
-def numbers_of(scene: Scene, names: tuple[str, ...], **values: float) -> Iterator[tuple[str, Numbers]]:
-    """Functions that depend on all parameters with these ``names``, in words, and their numbers.
-
-    Other parameters have the ``values`` that are given.
-    """
-    for s in (None, *scene.samples()):  # along the rod its functions may be others
-        point, rod = some_places(scene, s=s)
-        known = {**vars(scene.constants(s=point.s)), **values}
-        found: list[tuple[str, OfConstants, bool]] = [("stored energy", partial(scene.energy, rod.v, rod.k), False)]
-        for what, function, role in functions_of(scene):
-            if s is None or role.along:
-                if role.call == "f(c)":
-                    found.append((what, function, False))
-                elif role.call == "f(x, c)":
-                    found.append((what, partial(function, rod if role.along else point), True))
-        for what, function, placed in found:  # one of a place may know the arclength by that
-            c, asked = watched(Constants(**known))
-            try:
-                function(c)
-            except SceneError:
-                continue
-            if asked.issuperset(names) and (s is None or placed or "s" in asked):
-                yield what, Numbers(function, known, names)
-
-
 def _halved(function: Function, seen: np.ndarray, ends: set[float]) -> list[float]:
     """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not.
 
@@ -156,16 +115,17 @@ def _halved(function: Function, seen: np.ndarray, ends: set[float]) -> list[floa
         return []
     edges = np.linspace(first, last, PIECES + 1)
     size = np.maximum(size, np.ptp(function(edges), axis=0))
+    kink = STEEP * size / (PIECES * 2**DEEPEST)
     todo = [(low, high, 0) for low, high in pairwise(edges.tolist())]
     left = []
     ends |= set(edges.tolist())
     while todo:
         low, high, depth = todo.pop()
-        off, _ = told(function, low, high, seen)
-        if not np.any(off > CLOSE * size):
+        off, varied = told(function, low, high, seen)
+        if not np.any(off > np.maximum(CLOSE * varied, POLYNOMIAL * size)):
             continue
         if depth == DEEPEST:
-            left.append((low + high) / 2)
+            left += [(low + high) / 2] * bool(np.any(off > kink))
         else:
             middle = (low + high) / 2
             ends.add(middle)
@@ -194,18 +154,38 @@ def told(function: Function, low: float, high: float, seen: np.ndarray) -> tuple
     return np.maximum(off - ROUND_OFF * abs(values).max(axis=0), 0.0), np.ptp(values, axis=0)
 
 
-def _places(numbers: Numbers, first: float, last: float) -> np.ndarray:
+def _places(numbers: ParameterFunction, first: float, last: float) -> np.ndarray:
     """Values of one parameter at which numbers have to be looked at."""
     places = np.linspace(first, last, SEEN)
     for expression in numbers.expressions:
-        (symbol,), values = numbers.symbols, expression({numbers.symbols[0]: places})
+        symbol, fixed = numbers.symbols[0], {x: (value, 0.0) for x, value in numbers.fixed.items()}
+        values = expression({symbol: places} | {x: np.full(len(places), value) for x, value in numbers.fixed.items()})
         size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
-        places = refined(expression.expression, symbol, places, max(size, TINY))
+        places = refined(expression.expression, symbol, places, max(size, TINY), fixed)
     return places
 
 
-def _number(value: object) -> float:
-    try:
-        return plain(value(()) if callable(value) else value)
-    except Exception:  # of UFL's own, too
-        return float("nan")
+def _turns(places: np.ndarray, values: np.ndarray) -> set[float]:
+    """Where components (n, m) have extrema between the first and the last of the ``places`` (n,)."""
+    found = set[float]()
+    for y in values.T[:, np.isfinite(values).all(axis=1)] if np.isfinite(values).all() else []:
+        steps = np.diff(y)
+        steps[abs(steps) <= POLYNOMIAL * np.ptp(y) + ROUND_OFF * abs(y).max()] = 0.0
+        moving = np.flatnonzero(steps)
+        turned = np.flatnonzero(np.sign(steps[moving[1:]]) != np.sign(steps[moving[:-1]]))
+        for i in turned[:TURNS]:
+            some = slice(max(int(moving[i]) - 1, 0), int(moving[i + 1]) + 3)
+            found.add(_vertex(places[some], y[some]))
+    return found
+
+
+def _vertex(x: np.ndarray, y: np.ndarray) -> float:
+    """Extremum of the parabola through the value that is farthest from those at both ends, and its neighbours."""
+    i = int(np.argmax(abs(y - (y[0] + y[-1]) / 2)))
+    i = min(max(i, 1), len(x) - 2)
+    (a, b, c), (p, q, r) = x[i - 1 : i + 2], y[i - 1 : i + 2]
+    left, right = (q - p) / (b - a), (r - q) / (c - b)
+    if left == right:
+        return float(b)
+    at = (a + b) / 2 - left * (c - a) / 2 / (right - left)
+    return float(min(max(at, a), c))

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rodfem.problem.enclosure import refined
-from rodfem.problem.fast_load import CLOSE, Numbers, numbers_of, told
+from rodfem.problem.fast_load import CLOSE, told
+from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
 from rodfem.problem.values import Symbol
 from rodfem.tolerances import TINY
 
@@ -28,7 +29,7 @@ class FastPlane:
 
     def __init__(self, scene: Scene, names: tuple[str, str]) -> None:
         """List them; the parameters have these ``names``."""
-        self.functions = list(numbers_of(scene, names))
+        self.functions = list(parameter_functions(scene, names))
 
     def unfollowed(self, a: np.ndarray, b: np.ndarray) -> str:
         """Words for what no cubic tells between two points (2,) of the plane; empty where there is nothing."""
@@ -40,12 +41,14 @@ class FastPlane:
         return ""
 
 
-def _places(numbers: Numbers, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _places(numbers: ParameterFunction, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Where on the chord from ``a`` to ``b`` numbers have to be looked at."""
     places, t = SEEN, Symbol()
     for expression in numbers.expressions:
-        values = expression(dict(zip(numbers.symbols, (a + places[:, None] * (b - a)).T, strict=True)))
+        at = dict(zip(numbers.symbols, (a + places[:, None] * (b - a)).T, strict=True))
+        values = expression(at | {x: np.full(len(places), value) for x, value in numbers.fixed.items()})
         size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
         lines = {x: (float(p), float(q - p)) for x, p, q in zip(numbers.symbols, a, b, strict=True)}
+        lines |= {x: (value, 0.0) for x, value in numbers.fixed.items()}
         places = refined(expression.expression, t, places, max(size, TINY), lines)
     return places
