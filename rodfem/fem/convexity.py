@@ -12,7 +12,7 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
-from ufl.algorithms.analysis import extract_type
+from ufl.algorithms.analysis import extract_coefficients, extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
@@ -59,7 +59,7 @@ class Convexity:
         expression = apply_derivatives(apply_algebra_lowering(ufl.as_vector(entries)))
         self.evaluate = None
         of_state = any(node.ufl_operands[1] == x.label() for node in extract_type(expression, ufl.classes.Variable))
-        self.alters = of_state or scene.energy_depends_on(*names)
+        self.alters = of_state or (bool(extract_coefficients(expression)) and scene.energy_depends_on(*names))
         self.varies = bool(extract_type(expression, ufl.SpatialCoordinate))
         if not self.alters and not self.varies:  # the same everywhere: checked with the scene
             return

@@ -36,9 +36,9 @@ SEEN = 501
 """Loads at which a function is looked at, at least."""
 PIECES = 4
 """Ranges to begin with where a function is no cubic."""
-DEEPEST = 10
+DEEPEST = 12
 """How many times each of them is halved: beyond that it is said that a function is not followed."""
-STEEP = 4.0
+STEEP = 40.0
 """Difference on the smallest ranges, over their part of the variation over the whole one, up to which it is a kink."""
 DISTINCT = 1e-6
 """Distance of two loads, over the range, from which on they are two."""
