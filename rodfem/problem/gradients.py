@@ -1,7 +1,8 @@
-"""Resultants of the energies of a scene: first derivatives with respect to the state at a place."""
+"""Resultants and stiffnesses of the energies of a scene: first and second derivatives by the state at a place."""
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,13 +21,20 @@ if TYPE_CHECKING:
 
 
 class Gradient:
-    """Derivatives of a ``function`` of a place, in words ``what``, with respect to a state of these ``units``."""
+    """Derivatives of a ``function`` of a place, in words ``what``, with respect to a state of these ``units``.
+
+    Of first and second order: equilibria know the first ones, and where they lose their stability the second ones.
+    """
 
     def __init__(self, what: str, function: Any, units: dict[Symbol, float]) -> None:
         """Differentiate."""
         self.what = what
         symbols = [symbol for symbol in units if symbol in unique_pre_traversal(function)]
-        self._parts = [(units[symbol], Values(derivative(function, symbol))) for symbol in symbols]
+        first = {symbol: scalar(derivative(function, symbol)) for symbol in symbols}
+        self._parts = [(units[symbol], Values(part)) for symbol, part in first.items()]
+        for x, y in combinations_with_replacement(symbols, 2):
+            if y in unique_pre_traversal(first[x]):
+                self._parts.append((units[x] * units[y], Values(derivative(first[x], y))))
 
     def __call__(self, places: Places) -> np.ndarray:
         """Derivatives times the units of what they are with respect to, all in those of the function: (n, places)."""
