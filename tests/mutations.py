@@ -300,6 +300,48 @@ FAULTS = {
         "return [scene.interval[0] + 0.1 * scene.length]",
         "tests/diagram/test_fast_load.py",
     ),
+    "peaks-count-over-the-whole-range": Fault(
+        "rodfem/problem/fast_load.py",
+        "np.maximum(CLOSE * varied, POLYNOMIAL * size)",
+        "0.02 * size",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "energies-are-looked-at-in-their-values": Fault(
+        "rodfem/problem/parameter_functions.py",
+        "    yield from first.values()\n    for x, y in combinations_with_replacement(symbols, 2):",
+        "    for x, y in []:",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "sweeps-have-no-rows-at-extrema": Fault(
+        "rodfem/diagram/sweep.py",
+        "loads = np.unique([*loads, *fast.beside(loads)])",
+        "pass",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "loci-have-no-rows-at-extrema": Fault(
+        "rodfem/codim2/curve.py",
+        "for stop in (*self._turns(last, node), node):",
+        "for stop in (node,):",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "loci-do-not-know-what-is-sharp": Fault(
+        "rodfem/codim2/locus_errors.py",
+        "if words := unbroken(there, inside) or sharp_along(there, solver.system):",
+        "if words := unbroken(scene, inside) or sharp_along(scene, solver.system):",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "quadrature-of-first-derivatives-alone": Fault(
+        "rodfem/problem/gradients.py",
+        "self._parts.append((units[x] * units[y], Values(derivative(first[x], y))))",
+        "pass",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "convexity-of-the-undeformed-state-alone": Fault(
+        "rodfem/fem/convexity.py",
+        "self.alters = of_state or",
+        "self.alters =",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
     "functions-of-both-parameters-are-not-looked-at": Fault(
         "rodfem/problem/fast_plane.py",
         "self.functions = list(parameter_functions(scene, names))",
@@ -314,8 +356,8 @@ FAULTS = {
     ),
     "loci-say-nothing-of-what-is-too-fast": Fault(
         "rodfem/codim2/locus.py",
-        'said = [tracer.doubt, reasons.sentence if reasons else ""]',
-        'said = [reasons.sentence if reasons else ""]',
+        'said = [tracer.doubt, sharp, reasons.sentence if reasons else ""]',
+        'said = [sharp, reasons.sentence if reasons else ""]',
         LOCI,
     ),
     "changes-between-rows-are-not-looked-for": Fault(
@@ -605,8 +647,8 @@ FAULTS = {
     ),
     "stiffness-that-the-load-takes-away": Fault(
         f"{CONTINUATION}static_solver.py",
-        'scene.energy_depends_on("s", scene.load)',
-        "scene.depends_on_s()",
+        "return Convexity(self.system, self.system.scene.load)",
+        "return Convexity(self.system)",
         "tests/continuation/test_convexity.py",
     ),
     "planes-are-tried-at-the-ends": Fault(

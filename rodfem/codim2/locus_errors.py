@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,9 +20,11 @@ from rodfem.codim2.parameter_plane import LocusPoint, Plane
 from rodfem.codim2.singular import Singular
 from rodfem.continuation.kinds import FLUTTER, FOLD
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.nonsmooth import Nonsmooth, Reasons
+from rodfem.fem.sharpness import inside_element, sharp_along
 from rodfem.fem.transfer import Transfer, halved, richer_system
+from rodfem.problem.jumps import unbroken
 
 CUSP = 1e-3
 """Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
@@ -130,3 +134,33 @@ def without_smoothness(solver: StaticSolver, plane: Plane, nodes: Sequence[Locus
             error[row] = np.nan
             reasons += here
     return reasons
+
+
+def blurred(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], rows: int) -> tuple[list[int], str]:
+    """Numbers of the nodes at whose parameters something changes too steeply along the rod, and a sentence on it.
+
+    It is looked at for so many ``rows``, at about equal distances, each for those that it is nearest to; of the scene's
+    own values the diagram has told.
+
+    Parameters
+    ----------
+    solver, plane, nodes
+        What found the locus in a plane, and its points.
+    rows
+        Number of points at which it is looked at.
+    """
+    scene, found, said = solver.system.scene, list[int](), ""
+    seen = np.unique(np.linspace(0, len(nodes) - 1, rows).round().astype(int))
+    nearest = seen[np.argmin(abs(np.arange(len(nodes))[:, None] - seen), axis=1)]
+    for row in seen:
+        values = dict(zip(plane.names, map(float, nodes[row].p), strict=True))
+        parameters = {name: replace(p, value=values.get(name, p.value)) for name, p in scene.parameters.items()}
+        try:
+            there = replace(scene, parameters=parameters)
+        except SceneError:  # of the scene's own load, which is another one here
+            continue
+        inside = partial(inside_element, there, solver.system)
+        if words := unbroken(there, inside) or sharp_along(there, solver.system):
+            found += np.flatnonzero(nearest == row).tolist()
+            said = said or f"At {plane.names[1]} = {values[plane.names[1]]:.6g}: {words}"
+    return found, said

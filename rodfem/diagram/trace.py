@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
 from mpi4py import MPI
 
 from rodfem import compat
@@ -24,16 +23,14 @@ from rodfem.diagram.sweep import Sweep
 from rodfem.diagram.waves import check_waves
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
-from rodfem.fem.system import System
-from rodfem.fem.transfer import compile_richer, halved
+from rodfem.fem.sharpness import inside_element, sharp_along
+from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.jumps import unbroken
 from rodfem.problem.scene import Scene
-from rodfem.problem.smoothness import Rules, unresolved
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains
 from rodfem.ranks import end_together
 from rodfem.timing import Clock
-from rodfem.tolerances import SAME_PLACE, same_place
 
 PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
 
@@ -124,10 +121,10 @@ def traced(
         if doubt := round_off_of_strains(scene):
             recorder.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
             plan = replace(plan, error_bars=False)  # two meshes have that round-off alike: no bar would hold it
-        if doubt := unbroken(scene, partial(_inside, scene, found.system, plan.accuracy is not None)):
+        if doubt := unbroken(scene, partial(inside_element, scene, found.system, adaptive=plan.accuracy is not None)):
             recorder.warn(doubt)
         if plan.accuracy is None or not scene.conservative:
-            _warn_of_what_is_sharp(scene, found.system, recorder)
+            _warn(recorder, sharp_along(scene, found.system))
         if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
@@ -147,7 +144,7 @@ def traced(
             tracer.run()
             if plan.accuracy is not None and scene.conservative:
                 for number in sorted({point.mesh for branch in diagram for point in branch.points}):
-                    _warn_of_what_is_sharp(scene, tracer.solvers[number].system, recorder)
+                    _warn(recorder, sharp_along(scene, tracer.solvers[number].system))
         except BaseException as trouble:  # an interrupt, too: nothing that has been computed is lost
             if diagram.branches:
                 trouble.diagram = diagram  # type: ignore[attr-defined]
@@ -187,23 +184,6 @@ def _not_used(given: Discretization, plan: Plan) -> str:
     )
 
 
-def _warn_of_what_is_sharp(scene: Scene, system: System, observer: Observer) -> None:
-    """Warn of what changes too steeply along the rod for the elements of a system."""
-    k, ends = system.fields.discretization.degree, np.sort(system.fields.vertices.reshape(-1, 2), axis=1)
-    own, richer = (system.equations.quadrature_degree(degree) // 2 + 1 for degree in (k, k + 1))
-
-    def elements(s: float) -> list[tuple[float, float]]:
-        mine = [(float(a), float(b)) for a, b in ends[(ends[:, 0] <= s) & (s <= ends[:, 1])]]
-        return sorted({element for part in system.comm.allgather(mine) for element in part})
-
-    if doubt := unresolved(scene, elements, Rules(own, richer, halved(k), strains=(k - 1, k))):
+def _warn(observer: Observer, doubt: str) -> None:
+    if doubt:
         observer.warn(doubt)
-
-
-def _inside(scene: Scene, system: System, adaptive: bool, s: float) -> bool:
-    """Whether an arclength of a ``scene`` is inside of an element; of ``adaptive`` meshes only joints are vertices."""
-    if adaptive:
-        return not any(same_place(joint, s, scene.length) for joint in scene.joints)
-    ends, close = np.sort(system.fields.vertices.reshape(-1, 2), axis=1), SAME_PLACE * scene.length
-    mine = bool(((ends[:, 0] + close < s) & (s < ends[:, 1] - close)).any())
-    return any(system.comm.allgather(mine))

@@ -48,7 +48,7 @@ class IntegralOrdinate:
         if self.exists:
             self._at = LocalState(scene)
             of = scalar(scene.ordinate.of(along_rod(scene, self._at), self._at.constants))
-            self.exists, self._of = not is_polynomial(of, self._at), Values(of)
+            self.exists, self._of = not is_polynomial(of, self._at.units), Values(of)
 
     def __call__(self, x: PETSc.Vec) -> Integral:
         """Return the integral of a state ``x``."""

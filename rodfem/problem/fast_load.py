@@ -157,7 +157,7 @@ def told(function: Function, low: float, high: float, seen: np.ndarray) -> tuple
 def _places(numbers: ParameterFunction, first: float, last: float) -> np.ndarray:
     """Values of one parameter at which numbers have to be looked at."""
     places = np.linspace(first, last, SEEN)
-    for expression in numbers.expressions:
+    for expression in numbers.narrow:
         symbol, fixed = numbers.symbols[0], {x: (value, 0.0) for x, value in numbers.fixed.items()}
         values = expression({symbol: places} | {x: np.full(len(places), value) for x, value in numbers.fixed.items()})
         size = float(abs(values[np.isfinite(values)]).max(initial=0.0))

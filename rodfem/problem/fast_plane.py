@@ -44,7 +44,7 @@ class FastPlane:
 def _places(numbers: ParameterFunction, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Where on the chord from ``a`` to ``b`` numbers have to be looked at."""
     places, t = SEEN, Symbol()
-    for expression in numbers.expressions:
+    for expression in numbers.narrow:
         at = dict(zip(numbers.symbols, (a + places[:, None] * (b - a)).T, strict=True))
         values = expression(at | {x: np.full(len(places), value) for x, value in numbers.fixed.items()})
         size = float(abs(values[np.isfinite(values)]).max(initial=0.0))

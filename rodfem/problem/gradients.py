@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import ufl
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.algorithms.remove_complex_nodes import remove_complex_nodes
-from ufl.classes import Power, Product, ScalarValue, Sum, Variable, Zero
+from ufl.classes import Division, Power, Product, ScalarValue, Sum, Variable, Zero
 from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem.problem.pointwise import LocalState, Places, pointwise
@@ -49,7 +50,7 @@ def gradients(scene: Scene) -> tuple[LocalState, list[Gradient]]:
     at, found = LocalState(scene), []
     for place in pointwise(scene, at):
         whole = scalar(place.function)
-        if place.s is None and not is_polynomial(whole, at):
+        if place.s is None and not is_polynomial(whole, at.units):
             found.append(Gradient(place.what, whole, at.units))
     return at, found
 
@@ -59,21 +60,23 @@ def derivative(function: Any, symbol: Symbol) -> Any:
     return remove_complex_nodes(apply_derivatives(apply_algebra_lowering(ufl.diff(function, symbol))))
 
 
-def is_polynomial(function: Any, at: LocalState) -> bool:
-    """Whether a ``function`` is a polynomial in the symbols ``at`` a place, by the nodes of UFL between them and it."""
-    of_state: dict[Any, bool] = {}
+def is_polynomial(function: Any, symbols: Container[Any]) -> bool:
+    """Whether a ``function`` is a polynomial in some ``symbols``, by the nodes of UFL between them and it."""
+    asking: dict[Any, bool] = {}
 
-    def knows(node: Any) -> bool:
-        if node not in of_state:
-            of_state[node] = node in at.units or any(knows(x) for x in node.ufl_operands)
-        return of_state[node]
+    def asks(node: Any) -> bool:
+        if node not in asking:
+            asking[node] = node in symbols or any(asks(x) for x in node.ufl_operands)
+        return asking[node]
 
-    kinds = Sum | Product | Power | Variable
-    return all(
-        isinstance(node, kinds) and (not isinstance(node, Power) or _exponent(node.ufl_operands[1]))
-        for node in unique_pre_traversal(function)
-        if knows(node)
-    )
+    def keeps(node: Any) -> bool:
+        if isinstance(node, Power):
+            return _exponent(node.ufl_operands[1])
+        return isinstance(node, Sum | Product | Variable) or (
+            isinstance(node, Division) and not asks(node.ufl_operands[1])
+        )
+
+    return all(keeps(node) for node in unique_pre_traversal(function) if asks(node))
 
 
 def _exponent(power: Any) -> bool:

@@ -16,7 +16,7 @@ import ufl
 from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem.errors import SceneError
-from rodfem.problem.gradients import derivative
+from rodfem.problem.gradients import derivative, is_polynomial
 from rodfem.problem.kinds import plain
 from rodfem.problem.local_state import STATES, Constants, OfConstants, some_places, watched
 from rodfem.problem.pointwise import LocalState, pointwise
@@ -31,13 +31,17 @@ ALONG = 33
 
 
 class ParameterFunction:
-    """Numbers that depend on the parameters of some ``symbols``, by ``expressions`` of these and of ``fixed`` ones."""
+    """Numbers that depend on the parameters of some ``symbols``, by ``expressions`` of these and of ``fixed`` ones.
+
+    Those that are no polynomials of the parameters may be ``narrow`` peaks.
+    """
 
     def __init__(
         self, symbols: list[Symbol], expressions: list[Values], fixed: dict[Symbol, float] | None = None
     ) -> None:
         """Keep what the numbers are made of."""
         self.symbols, self.expressions, self.fixed = symbols, expressions, fixed or {}
+        self.narrow = [of for of in expressions if not is_polynomial(of.expression, symbols)]
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
         """Numbers (n, m) for ``places`` (n, number of parameters); nan for what is not defined."""

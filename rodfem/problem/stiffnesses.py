@@ -39,7 +39,7 @@ class Stiffness:
         self.parts: list[tuple[float, Chords]] = []
         for x, y in combinations_with_replacement(symbols, 2):
             second = scalar(derivative(derivative(function, x), y))
-            if not is_polynomial(second, at):
+            if not is_polynomial(second, at.units):
                 self.parts.append((at.units[x] * at.units[y], Chords(Values(second))))
 
     def hidden(self, a: Places, b: Places) -> np.ndarray:
@@ -61,7 +61,7 @@ def stiffnesses(scene: Scene) -> tuple[LocalState, list[Stiffness]]:
     at, found = LocalState(scene), []
     for place in pointwise(scene, at):
         whole = scalar(place.function)
-        if not is_polynomial(whole, at):
+        if not is_polynomial(whole, at.units):
             natural = scene.units.energy / (scene.length if place.s is None else 1.0)
             found.append(Stiffness(place.what, place.s, whole, at, natural))
     return at, [each for each in found if each.parts]

@@ -236,9 +236,9 @@ def trouble_with_inertia(scene: Scene, load: float | None) -> str:
             "give zero or more" if load is None else f"give zero or more, or a range of {scene.load} in which it is"
         )
         return f"A mass or rotary inertia of {min(masses + rotary):g}{there} is negative: {remedy}."
-    beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
-    if beyond:
-        return f"A mass or rotary inertia of {beyond[0]:g}{there} has powers that are no floats: use other units."
+    largest = max(masses + rotary)  # what is much less is none
+    if largest and not TINIEST < largest < LARGEST:
+        return f"A mass or rotary inertia of {largest:g}{there} has powers that are no floats: use other units."
     given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
     if scene.conservative or max(masses) > 0 or given:
         return ""

@@ -1,0 +1,141 @@
+"""What functions of a scene do between rows, at other parameters, or at some states alone: found, or said."""
+
+from __future__ import annotations
+
+from math import log, pi, sqrt
+from typing import Any
+
+import classics
+import numpy as np
+import pytest
+import ufl
+from classics import column
+from scipy.optimize import brentq
+
+from forms.energy import bending_and_twist
+from rodfem import Diagram, Discretization, Plan, clamped, free, trace
+from rodfem.continuation.kinds import FLUTTER
+from rodfem.problem.fast_load import FastLoad
+from rodfem.problem.scene import Scene
+
+pytestmark = pytest.mark.alone
+MESH = Discretization("auto", 4, 6)
+EULER = pi**2 / 4
+BECK = 20.0509536189738
+WIDTH = 1e-3
+
+
+def bell(x: Any) -> Any:
+    return ufl.exp(-((x / WIDTH) ** 2))
+
+
+def cantilever(
+    energy: Any, thrust: Any = lambda c: EULER / 2, span: tuple[float, float] = (0.0, 4.0), **given: Any
+) -> Scene:
+    ends = clamped(), free(lambda c: (0.0, 0.0, -thrust(c)))
+    return column("cantilever", ends, span, energy=energy, **given)
+
+
+def constant(v: Any, k: Any, c: Any) -> Any:
+    return bending_and_twist(k, (1.0, 9.0, 1.0))
+
+
+def branch_points(diagram: Diagram) -> list[float]:
+    return [s.point.load for s in diagram.special("branch point")]
+
+
+def test_a_peak_that_is_small_beside_what_the_load_grows_to() -> None:
+    """Thrust ``P + 0.05 exp(-t^2)``: critical on both sides of the peak, and at Euler's load."""
+    rod = cantilever(constant, lambda c: c.P + 0.05 * bell(c.P - 2.43))
+    thrust = lambda P: P + 0.05 * np.exp(-(((P - 2.43) / WIDTH) ** 2)) - EULER  # noqa: E731
+    exact = [brentq(thrust, *ends, xtol=1e-14) for ends in ((2.425, 2.43), (2.43, 2.435))]
+    np.testing.assert_allclose(branch_points(trace(rod, MESH, Plan(depth=0))), [*exact, EULER], rtol=0, atol=1e-9)
+
+
+def test_a_notch_that_other_terms_hide() -> None:
+    """Bending softens by half at one load, under 80 % of Euler's; the energy has a term ``100 P``, and twist grows."""
+    rod = cantilever(
+        lambda v, k, c: bending_and_twist(k, (1.0 - 0.5 * bell(c.P - 0.3712), 9.0, 1e3 * (1.0 + c.P))) + 100.0 * c.P,
+        lambda c: 0.8 * EULER,
+        (0.0, 1.0),
+    )
+    off = WIDTH * sqrt(-log(0.4))
+    found = branch_points(trace(rod, MESH, Plan(depth=0)))
+    np.testing.assert_allclose(found, [0.3712 - off, 0.3712 + off], rtol=0, atol=1e-9)
+
+
+def test_a_kink_is_no_peak() -> None:
+    for thrust in (lambda c: abs(c.P - 1.234), lambda c: ufl.max_value(c.P, 1.234)):
+        assert not FastLoad(cantilever(constant, thrust), (0.0, 4.0)).doubt
+
+
+def test_flutter_that_comes_and_goes_with_a_parabola() -> None:
+    """The stiffness of the other plane is ``0.83 + 1000 (P - 17.0321)^2``: a pair 0.009 apart, between two rows."""
+    stiffness = lambda P: 0.83 + 1000 * (P - 17.0321) ** 2  # noqa: E731
+    ends = clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))
+    rod = column(
+        "parabola", ends, (15.0, 19.0), inertia=classics.BEAM,
+        energy=lambda v, k, c: bending_and_twist(k, (9.0, stiffness(c.P), 1.0)),
+    )  # fmt: skip
+    pair = lambda P: BECK * stiffness(P) - P  # noqa: E731
+    exact = [brentq(pair, *ends, xtol=1e-13) for ends in ((17.0, 17.0321), (17.0321, 17.06))]
+    found = [s.point.load for s in trace(rod, MESH, Plan(depth=0)).special(FLUTTER)]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-6)
+
+
+def test_another_eigenvalue_that_comes_and_goes_along_a_locus() -> None:
+    """At ``b = 0.4116`` the other plane buckles first, as a parabola has it: no other row shows that."""
+    rod = cantilever(
+        lambda v, k, c: bending_and_twist(k, (1.0, 1.0 + 1000.0 * ((c.b - 0.4116) ** 2 - 0.019**2), 1.0)),
+        lambda c: c.P,
+        constants={"b": 0.1},
+    )
+    diagram = trace(rod, MESH, Plan(depth=0, error_bars=False))
+    found = diagram.locus(diagram.special("branch point")[0], "b", (0.0, 1.0), (0.0, 4.0))
+    (row,) = np.flatnonzero(abs(found.values[:, 1] - 0.4116) < 1e-5)
+    assert found.index[row].tolist() == [1, 2]
+    assert {mark.row for mark in found.marks} >= {row, row + 1}
+
+
+@pytest.mark.parametrize(
+    ("energy", "words"),
+    [
+        (lambda c: 1 / (1 + c.b * bell(c.s - 0.4321) / (WIDTH * sqrt(pi))), "changes too sharply about s = 0.432"),
+        (
+            lambda c: 1 + c.b * ufl.conditional(ufl.lt(c.s, 0.4321), 1.0, 0.0),
+            "jumps inside of an element, at s = 0.4321",
+        ),
+    ],
+)
+def test_a_locus_knows_what_is_sharp_at_its_own_parameters(energy: Any, words: str) -> None:
+    """At the start there is none of it: errors were 1e11 times their bars."""
+    rod = cantilever(lambda v, k, c: bending_and_twist(k, (energy(c), 9.0, 1.0)), lambda c: c.P, constants={"b": 0.0})
+    diagram = trace(rod, MESH, Plan(depth=0))
+    found = diagram.locus(diagram.special("branch point")[0], "b", (0.0, 1.0), (0.0, 4.0))
+    assert words in found.note
+    there = found.values[:, 1] > 0.1
+    assert np.isnan(found.error[there]).all() and set(np.flatnonzero(there)) <= set(found.unresolved)
+
+
+def test_a_potential_that_is_narrow_in_the_position_and_even_in_the_deflection() -> None:
+    """On a straight column it has no force, but a stiffness, which no place of the quadrature sees."""
+    rod = cantilever(
+        constant,
+        lambda c: c.P,
+        potential=lambda x, c: 25.0 * bell(x.r[2] - 0.4321) / (WIDTH * sqrt(pi)) * x.r[1] ** 2,
+    )
+    diagram = trace(rod, MESH, Plan(depth=0))
+    assert any("too sharply for the points of its quadrature" in said for said in diagram.warnings)
+    assert all(np.isnan(s.error_estimate) for s in diagram.special("branch point"))
+
+
+def test_a_dent_of_the_energy_beyond_small_strains() -> None:
+    """``W'' = 1 + (4 t^2 - 2) exp(-t^2)``, ``t = (v3 - 1.3712)/0.05``: quadratic near zero."""
+    rod = column(
+        "dented", (clamped(), free(lambda c: (0.0, 0.0, c.P))), (0.0, 1.0), rod="unshearable",
+        energy=lambda v, k, c: bending_and_twist(k, (50.0, 50.0, 1.0)) + 0.5 * (v[2] - 1) ** 2
+        + 0.05**2 * ufl.exp(-(((v[2] - 1.3712) / 0.05) ** 2)),
+    )  # fmt: skip
+    (branch,) = trace(rod, MESH, Plan(depth=0, error_bars=False))
+    assert branch.ended.startswith("the stored energy is not convex any more at P = 0.38")
+    assert {point.negative for point in branch.points} == {0}
