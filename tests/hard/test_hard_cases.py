@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from hard import bifurcations
 from hard.case import Case
 from hard.cases import CASES, SAID
 
@@ -18,3 +19,9 @@ EVERY = [(case, value) for name, group in CASES.items() if name != APART for cas
 def test_a_hard_case(case: Case, value: Any) -> None:
     found = case.measure(value)
     assert found.right or (case.promised == SAID and found.said), f"{found.error:.3g} {found.wrong} {found.said}"
+
+
+def test_steps_are_shortened_about_a_narrow_bend() -> None:
+    """Two folds 3e-4 apart in load are found, not only said to be missing perhaps."""
+    found = bifurcations.dent(3e-4)
+    assert found.right and not found.said, f"{found.error:.3g} {found.wrong} {found.said}"
