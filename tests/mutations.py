@@ -308,8 +308,8 @@ FAULTS = {
     ),
     "energies-are-looked-at-in-their-values": Fault(
         "rodfem/problem/parameter_functions.py",
-        "    yield from first.values()\n    for x, y in combinations_with_replacement(symbols, 2):",
-        "    for x, y in []:",
+        "first.items())\n    for x, y in combinations_with_replacement(symbols, 2):",
+        "[])\n    for x, y in []:",
         "tests/diagram/test_functions_between_rows.py",
     ),
     "sweeps-have-no-rows-at-extrema": Fault(
@@ -344,7 +344,7 @@ FAULTS = {
     ),
     "functions-of-both-parameters-are-not-looked-at": Fault(
         "rodfem/problem/fast_plane.py",
-        "self.functions = list(parameter_functions(scene, names))",
+        "self.functions = [each for each in parameter_functions(scene, names) if each[1].joint]",
         "self.functions = list[tuple[str, ParameterFunction]]()",
         LOCI,
     ),
@@ -356,8 +356,8 @@ FAULTS = {
     ),
     "loci-say-nothing-of-what-is-too-fast": Fault(
         "rodfem/codim2/locus.py",
-        'said = [tracer.doubt, sharp, reasons.sentence if reasons else ""]',
-        'said = [sharp, reasons.sentence if reasons else ""]',
+        'said = [tracer.doubt, sharp, hidden, reasons.sentence if reasons else ""]',
+        'said = [sharp, hidden, reasons.sentence if reasons else ""]',
         LOCI,
     ),
     "changes-between-rows-are-not-looked-for": Fault(
@@ -581,7 +581,7 @@ FAULTS = {
     ),
     "peaks-of-the-load-are-looked-for-in-few-places": Fault(
         "rodfem/problem/fast_load.py",
-        "places = refined(expression.expression, symbol, places, max(size, TINY), fixed)",
+        "places = refined(expression.expression, symbol, places, max(size, numbers.least), fixed)",
         "places = places[::125]",
         "tests/diagram/test_load_steps.py",
     ),

@@ -23,6 +23,7 @@ from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.nonsmooth import Nonsmooth, Reasons
 from rodfem.fem.sharpness import inside_element, sharp_along
+from rodfem.fem.stiffnesses_at import StiffnessesAt
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.problem.jumps import unbroken
 
@@ -164,3 +165,25 @@ def blurred(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], row
             found += np.flatnonzero(nearest == row).tolist()
             said = said or f"At {plane.names[1]} = {values[plane.names[1]]:.6g}: {words}"
     return found, said
+
+
+def hidden_changes(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint]) -> str:
+    """Sentence on an energy that softens and stiffens again between two nodes, in state and parameters; or empty.
+
+    Other eigenvalues may vanish there that none of the nodes shows.
+
+    Parameters
+    ----------
+    solver, plane, nodes
+        What found the locus in a plane, and its points.
+    """
+    found = StiffnessesAt(solver.shape)([n.x for n in nodes], [plane.along(n.p, 0) for n in nodes])
+    for row, what in found.items():
+        a, b = (
+            ", ".join(f"{name} = {v:.6g}" for name, v in zip(plane.names, n.p, strict=True))
+            for n in nodes[row : row + 2]
+        )
+        return (
+            f"Between {a} and {b} the {what} stiffens or softens and changes back: the curve may be another one there."
+        )
+    return ""

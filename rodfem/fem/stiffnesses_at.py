@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.fem.parameters import Line
 from rodfem.fem.shape import Shape
 from rodfem.fem.state_along import StateAlong
 from rodfem.problem.pointwise import Places
@@ -26,10 +27,11 @@ class StiffnessesAt:
         self.shape = shape
         self.symbols, self.stiffnesses = stiffnesses(shape.system.scene)
 
-    def __call__(self, states: Sequence[PETSc.Vec]) -> dict[int, str]:
+    def __call__(self, states: Sequence[PETSc.Vec], lines: Sequence[Line] = ()) -> dict[int, str]:
         """Numbers of the states after which second derivatives are others than at that and at the next one.
 
-        With words for the function that has them.
+        With words for the function that has them.  Parameters are those of the system's line, or of one for each of the
+        ``states``, on which the system is left then.
         """
         found = dict[int, str]()
         if not self.stiffnesses or len(states) < 2:
@@ -37,13 +39,18 @@ class StiffnessesAt:
         block = max(1, AT_ONCE // (self.shape.system.fields.discretization.elements * len(PLACES)))
         for first in range(0, len(states) - 1, block):
             some = states[first : first + block + 1]
-            places = [StateAlong(self.shape, x, self.symbols)(PLACES) for x in some]
+            places = [self._places(x, lines[first + i] if lines else None) for i, x in enumerate(some)]
             for each in self.stiffnesses:
                 here = [self._of(each.s, at) for at in places]
                 a, b = _together(here[:-1]), _together(here[1:])
                 hidden = each.hidden(a, b).reshape(len(some) - 1, -1).any(axis=1)
                 found |= {first + int(i): each.what for i in np.flatnonzero(hidden)}
         return found
+
+    def _places(self, x: PETSc.Vec, line: Line | None) -> Places:
+        if line is not None:
+            self.shape.system.line = line
+        return StateAlong(self.shape, x, self.symbols)(PLACES)
 
     def _of(self, s: float | None, places: Places) -> Places:
         """All places, or the one at the arclength ``s``."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from rodfem.problem.enclosure import refined
 from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
-from rodfem.tolerances import ROUND_OFF, TINY
+from rodfem.tolerances import ROUND_OFF
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Point
@@ -48,6 +48,8 @@ TURNS = 100
 """Extrema of a component that are listed, at most."""
 Function = Callable[[np.ndarray], np.ndarray]
 """Components (n, m) for arguments (n,)."""
+Seen = tuple[np.ndarray, np.ndarray]
+"""Arguments in ascending order, (n,), and the components of a function there, (n, m)."""
 
 
 class FastLoad:
@@ -68,8 +70,9 @@ class FastLoad:
         turns = set[float]()
         for what, numbers in parameter_functions(scene, (name,), **values):
             places = _places(numbers, first, last)
-            turns |= _turns(places, numbers(places[:, None]))
-            worst = _halved(lambda t, f=numbers: f(t[:, None]), places, ends)  # type: ignore[misc]
+            seen = places, numbers(places[:, None])
+            turns |= _turns(*seen)
+            worst = _halved(lambda t, f=numbers: f(t[:, None]), seen, ends)  # type: ignore[misc]
             if worst and not self.doubt:
                 self.doubt = (
                     f"The {what} changes too fast with {name} about {name} = {worst[0]:.6g} to be followed "
@@ -104,12 +107,9 @@ class FastLoad:
         return float((away + self.high - self.low).min() / rate)
 
 
-def _halved(function: Function, seen: np.ndarray, ends: set[float]) -> list[float]:
-    """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not.
-
-    It is looked at where it has been ``seen``, in ascending order, from one end to the other.
-    """
-    first, last = float(seen[0]), float(seen[-1])
+def _halved(function: Function, seen: Seen, ends: set[float]) -> list[float]:
+    """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not."""
+    first, last = float(seen[0][0]), float(seen[0][-1])
     off, size = told(function, first, last, seen)
     if not np.any(off > POLYNOMIAL * size):  # nor where it is not defined, nan
         return []
@@ -133,7 +133,7 @@ def _halved(function: Function, seen: np.ndarray, ends: set[float]) -> list[floa
     return sorted(left)
 
 
-def told(function: Function, low: float, high: float, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def told(function: Function, low: float, high: float, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
     """How far a function is from a cubic, beyond round-off, and how much it varies, by component.
 
     Parameters
@@ -143,11 +143,12 @@ def told(function: Function, low: float, high: float, seen: np.ndarray) -> tuple
     low, high
         The ends of the range in which it is looked at.
     seen
-        Arguments, in ascending order, at which it is compared with the cubic besides.
+        Arguments at which it is compared with the cubic besides, and its components there.
     """
-    inside = seen[slice(*np.searchsorted(seen, [low, high], side="right"))]
+    some = slice(*np.searchsorted(seen[0], [low, high], side="right"))
+    inside = seen[0][some]
     known = function(low + KNOWN * (high - low))
-    asked = function(np.concatenate([low + ASKED * (high - low), inside]))
+    asked = np.vstack([function(low + ASKED * (high - low)), seen[1][some]])
     there = np.append(ASKED, (inside - low) / (high - low))
     cubic = np.vander(there, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
     values, off = np.vstack([known, asked]), abs(cubic - asked).max(axis=0)
@@ -161,7 +162,7 @@ def _places(numbers: ParameterFunction, first: float, last: float) -> np.ndarray
         symbol, fixed = numbers.symbols[0], {x: (value, 0.0) for x, value in numbers.fixed.items()}
         values = expression({symbol: places} | {x: np.full(len(places), value) for x, value in numbers.fixed.items()})
         size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
-        places = refined(expression.expression, symbol, places, max(size, TINY), fixed)
+        places = refined(expression.expression, symbol, places, max(size, numbers.least), fixed)
     return places
 
 

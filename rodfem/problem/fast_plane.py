@@ -15,7 +15,6 @@ from rodfem.problem.enclosure import refined
 from rodfem.problem.fast_load import CLOSE, told
 from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
 from rodfem.problem.values import Symbol
-from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -29,13 +28,14 @@ class FastPlane:
 
     def __init__(self, scene: Scene, names: tuple[str, str]) -> None:
         """List them; the parameters have these ``names``."""
-        self.functions = list(parameter_functions(scene, names))
+        self.functions = [each for each in parameter_functions(scene, names) if each[1].joint]
 
     def unfollowed(self, a: np.ndarray, b: np.ndarray) -> str:
         """Words for what no cubic tells between two points (2,) of the plane; empty where there is nothing."""
         for what, numbers in self.functions:
+            on_chord = lambda t, f=numbers: f(a + t[:, None] * (b - a))  # noqa: E731
             there = _places(numbers, a, b)
-            off, size = told(lambda t, f=numbers: f(a + t[:, None] * (b - a)), 0.0, 1.0, there)  # type: ignore[misc]
+            off, size = told(on_chord, 0.0, 1.0, (there, on_chord(there)))
             if np.any(off > CLOSE * size):
                 return what
         return ""
@@ -50,5 +50,5 @@ def _places(numbers: ParameterFunction, a: np.ndarray, b: np.ndarray) -> np.ndar
         size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
         lines = {x: (float(p), float(q - p)) for x, p, q in zip(numbers.symbols, a, b, strict=True)}
         lines |= {x: (value, 0.0) for x, value in numbers.fixed.items()}
-        places = refined(expression.expression, t, places, max(size, TINY), lines)
+        places = refined(expression.expression, t, places, max(size, numbers.least), lines)
     return places

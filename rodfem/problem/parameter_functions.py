@@ -7,12 +7,13 @@ its value one term hides another, and a constant hides both.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
+from ufl.classes import Zero
 from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem.errors import SceneError
@@ -22,10 +23,13 @@ from rodfem.problem.local_state import STATES, Constants, OfConstants, some_plac
 from rodfem.problem.pointwise import LocalState, pointwise
 from rodfem.problem.roles import functions_of
 from rodfem.problem.values import Symbol, Values, scalar
+from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
+LEAST = 1e-12
+"""Value of what is made of an energy, over the natural one, below which it is none."""
 ALONG = 33
 """Places along the rod, at equal distances, besides both sides of all breaks."""
 
@@ -33,8 +37,11 @@ ALONG = 33
 class ParameterFunction:
     """Numbers that depend on the parameters of some ``symbols``, by ``expressions`` of these and of ``fixed`` ones.
 
-    Those that are no polynomials of the parameters may be ``narrow`` peaks.
+    Those that are no polynomials of the parameters may be ``narrow`` peaks.  Values below the ``least`` one are none.
+    Of two parameters they are ``joint`` where they are no sum of a function of each.
     """
+
+    least = TINY
 
     def __init__(
         self, symbols: list[Symbol], expressions: list[Values], fixed: dict[Symbol, float] | None = None
@@ -42,6 +49,12 @@ class ParameterFunction:
         """Keep what the numbers are made of."""
         self.symbols, self.expressions, self.fixed = symbols, expressions, fixed or {}
         self.narrow = [of for of in expressions if not is_polynomial(of.expression, symbols)]
+
+    @cached_property
+    def joint(self) -> bool:
+        """Whether a mixed derivative does not vanish."""
+        x, y = self.symbols
+        return any(not isinstance(derivative(derivative(of.expression, x), y), Zero) for of in self.expressions)
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
         """Numbers (n, m) for ``places`` (n, number of parameters); nan for what is not defined."""
@@ -56,6 +69,7 @@ class Numerical(ParameterFunction):
     def __init__(self, function: OfConstants, known: dict[str, Any], names: tuple[str, ...]) -> None:
         """Call it with the ``known`` values but for the parameters with these ``names``."""
         super().__init__([Symbol() for _ in names], [])
+        self.joint = True
         self.function, self.known, self.names = function, known, names
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
@@ -131,18 +145,20 @@ def _of_states(
         varies = place.s is None and any(at.s in unique_pre_traversal(part) for part in parts)
         for s in _arclengths(scene) if varies else [_arclengths(scene)[0] if place.s is None else place.s]:
             for state in STATES:
-                yield place.what, ParameterFunction(symbols, expressions, {**fixed, **_at(scene, at, state, s)})
+                found = ParameterFunction(symbols, expressions, {**fixed, **_at(scene, at, state, s)})
+                found.least = LEAST * scene.units.energy
+                yield place.what, found
 
 
 def _derivatives(function: Any, at: LocalState) -> Iterator[Any]:
-    """A function, and its first and second derivatives."""
+    """A function, and its first and second derivatives, all in its own units."""
     yield function
     symbols = [symbol for symbol in at.units if symbol in unique_pre_traversal(function)]
     first = {symbol: scalar(derivative(function, symbol)) for symbol in symbols}
-    yield from first.values()
+    yield from (at.units[symbol] * part for symbol, part in first.items())
     for x, y in combinations_with_replacement(symbols, 2):
         if y in unique_pre_traversal(first[x]):
-            yield scalar(derivative(first[x], y))
+            yield at.units[x] * at.units[y] * scalar(derivative(first[x], y))
 
 
 def _asks(part: Any, symbols: list[Symbol]) -> bool:
