@@ -251,6 +251,8 @@ def locus(
     bounds: tuple[Interval, Interval],
     steps: StepControl = STEPS,
     error_bars: int = 5,
+    *,
+    doubtful: bool = False,
 ) -> Locus:
     """Follow a special point in the plane of the scene's load and a second parameter, to both sides.
 
@@ -269,6 +271,8 @@ def locus(
         Control of the step; lengths are relative to the bounds.
     error_bars
         At how many rows, besides the marked ones, the error of the discretisation is estimated; 0: at none.
+    doubtful
+        Whether the mesh leaves the index beside the special point open, so that it does not resolve the curve.
 
     Raises
     ------
@@ -300,6 +304,8 @@ def locus(
         crossings = _crossings(tracer, found, first, float(p[1]))
         errors = errors_of(solver, special.kind, plane, found.nodes, found.marks, error_bars)
         lower = _lower_side(solver, plane, special, first)
+        if doubtful or special.resolved is False:
+            errors = errors._replace(unresolved=list(range(len(found.nodes))))
         reasons = without_smoothness(solver, plane, found.nodes, errors.error)
         hidden = hidden_changes(solver, plane, found.nodes)
         rows, sharp = blurred(solver, plane, found.nodes, SHARP)
@@ -323,7 +329,6 @@ def _locus(
     """The curve that was found in a ``plane``, its names and bounds, with what a file of it says about the scene."""
     scene, nodes, (names, bounds) = solver.system.scene, found.nodes, plane
     rest, k = np.array([n.rest for n in nodes]), _changing(special, nodes[found.start])
-    unresolved = list(range(len(nodes))) if special.resolved is False else errors.unresolved
     load, other = (scene.parameters[name] for name in names)
     return Locus(
         scene=scene.name,
@@ -341,7 +346,7 @@ def _locus(
         omega2=np.array([n.omega2 for n in nodes]),
         located_to=np.array([n.located_to for n in nodes]),
         error=errors.error,
-        unresolved=unresolved,
+        unresolved=errors.unresolved,
         planar=bool(scene.planar),
         marks=[Mark(kind, row) for row, kind in sorted(found.marks.items())],
         start=found.start,

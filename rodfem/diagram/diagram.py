@@ -214,13 +214,24 @@ class Diagram:
         """
         from rodfem.codim2.locus import STEPS, locus
 
-        if not any(special is mine for branch in self.branches for mine in branch.special):
+        found = [branch for branch in self.branches if any(special is mine for mine in branch.special)]
+        if not found:
             raise InputError(
                 f"The special point at {self.scene.load} = {special.point.load:.8g} is not one of this diagram: give "
                 "one of diagram.special()."
             )
         low, high = sorted(load or self.span)
-        return locus(self.solvers[special.point.mesh], special, parameter, ((low, high), interval), steps or STEPS)
+        points = found[0].points
+        # beside an index that the mesh leaves open another eigenvalue may vanish with this one
+        beside = [points[max(i - 1, 0) : i + 2] for i, point in enumerate(points) if point is special.point]
+        return locus(
+            self.solvers[special.point.mesh],
+            special,
+            parameter,
+            ((low, high), interval),
+            steps or STEPS,
+            doubtful=any(point.undecided for some in beside for point in some),
+        )
 
     @checked(load=number(1.0), tries=count(24), seed=count(0))
     def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:

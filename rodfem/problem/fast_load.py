@@ -32,6 +32,8 @@ POLYNOMIAL = 1e-9
 """Difference, relative to the variation over the whole range, up to which a function is a cubic."""
 CLOSE = 0.005
 """Difference, relative to the variation over a piece, up to which a cubic tells a function there."""
+NOISE = 1e-12
+"""Difference in a component, over the largest one of its function, that is round-off."""
 SEEN = 501
 """Loads at which a function is looked at, at least."""
 PIECES = 4
@@ -71,8 +73,9 @@ class FastLoad:
         for what, numbers in parameter_functions(scene, (name,), **values):
             places = _places(numbers, first, last)
             seen = places, numbers(places[:, None])
-            turns |= _turns(*seen)
-            worst = _halved(lambda t, f=numbers: f(t[:, None]), seen, ends)  # type: ignore[misc]
+            least = max(numbers.least, NOISE * float(abs(seen[1][np.isfinite(seen[1])]).max(initial=0.0)))
+            turns |= _turns(*seen, least)
+            worst = _halved(lambda t, f=numbers: f(t[:, None]), seen, ends, least)  # type: ignore[misc]
             if worst and not self.doubt:
                 self.doubt = (
                     f"The {what} changes too fast with {name} about {name} = {worst[0]:.6g} to be followed "
@@ -107,11 +110,14 @@ class FastLoad:
         return float((away + self.high - self.low).min() / rate)
 
 
-def _halved(function: Function, seen: Seen, ends: set[float]) -> list[float]:
-    """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not."""
+def _halved(function: Function, seen: Seen, ends: set[float], least: float) -> list[float]:
+    """Add the ends of ranges in which cubics tell a ``function`` to the ``least`` difference that counts.
+
+    Return loads about which they do not.
+    """
     first, last = float(seen[0][0]), float(seen[0][-1])
     off, size = told(function, first, last, seen)
-    if not np.any(off > POLYNOMIAL * size):  # nor where it is not defined, nan
+    if not np.any(off > np.maximum(POLYNOMIAL * size, least)):  # nor where it is not defined, nan
         return []
     edges = np.linspace(first, last, PIECES + 1)
     size = np.maximum(size, np.ptp(function(edges), axis=0))
@@ -122,7 +128,7 @@ def _halved(function: Function, seen: Seen, ends: set[float]) -> list[float]:
     while todo:
         low, high, depth = todo.pop()
         off, varied = told(function, low, high, seen)
-        if not np.any(off > np.maximum(CLOSE * varied, POLYNOMIAL * size)):
+        if not np.any(off > np.maximum(CLOSE * varied, np.maximum(POLYNOMIAL * size, least))):
             continue
         if depth == DEEPEST:
             left += [(low + high) / 2] * bool(np.any(off > kink))
@@ -166,12 +172,15 @@ def _places(numbers: ParameterFunction, first: float, last: float) -> np.ndarray
     return places
 
 
-def _turns(places: np.ndarray, values: np.ndarray) -> set[float]:
-    """Where components (n, m) have extrema between the first and the last of the ``places`` (n,)."""
+def _turns(places: np.ndarray, values: np.ndarray, least: float) -> set[float]:
+    """Where components (n, m) have extrema between the first and the last of the ``places`` (n,).
+
+    Differences below the ``least`` one are none.
+    """
     found = set[float]()
     for y in values.T[:, np.isfinite(values).all(axis=1)] if np.isfinite(values).all() else []:
         steps = np.diff(y)
-        steps[abs(steps) <= POLYNOMIAL * np.ptp(y) + ROUND_OFF * abs(y).max()] = 0.0
+        steps[abs(steps) <= POLYNOMIAL * np.ptp(y) + ROUND_OFF * abs(y).max() + least] = 0.0
         moving = np.flatnonzero(steps)
         turned = np.flatnonzero(np.sign(steps[moving[1:]]) != np.sign(steps[moving[:-1]]))
         for i in turned[:TURNS]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rodfem.problem.enclosure import refined
-from rodfem.problem.fast_load import CLOSE, told
+from rodfem.problem.fast_load import CLOSE, NOISE, told
 from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
 from rodfem.problem.values import Symbol
 
@@ -35,8 +35,10 @@ class FastPlane:
         for what, numbers in self.functions:
             on_chord = lambda t, f=numbers: f(a + t[:, None] * (b - a))  # noqa: E731
             there = _places(numbers, a, b)
-            off, size = told(on_chord, 0.0, 1.0, (there, on_chord(there)))
-            if np.any(off > CLOSE * size):
+            seen = on_chord(there)
+            off, size = told(on_chord, 0.0, 1.0, (there, seen))
+            largest = float(abs(seen[np.isfinite(seen)]).max(initial=0.0))
+            if np.any(off > np.maximum(CLOSE * size, max(numbers.least, NOISE * largest))):
                 return what
         return ""
 
