@@ -44,6 +44,8 @@ STEEP = 40.0
 """Difference on the smallest ranges, over their part of the variation over the whole one, up to which it is a kink."""
 DISTINCT = 1e-6
 """Distance of two loads, over the range, from which on they are two."""
+WINDOW, SHARP = 0.01, 0.01
+"""Distance from an extremum, over the range, and how much values change there, over that at the extremum."""
 ASIDE = 1e-7
 """Distance of a load from an extremum, over the range."""
 TURNS = 100
@@ -175,9 +177,9 @@ def _places(numbers: ParameterFunction, first: float, last: float) -> np.ndarray
 def _turns(places: np.ndarray, values: np.ndarray, least: float) -> set[float]:
     """Where components (n, m) have extrema between the first and the last of the ``places`` (n,).
 
-    Differences below the ``least`` one are none.
+    Differences below the ``least`` one are none.  Where values hardly change beside it the rows of a sweep tell.
     """
-    found = set[float]()
+    found, width = set[float](), float(places[-1] - places[0])
     for y in values.T[:, np.isfinite(values).all(axis=1)] if np.isfinite(values).all() else []:
         steps = np.diff(y)
         steps[abs(steps) <= POLYNOMIAL * np.ptp(y) + ROUND_OFF * abs(y).max() + least] = 0.0
@@ -185,7 +187,10 @@ def _turns(places: np.ndarray, values: np.ndarray, least: float) -> set[float]:
         turned = np.flatnonzero(np.sign(steps[moving[1:]]) != np.sign(steps[moving[:-1]]))
         for i in turned[:TURNS]:
             some = slice(max(int(moving[i]) - 1, 0), int(moving[i + 1]) + 3)
-            found.add(_vertex(places[some], y[some]))
+            turn = _vertex(places[some], y[some])
+            away = np.interp([turn - WINDOW * width, turn, turn + WINDOW * width], places, y)
+            if abs(away - away[1]).max() > SHARP * abs(away[1]):
+                found.add(turn)
     return found
 
 
