@@ -219,22 +219,26 @@ class Tracer:
     def _between(self, half: Half, history: list[LocusPoint], node: LocusPoint) -> str:
         """Insert what lies between the last node of a history and the next one; a reason if the curve ends there."""
         last, before = history[-1], history[-2] if len(history) > 1 else None
+        nodes, marks, count = list[LocusPoint](), dict[int, str](), len(half.nodes)
+        ended = ""
         for stop in (*self._turns(last, node), node):
             rows, ended = self.points.between(last, stop, before)
             for row, kind in rows:
                 if kind:
-                    half.marks[len(half.nodes)] = kind
-                half.nodes.append(row)
+                    marks[count + len(nodes)] = kind
+                nodes.append(row)
             if ended:
-                return ended
+                break
             if last.rest != stop.rest:
-                half.marks[len(half.nodes)] = self.criterion.others
+                marks[count + len(nodes)] = self.criterion.others
             elif last.orientation != stop.orientation:
-                half.marks[len(half.nodes)] = CROSSES
+                marks[count + len(nodes)] = CROSSES
             if stop is not node:
-                half.nodes.append(stop)
+                nodes.append(stop)
             last, before = stop, last
-        return ""
+        half.nodes += nodes  # all at once: a step that fails half-way is tried again
+        half.marks |= marks
+        return ended
 
     def _turns(self, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
         """Points between two nodes where a function of a parameter has an extremum: other eigenvalues may, too."""

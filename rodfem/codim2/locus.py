@@ -21,7 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.codim2.curve import Half, Tracer
-from rodfem.codim2.locus_errors import Errors, blurred, criterion_of, errors_of, hidden_changes, without_smoothness
+from rodfem.codim2.locus_errors import Errors, criterion_of, errors_of, hidden_changes, sharp_rows, without_smoothness
 from rodfem.codim2.others import unstable
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import null_vectors
@@ -308,7 +308,7 @@ def locus(
             errors = errors._replace(unresolved=list(range(len(found.nodes))))
         reasons = without_smoothness(solver, plane, found.nodes, errors.error)
         hidden = hidden_changes(solver, plane, found.nodes)
-        rows, sharp = blurred(solver, plane, found.nodes, SHARP)
+        rows, sharp = sharp_rows(solver, plane, found.nodes, SHARP)
         errors.error[rows] = np.nan
         errors = errors._replace(unresolved=sorted({*errors.unresolved, *rows}))
     located = _locus(solver, special, (plane.names, bounds), found, crossings, errors, lower)

@@ -137,7 +137,7 @@ def without_smoothness(solver: StaticSolver, plane: Plane, nodes: Sequence[Locus
     return reasons
 
 
-def blurred(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], rows: int) -> tuple[list[int], str]:
+def sharp_rows(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], rows: int) -> tuple[list[int], str]:
     """Numbers of the nodes at whose parameters something changes too steeply along the rod, and a sentence on it.
 
     It is looked at for so many ``rows``, at about equal distances, each for those that it is nearest to; of the scene's

@@ -67,6 +67,7 @@ class Convexity:
         points = np.array([0.0, *inside, 1.0])
         if self.varies:
             points = np.append(points, np.linspace(0.0, 1.0, GRID))
+        self.places = len(points)
         vector = with_constants(ufl.as_vector(entries), f.mesh)
         self.evaluate = form_compiler.expression(vector, points.reshape(-1, 1), f.mesh, f.owned_cells)
 
@@ -118,8 +119,7 @@ class Convexity:
 
     def _by_element(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives by element of this rank and place on it, (cells, places, size, size)."""
-        matrices = self._matrices(x)
-        return matrices.reshape(self.system.fields.owned_cells, -1, self.size, self.size)
+        return self._matrices(x).reshape(self.system.fields.owned_cells, self.places, self.size, self.size)
 
     def _matrices(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives at all places of this rank, symmetric, (places, size, size)."""
