@@ -43,9 +43,10 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
         return where, f"comes to a kink of the {after.kink}" if after.kink else f"leaves a kink of the {one.kink}"
     if UNDECIDED in (one.kind, after.kind):
         return where, "has an eigenvalue that is not told from zero on one side"
-    if one.kind == STABLE:
-        return where, "loses its stability against motions out of the plane (without planar it is located)"
-    return where, "changes its stability against motions out of the plane"
+    verb = "loses" if one.kind == STABLE else "changes"
+    if one.in_space is None or after.in_space is None or (one.least, one.most) != (after.least, after.most):
+        return where, f"{verb} its stability, and no special point says why"
+    return where, f"{verb} its stability against motions out of the plane (without planar it is located)"
 
 
 def _event(special: Mapping[str, Any], branch: Mapping[str, Any], branches: Branches) -> str:

@@ -113,6 +113,15 @@ def test_stable_in_the_plane_only() -> None:
     assert "stable in its plane (not examined in space), by the frequencies found, on" in words
 
 
+def test_a_change_that_no_special_point_explains() -> None:
+    """Of a rod in space, and of a planar one whose index in its plane changes, it is none out of a plane."""
+    words = said(branch("straight", [0.0, 1.0, 2.0, 4.0], [0, 0, 1, 1]))
+    assert "loses its stability, and no special point says why" in words
+    rod = classics.planar_column()
+    columns = branch("straight", [0.0, 1.0, 2.0, 4.0], [0, 0, 1, 1], columns={"negative_in_space": [0, 0, 1, 1]})
+    assert "loses its stability, and no special point says why" in said(columns, planar=rod.planar)
+
+
 def test_divergence_is_named() -> None:
     found = special("divergence", 1, 2.0, 0, 1)
     words = said(branch("straight", [0.0, 2.0, 4.0], [0, 0, 1], columns={"omega2": []}, special=[found]))
