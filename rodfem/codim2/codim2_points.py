@@ -148,7 +148,7 @@ class Codim2Points:
         """Points between two nodes at which a parameter has an extremum."""
         names, found = self.plane.names, list[Row]()
         flat = np.minimum(abs(a.dp), abs(b.dp)) <= FLAT * self.plane.width
-        for i in np.flatnonzero((a.dp * b.dp < 0) & ~flat):
+        for i in np.flatnonzero((a.dp * b.dp < 0) & ~flat & _changes(a, b)):
             turn = self._located(a, b, lambda n, i=i: float(n.dp[i]), f"turns in {names[i]}")  # type: ignore[misc]
             sought = Sought(lambda n, i=i: float(n.p[i]), stationary=True)  # type: ignore[misc]
             found += [(self._placed(n, sought), kind) for n, kind in turn if _moves(n, a, b, i)]
@@ -285,7 +285,7 @@ def _extrema(a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> list[tu
         s = _vertex(tuple(n.s for n in nodes), tuple(n.curvature for n in nodes))
         if s is not None and a.s < s < b.s:
             found.append((s, lambda n: n.curvature))
-    for i in np.flatnonzero(a.dp * b.dp > 0):
+    for i in np.flatnonzero((a.dp * b.dp > 0) & _changes(a, b)):
         chord = (b.p[i] - a.p[i]) / (b.s - a.s)
         if np.sign(a.dp[i]) * (3 * chord - (a.dp[i] + b.dp[i]) / 2) < min(abs(a.dp[i]), abs(b.dp[i])):
             found.append(((a.s + b.s) / 2, lambda n, i=i: float(n.dp[i])))  # type: ignore[misc]
@@ -298,6 +298,12 @@ def _vertex(s: Sequence[float], values: Sequence[float]) -> float | None:
     if second * values[1] <= 0:
         return None
     return float(s[1] - first / (2 * second))
+
+
+def _changes(a: LocusPoint, b: LocusPoint) -> np.ndarray:
+    """Whether each parameter (2,) may change between two nodes by more than its uncertainty: else nothing is sought."""
+    most = np.maximum(abs(a.dp), abs(b.dp)) * (b.s - a.s)
+    return np.asarray(most > CERTAIN * np.minimum(a.located_to, b.located_to))
 
 
 def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:
