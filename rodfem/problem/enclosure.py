@@ -28,12 +28,15 @@ KNOWN = 1e-12
 """Integral of a function that is not looked for on a piece, over its largest value times the length of the rod."""
 MOST = 200_000
 """Places that are added: of what varies everywhere on so small a scale the elements say more."""
+AT_ONCE = 1_000_000
+"""The same of several functions, over their number: a part of them needs fewer."""
 ROUND_OFF = 4 * float(np.finfo(float).eps)
 """Length of a piece that is not halved, over the largest arclength."""
 NARROWEST = 2.0**-13
 """Length of a piece of a line between two places that is not halved, over that of the line."""
 SPLIT = 0.4993
 """Part of a piece to one side of the place that divides it: no simple fraction of the rod is such a place."""
+Number = float | np.ndarray
 ONE, ANY = number(1.0), Interval(np.asarray(-inf), np.asarray(inf))
 
 
@@ -55,7 +58,11 @@ class Answer(NamedTuple):
 
 
 def refined(
-    expression: Any, s: Symbol, places: np.ndarray, size: float, others: dict[Symbol, tuple[float, float]] | None = None
+    expression: Any,
+    s: Symbol,
+    places: np.ndarray,
+    size: float | np.ndarray,
+    others: dict[Symbol, tuple[Number, Number]] | None = None,
 ) -> np.ndarray:
     """Places, with those that a scalar ``expression`` needs besides to be known between them, in ascending order.
 
@@ -66,23 +73,25 @@ def refined(
     places
         Arclengths from one end of the rod to the other, of shape (n,).
     size
-        Largest value of the expression at them.
+        Largest value of the expression at them; of several functions, of which each needs its places, of shape (k, 1).
     others
-        Symbols besides that are linear in ``s``, each with its value at zero and its slope.
+        Symbols besides that are linear in ``s``, each with its value at zero and its slope: numbers, or of that shape.
     """
     nodes = list(unique_post_traversal(scalar(expression)))
     a, b = float(places[0]), float(places[-1])
     ends = np.unique([*places[:: max(1, len(places) // PIECES)], b])
-    low, high, found, number_of = ends[:-1], ends[1:], [places], 0
-    while len(low) and number_of < MOST:
+    low, high, found, number_of, functions = ends[:-1], ends[1:], [places], 0, np.size(size)
+    while len(low) and number_of < MOST and number_of * functions < AT_ONCE:
         try:
             pieces = Interval(low, high)
             lines = {x: Jet(number(p) + number(d) * pieces, number(d)) for x, (p, d) in (others or {}).items()}
-            slope = _jet(nodes, {s: Jet(pieces, ONE), **lines}, low.shape).slope
+            shape = np.broadcast_shapes(low.shape, np.shape(size))
+            slope = _jet(nodes, {s: Jet(pieces, ONE), **lines}, shape).slope
         except NotImplementedError:  # a function without bounds, as those of Bessel
             return places
         length = high - low
         told = slope.high - slope.low <= 2 * KNOWN * size * (b - a) / length**2
+        told = told.reshape(-1, len(low)).all(axis=0)
         wide = ~told & (length > ROUND_OFF * max(abs(a), abs(b)))
         low, high, length = low[wide], high[wide], length[wide]
         middle = low + SPLIT * length

@@ -9,14 +9,14 @@ without such bounds, one that compares the load in Python, a peak between :data:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rodfem.problem.enclosure import refined
+from rodfem.problem.enclosure import AT_ONCE
 from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
 from rodfem.tolerances import ROUND_OFF
 
@@ -73,16 +73,16 @@ class FastLoad:
         self.doubt, ends, name = "", {first, last}, name or scene.load
         turns = set[float]()
         for what, numbers in parameter_functions(scene, (name,), **values):
-            places = _places(numbers, first, last)
-            seen = places, numbers(places[:, None])
-            least = max(numbers.least, NOISE * float(abs(seen[1][np.isfinite(seen[1])]).max(initial=0.0)))
-            turns |= _turns(*seen, least)
-            worst = _halved(lambda t, f=numbers: f(t[:, None]), seen, ends, least)  # type: ignore[misc]
-            if worst and not self.doubt:
-                self.doubt = (
-                    f"The {what} changes too fast with {name} about {name} = {worst[0]:.6g} to be followed "
-                    "in steps, or jumps there: special points may be missing; let the range end before it."
-                )
+            for each, places in _looked_at(numbers, np.linspace(first, last, SEEN)):
+                seen = places, each(places[:, None])
+                least = np.maximum(each.least, NOISE * each.sizes(seen[1]))
+                turns |= _turns(*seen, least)
+                worst = _halved(lambda t, f=each: f(t[:, None]), seen, ends, least)  # type: ignore[misc]
+                if worst and not self.doubt:
+                    self.doubt = (
+                        f"The {what} changes too fast with {name} about {name} = {worst[0]:.6g} to be followed "
+                        "in steps, or jumps there: special points may be missing; let the range end before it."
+                    )
         loads = np.array(sorted(ends) if len(ends) > 2 else [])
         self.low, self.high = loads[:-1], loads[1:]
         self.turns, self.width = sorted(turns), last - first
@@ -112,8 +112,8 @@ class FastLoad:
         return float((away + self.high - self.low).min() / rate)
 
 
-def _halved(function: Function, seen: Seen, ends: set[float], least: float) -> list[float]:
-    """Add the ends of ranges in which cubics tell a ``function`` to the ``least`` difference that counts.
+def _halved(function: Function, seen: Seen, ends: set[float], least: np.ndarray) -> list[float]:
+    """Add the ends of ranges in which cubics tell a ``function`` to the ``least`` differences that count, (m,).
 
     Return loads about which they do not.
     """
@@ -163,26 +163,30 @@ def told(function: Function, low: float, high: float, seen: Seen) -> tuple[np.nd
     return np.maximum(off - ROUND_OFF * abs(values).max(axis=0), 0.0), np.ptp(values, axis=0)
 
 
-def _places(numbers: ParameterFunction, first: float, last: float) -> np.ndarray:
-    """Values of one parameter at which numbers have to be looked at."""
-    places = np.linspace(first, last, SEEN)
-    for expression in numbers.narrow:
-        symbol, fixed = numbers.symbols[0], {x: (value, 0.0) for x, value in numbers.fixed.items()}
-        values = expression({symbol: places} | {x: np.full(len(places), value) for x, value in numbers.fixed.items()})
-        size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
-        places = refined(expression.expression, symbol, places, max(size, numbers.least), fixed)
-    return places
+def _looked_at(numbers: ParameterFunction, seen: np.ndarray) -> Iterator[tuple[ParameterFunction, np.ndarray]]:
+    """Numbers of one parameter, and values of it at which they have to be looked at, with those in ``seen``.
+
+    Those of all states at once, but where these would be too many.
+    """
+    places = numbers.places(seen, np.zeros(1), np.ones(1))
+    if numbers.states > 1 and len(places) * numbers.states > AT_ONCE // 2:
+        for half in numbers.halves():
+            yield from _looked_at(half, seen)
+    else:
+        yield numbers, places
 
 
-def _turns(places: np.ndarray, values: np.ndarray, least: float) -> set[float]:
+def _turns(places: np.ndarray, values: np.ndarray, least: np.ndarray) -> set[float]:
     """Where components (n, m) have extrema between the first and the last of the ``places`` (n,).
 
-    Differences below the ``least`` one are none.  Where values hardly change beside it the rows of a sweep tell.
+    Differences below the ``least`` of a component (m,) are none.  Where values hardly change beside it the rows of a
+    sweep tell.
     """
     found, width = set[float](), float(places[-1] - places[0])
-    for y in values.T[:, np.isfinite(values).all(axis=1)] if np.isfinite(values).all() else []:
+    defined = np.isfinite(values).all(axis=0)
+    for y, lost in zip(values.T[defined], least[defined], strict=True):
         steps = np.diff(y)
-        steps[abs(steps) <= POLYNOMIAL * np.ptp(y) + ROUND_OFF * abs(y).max() + least] = 0.0
+        steps[abs(steps) <= POLYNOMIAL * np.ptp(y) + ROUND_OFF * abs(y).max() + lost] = 0.0
         moving = np.flatnonzero(steps)
         turned = np.flatnonzero(np.sign(steps[moving[1:]]) != np.sign(steps[moving[:-1]]))
         for i in turned[:TURNS]:

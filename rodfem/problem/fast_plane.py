@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rodfem.problem.enclosure import refined
 from rodfem.problem.fast_load import CLOSE, NOISE, told
-from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
-from rodfem.problem.values import Symbol
+from rodfem.problem.parameter_functions import parameter_functions
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -34,23 +32,10 @@ class FastPlane:
         """Words for what no cubic tells between two points (2,) of the plane; empty where there is nothing."""
         for what, numbers in self.functions:
             on_chord = lambda t, f=numbers: f(a + t[:, None] * (b - a))  # noqa: E731
-            there = _places(numbers, a, b)
+            there = numbers.places(SEEN, a, b)
             seen = on_chord(there)
             off, size = told(on_chord, 0.0, 1.0, (there, seen))
-            largest = float(abs(seen[np.isfinite(seen)]).max(initial=0.0))
-            if np.any(off > np.maximum(CLOSE * size, max(numbers.least, NOISE * largest))):
+            least = np.maximum(numbers.least, NOISE * numbers.sizes(seen))
+            if np.any(off > np.maximum(CLOSE * size, least)):
                 return what
         return ""
-
-
-def _places(numbers: ParameterFunction, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Where on the chord from ``a`` to ``b`` numbers have to be looked at."""
-    places, t = SEEN, Symbol()
-    for expression in numbers.narrow:
-        at = dict(zip(numbers.symbols, (a + places[:, None] * (b - a)).T, strict=True))
-        values = expression(at | {x: np.full(len(places), value) for x, value in numbers.fixed.items()})
-        size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
-        lines = {x: (float(p), float(q - p)) for x, p, q in zip(numbers.symbols, a, b, strict=True)}
-        lines |= {x: (value, 0.0) for x, value in numbers.fixed.items()}
-        places = refined(expression.expression, t, places, max(size, numbers.least), lines)
-    return places

@@ -24,8 +24,15 @@ class Interval:
     low: np.ndarray
     high: np.ndarray
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether these are zero, everywhere, as slopes of constants are."""
+        return self.low is self.high and self.low.ndim == 0 and not self.low
+
     def __add__(self, other: Interval) -> Interval:
         """Sums of numbers in either."""
+        if self.is_zero or other.is_zero:
+            return other if self.is_zero else self
         return bounds(self.low + other.low, self.high + other.high)
 
     def __neg__(self) -> Interval:
@@ -34,7 +41,12 @@ class Interval:
 
     def __mul__(self, other: Interval) -> Interval:
         """Products of numbers in either; zero times what has no bounds is zero."""
-        products = [a * b for a in (self.low, self.high) for b in (other.low, other.high)]
+        if self.is_zero or other.is_zero:
+            return number(0.0)
+        ends = [
+            {id(x): x for x in (each.low, each.high)}.values() for each in (self, other)
+        ]  # of a number there is one
+        products = [a * b for a in ends[0] for b in ends[1]]
         products = [np.where(np.isnan(p), 0.0, p) for p in products]
         return bounds(reduce(np.minimum, products), reduce(np.maximum, products))
 
@@ -90,9 +102,10 @@ class Interval:
         return np.asarray(~(turns < 0))
 
 
-def number(value: float) -> Interval:
-    """One ``value``."""
-    return Interval(np.asarray(float(value)), np.asarray(float(value)))
+def number(value: float | np.ndarray) -> Interval:
+    """One ``value``, or one of each in an array."""
+    exact = np.asarray(value, dtype=float)
+    return Interval(exact, exact)
 
 
 def bounds(low: np.ndarray, high: np.ndarray, least: float = -inf, most: float = inf) -> Interval:

@@ -7,6 +7,7 @@ its value one term hides another, and a constant hides both.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from ufl.classes import Zero
 from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem.errors import SceneError
+from rodfem.problem.enclosure import refined
 from rodfem.problem.gradients import derivative, is_polynomial
 from rodfem.problem.kinds import plain
 from rodfem.problem.local_state import STATES, Constants, OfConstants, some_places, watched
@@ -34,9 +36,31 @@ ALONG = 33
 """Places along the rod, at equal distances, besides both sides of all breaks."""
 
 
+@dataclass
+class Part:
+    """An expression by its ``values``, where it has the same ones in several states that ``fixed`` symbols tell apart.
+
+    ``state`` (k,) has the number of the first of each ``group`` of such states, which is (number of states,).
+    """
+
+    values: Values
+    state: np.ndarray
+    group: np.ndarray
+
+    @classmethod
+    def of(cls, values: Values, fixed: dict[Symbol, np.ndarray], states: int) -> Part:
+        """Tell states apart by those symbols that the expression has."""
+        asked = [each for symbol, each in fixed.items() if symbol in values.symbols]
+        if not asked:
+            return cls(values, np.zeros(1, dtype=int), np.zeros(states, dtype=int))
+        _, state, group = np.unique(np.array(asked).T, axis=0, return_index=True, return_inverse=True)
+        return cls(values, state, group.ravel())
+
+
 class ParameterFunction:
     """Numbers that depend on the parameters of some ``symbols``, by ``expressions`` of these and of ``fixed`` ones.
 
+    Each expression is a number in each of as many ``states`` as the fixed symbols have values, where they differ.
     Those that are no polynomials of the parameters may be ``narrow`` peaks.  Values below the ``least`` one are none.
     Of two parameters they are ``joint`` where they are no sum of a function of each.
     """
@@ -44,11 +68,13 @@ class ParameterFunction:
     least = TINY
 
     def __init__(
-        self, symbols: list[Symbol], expressions: list[Values], fixed: dict[Symbol, float] | None = None
+        self, symbols: list[Symbol], expressions: list[Values], fixed: dict[Symbol, np.ndarray] | None = None
     ) -> None:
         """Keep what the numbers are made of."""
         self.symbols, self.expressions, self.fixed = symbols, expressions, fixed or {}
-        self.narrow = [of for of in expressions if not is_polynomial(of.expression, symbols)]
+        self.states = min((len(values) for values in self.fixed.values()), default=1)
+        self.parts = [Part.of(values, self.fixed, self.states) for values in expressions]
+        self.narrow = [part for part in self.parts if not is_polynomial(part.values.expression, symbols)]
 
     @cached_property
     def joint(self) -> bool:
@@ -58,9 +84,48 @@ class ParameterFunction:
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
         """Numbers (n, m) for ``places`` (n, number of parameters); nan for what is not defined."""
-        at = dict(zip(self.symbols, places.T, strict=True))
-        at |= {symbol: np.full(len(places), value) for symbol, value in self.fixed.items()}
-        return np.stack([values(at) for values in self.expressions], axis=1)
+        return np.concatenate([self._of(part, places) for part in self.parts], axis=1)
+
+    def _of(self, part: Part, places: np.ndarray) -> np.ndarray:
+        """Numbers (n, k) of one expression."""
+        at = {symbol: np.repeat(x, len(part.state)) for symbol, x in zip(self.symbols, places.T, strict=True)}
+        at |= {symbol: np.tile(each[part.state], len(places)) for symbol, each in self.fixed.items()}
+        return part.values(at).reshape(len(places), len(part.state))
+
+    def sizes(self, numbers: np.ndarray) -> np.ndarray:
+        """Of each of some ``numbers`` (n, m) the largest one in its state, of any expression: (m,).
+
+        That of the least such state, where a number is that of several.
+        """
+        ends = np.cumsum([len(part.state) for part in self.parts])[:-1]
+        each = zip(self.parts, np.split(_largest(numbers), ends), strict=True)
+        sizes, found = np.max([of[part.group] for part, of in each], axis=0), list[np.ndarray]()
+        for part in self.parts:
+            found.append(np.full(len(part.state), np.inf))
+            np.minimum.at(found[-1], part.group, sizes)
+        return np.concatenate(found)
+
+    def places(self, seen: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Where on the line of parameters ``a + t (b - a)`` numbers have to be looked at: ``t`` (n,), ascending.
+
+        Those in ``seen`` are among them; ``a`` and ``b`` are of shape (number of parameters,).
+        """
+        places, t = seen, Symbol()
+        lines = {symbol: (float(p), float(q - p)) for symbol, p, q in zip(self.symbols, a, b, strict=True)}
+        for part in self.narrow:
+            size = np.maximum(_largest(self._of(part, a + places[:, None] * (b - a))), self.least)
+            fixed = {symbol: (each[part.state, None], 0.0) for symbol, each in self.fixed.items()}
+            places = refined(part.values.expression, t, places, size[:, None], {**fixed, **lines})
+        return places
+
+    def halves(self) -> list[ParameterFunction]:
+        """The same in one half of the states, and in the other."""
+        found, half = list[ParameterFunction](), self.states // 2
+        for some in (slice(half), slice(half, None)):
+            fixed = {symbol: each[some] for symbol, each in self.fixed.items()}
+            found.append(ParameterFunction(self.symbols, self.expressions, fixed))
+            found[-1].least = self.least
+        return found
 
 
 class Numerical(ParameterFunction):
@@ -77,6 +142,10 @@ class Numerical(ParameterFunction):
         rows = [self._at(place) for place in places.tolist()]
         wide = max(map(len, rows), default=1)
         return np.array([row if len(row) == wide else [float("nan")] * wide for row in rows])
+
+    def sizes(self, numbers: np.ndarray) -> np.ndarray:
+        """Of each of some ``numbers`` (n, m) the largest one of them all: (m,)."""
+        return np.full(numbers.shape[1], _largest(numbers).max(initial=0.0))
 
     def _at(self, place: list[float]) -> list[float]:
         try:
@@ -143,11 +212,13 @@ def _of_states(
         if not parts:
             continue
         varies = place.s is None and any(at.s in unique_pre_traversal(part) for part in parts)
-        for s in _arclengths(scene) if varies else [_arclengths(scene)[0] if place.s is None else place.s]:
-            for state in STATES:
-                found = ParameterFunction(symbols, expressions, {**fixed, **_at(scene, at, state, s)})
-                found.least = LEAST * scene.units.energy
-                yield place.what, found
+        arclengths = _arclengths(scene) if varies else [_arclengths(scene)[0] if place.s is None else place.s]
+        points = [_at(scene, at, state, s) for s in arclengths for state in STATES]
+        every = {symbol: np.full(len(points), value) for symbol, value in fixed.items()}
+        every |= {symbol: np.array([point[symbol] for point in points]) for symbol in points[0]}
+        found = ParameterFunction(symbols, expressions, every)
+        found.least = LEAST * scene.units.energy
+        yield place.what, found
 
 
 def _derivatives(function: Any, at: LocalState) -> Iterator[Any]:
@@ -197,6 +268,11 @@ def _arclengths(scene: Scene) -> list[float]:
     a, b = scene.interval
     inside = np.linspace(a, b, ALONG + 2)[1:-1].tolist()
     return [*inside, *scene.samples()]
+
+
+def _largest(numbers: np.ndarray) -> np.ndarray:
+    """Largest size of the ``numbers`` (n, m) that are defined, in each column; zero without one."""
+    return np.asarray(np.where(np.isfinite(numbers), abs(numbers), 0.0).max(axis=0, initial=0.0))
 
 
 def _number(value: object) -> float:
