@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rodfem.problem.fast_load import CLOSE, NOISE, told
-from rodfem.problem.parameter_functions import parameter_functions
+from rodfem.problem.parameter_functions import ParameterFunction, parameter_functions
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -31,11 +31,16 @@ class FastPlane:
     def unfollowed(self, a: np.ndarray, b: np.ndarray) -> str:
         """Words for what no cubic tells between two points (2,) of the plane; empty where there is nothing."""
         for what, numbers in self.functions:
-            on_chord = lambda t, f=numbers: f(a + t[:, None] * (b - a))  # noqa: E731
-            there = numbers.places(SEEN, a, b)
-            seen = on_chord(there)
-            off, size = told(on_chord, 0.0, 1.0, (there, seen))
-            least = np.maximum(numbers.least, NOISE * numbers.sizes(seen))
-            if np.any(off > np.maximum(CLOSE * size, least)):
+            if not self._told(numbers, a, b, SEEN) or not self._told(numbers, a, b, numbers.places(SEEN, a, b)):
                 return what
         return ""
+
+    def _told(self, numbers: ParameterFunction, a: np.ndarray, b: np.ndarray, there: np.ndarray) -> bool:
+        """Whether a cubic tells numbers on a chord, as far as places of it ``there`` show."""
+
+        def on_chord(t: np.ndarray) -> np.ndarray:
+            return numbers(a + t[:, None] * (b - a))
+
+        seen = on_chord(there)
+        off, size = told(on_chord, 0.0, 1.0, (there, seen))
+        return not np.any(off > np.maximum(CLOSE * size, np.maximum(numbers.least, NOISE * numbers.sizes(seen))))
