@@ -10,7 +10,6 @@ without such bounds, one that compares the load in Python, a peak between :data:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -117,50 +116,60 @@ def _halved(function: Function, seen: Seen, ends: set[float], least: np.ndarray)
 
     Return loads about which they do not.
     """
-    first, last = float(seen[0][0]), float(seen[0][-1])
-    off, size = told(function, first, last, seen)
+    first, last = seen[0][[0, -1]]
+    off, size = told(function, np.array([first]), np.array([last]), seen)
     if not np.any(off > np.maximum(POLYNOMIAL * size, least)):  # nor where it is not defined, nan
         return []
     edges = np.linspace(first, last, PIECES + 1)
-    size = np.maximum(size, np.ptp(function(edges), axis=0))
+    size = np.maximum(size[0], np.ptp(function(edges), axis=0))
     kink = STEEP * size / (PIECES * 2**DEEPEST)
-    todo = [(low, high, 0) for low, high in pairwise(edges.tolist())]
-    left = []
+    least = np.maximum(POLYNOMIAL * size, least)
+    low, high = edges[:-1], edges[1:]
     ends |= set(edges.tolist())
-    while todo:
-        low, high, depth = todo.pop()
-        off, varied = told(function, low, high, seen)
-        if not np.any(off > np.maximum(CLOSE * varied, np.maximum(POLYNOMIAL * size, least))):
-            continue
-        if depth == DEEPEST:
-            left += [(low + high) / 2] * bool(np.any(off > kink))
-        else:
-            middle = (low + high) / 2
-            ends.add(middle)
-            todo += [(low, middle, depth + 1), (middle, high, depth + 1)]
-    return sorted(left)
+    for depth in range(DEEPEST + 1):
+        untold, broken = np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
+        block = max(1, AT_ONCE // (len(least) * (len(KNOWN) + len(ASKED))))
+        for some in (slice(i, i + block) for i in range(0, len(low), block)):
+            off, varied = told(function, low[some], high[some], seen)
+            untold[some] = np.any(off > np.maximum(CLOSE * varied, least), axis=1)
+            broken[some] = untold[some] & np.any(off > kink, axis=1)
+        low, high, middle = low[untold], high[untold], (low + high)[untold] / 2
+        if depth < DEEPEST:
+            ends |= set(middle.tolist())
+            low, high = (np.stack(both, axis=1).ravel() for both in ((low, middle), (middle, high)))
+    return middle[broken[untold]].tolist()
 
 
-def told(function: Function, low: float, high: float, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
-    """How far a function is from a cubic, beyond round-off, and how much it varies, by component.
+def told(function: Function, low: np.ndarray, high: np.ndarray, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
+    """How far a function is from a cubic, beyond round-off, and how much it varies, by range and component: (p, m).
 
     Parameters
     ----------
     function
         Returns the components (n, m) for arguments (n,).
     low, high
-        The ends of the range in which it is looked at.
+        The ends (p,) of the ranges in which it is looked at, in ascending order.
     seen
         Arguments at which it is compared with the cubic besides, and its components there.
     """
-    some = slice(*np.searchsorted(seen[0], [low, high], side="right"))
-    inside = seen[0][some]
-    known = function(low + KNOWN * (high - low))
-    asked = np.vstack([function(low + ASKED * (high - low)), seen[1][some]])
-    there = np.append(ASKED, (inside - low) / (high - low))
-    cubic = np.vander(there, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
-    values, off = np.vstack([known, asked]), abs(cubic - asked).max(axis=0)
-    return np.maximum(off - ROUND_OFF * abs(values).max(axis=0), 0.0), np.ptp(values, axis=0)
+    length = high - low
+    places = low[:, None] + np.append(KNOWN, ASKED) * length[:, None]
+    values = function(places.ravel()).reshape(*places.shape, -1)
+    known, inverse = values[:, : len(KNOWN)], np.linalg.inv(np.vander(KNOWN))
+    weights = np.vander(ASKED, len(KNOWN)) @ inverse
+    off = abs(np.einsum("ak,pkm->pam", weights, known) - values[:, len(KNOWN) :]).max(axis=1)
+    least, most = values.min(axis=1), values.max(axis=1)
+    range_of = np.searchsorted(low, seen[0]) - 1
+    inside = (range_of >= 0) & (seen[0] <= high[range_of])
+    if inside.any():
+        range_of, x, y = range_of[inside], seen[0][inside], seen[1][inside]
+        weights = np.vander((x - low[range_of]) / length[range_of], len(KNOWN)) @ inverse
+        away = abs(sum(w[:, None] * known[range_of, k] for k, w in enumerate(weights.T)) - y)
+        which, begin = np.unique(range_of, return_index=True)
+        off[which] = np.maximum(off[which], np.maximum.reduceat(away, begin))
+        least[which] = np.minimum(least[which], np.minimum.reduceat(y, begin))
+        most[which] = np.maximum(most[which], np.maximum.reduceat(y, begin))
+    return np.maximum(off - ROUND_OFF * np.maximum(abs(least), abs(most)), 0.0), most - least
 
 
 def _looked_at(numbers: ParameterFunction, seen: np.ndarray) -> Iterator[tuple[ParameterFunction, np.ndarray]]:
