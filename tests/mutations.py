@@ -356,8 +356,8 @@ FAULTS = {
     ),
     "loci-say-nothing-of-what-is-too-fast": Fault(
         "rodfem/codim2/locus.py",
-        'said = [tracer.doubt, sharp, hidden, reasons.sentence if reasons else ""]',
-        'said = [sharp, hidden, reasons.sentence if reasons else ""]',
+        'said = [tracer.doubt, sharp, hidden, nearest, reasons.sentence if reasons else ""]',
+        'said = [sharp, hidden, nearest, reasons.sentence if reasons else ""]',
         LOCI,
     ),
     "changes-between-rows-are-not-looked-for": Fault(

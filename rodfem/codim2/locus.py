@@ -20,9 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.codim2.criterion import Criterion
 from rodfem.codim2.curve import Half, Tracer
 from rodfem.codim2.locus_errors import Errors, criterion_of, errors_of, hidden_changes, sharp_rows, without_smoothness
-from rodfem.codim2.others import unstable
+from rodfem.codim2.others import NEAREST, UNSTABLE, all_looked_at, unstable
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import null_vectors
 from rodfem.continuation.branch import SpecialPoint
@@ -308,11 +309,12 @@ def locus(
             errors = errors._replace(unresolved=list(range(len(found.nodes))))
         reasons = without_smoothness(solver, plane, found.nodes, errors.error)
         hidden = hidden_changes(solver, plane, found.nodes)
+        nearest = _nearest(solver, criterion, plane, first)
         rows, sharp = sharp_rows(solver, plane, found.nodes, SHARP)
         errors.error[rows] = np.nan
         errors = errors._replace(unresolved=sorted({*errors.unresolved, *rows}))
     located = _locus(solver, special, (plane.names, bounds), found, crossings, errors, lower)
-    said = [tracer.doubt, sharp, hidden, reasons.sentence if reasons else ""]
+    said = [tracer.doubt, sharp, hidden, nearest, reasons.sentence if reasons else ""]
     located.note = " ".join(f"Locus of the {special.kind}: {words}" for words in said if words)
     return located
 
@@ -358,6 +360,15 @@ def _locus(
         words=(load.words, other.words),
         units=(load.unit, other.unit),
     )
+
+
+def _nearest(solver: StaticSolver, criterion: Criterion, plane: Plane, node: LocusPoint) -> str:
+    """Sentence on the eigenvalues that an index counts, where these are not all of the mesh; or empty."""
+    if criterion.others != UNSTABLE:
+        return ""
+    solver.system.line = plane.along(node.p, 0)
+    solver.system.set_load(node.x, float(node.p[0]))
+    return "" if all_looked_at(NonsymmetricSolver(solver.system).at(node.x)) else f"{NEAREST}."
 
 
 def _crossings(tracer: Tracer, found: Curve, first: LocusPoint, level: float) -> list[tuple[float, float]]:

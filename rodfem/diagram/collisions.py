@@ -27,6 +27,8 @@ from rodfem.tolerances import TINY, round_off, unit
 
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+JUST_MET = 1e-4
+"""Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
 COMMON = 0.5
 """Share of a subspace in another above which both are one collision's."""
 
@@ -181,7 +183,8 @@ class Collisions:
             )
             floor = round_off(there.load, self.units.load)
             return Critical(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
-        if other.discriminant < 0:
+        just_met = abs(other.discriminant) < (JUST_MET * scale) ** 2 and not places(there.found, other.values)
+        if other.discriminant < 0 and not just_met:
             return other
         located = located_flutter(
             Measuring(self.solver, self.eigensolver, here.x),
@@ -189,12 +192,16 @@ class Collisions:
             (there.load + here.load) / 2,
             abs(here.load - there.load),
         )
+        load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
+        outside = (load - there.load) * (here.load - there.load) < 0
+        if apart <= uncertainty or (outside and just_met and apart < JUST_MET * abs(here.load - there.load)):
+            load, uncertainty = there.load, uncertainty + apart  # at that row, at which they still count as real
         low, high = sorted((here.load, there.load))
-        if not low - located.uncertainty <= located.load <= high + located.uncertainty:
-            raise ConvergenceError(f"two that meet at {located.load:.6g}, beyond this step, are not its own")
+        if not low - uncertainty <= load <= high + uncertainty:
+            raise ConvergenceError(f"two that meet at {load:.6g}, beyond this step, are not its own")
         if located.slope * (here.load - there.load) > 0:
-            raise ConvergenceError(f"the two that meet at {located.load:.6g} are complex on the other side of it")
-        return Critical(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
+            raise ConvergenceError(f"the two that meet at {load:.6g} are complex on the other side of it")
+        return Critical(FLUTTER, load, cluster.size, uncertainty, located.cluster.mean, located.cluster)
 
 
 class Measuring:

@@ -46,6 +46,8 @@ from rodfem.tolerances import unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
+ONE_LOAD = 1e-12
+"""Distance of two loads, over the greatest, up to which they are one: a step between them would be round-off."""
 FAST = 4
 """Number of loads in each range in which a cubic tells what the load does, where that changes fast."""
 
@@ -61,6 +63,11 @@ class Sweep:
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span, self.units = plan.over(solver.system.scene), solver.system.scene.units
+        self._least = ONE_LOAD * max(map(abs, self.span))
+        self._asked = list[float]()
+        for load in plan.at:
+            known = (other for other in (*self.span, *self._asked) if abs(load - other) <= self._least)
+            self._asked.append(next(known, load))
         self.eigensolver = NonsymmetricSolver(solver.system)
         self.number = plan.spectrum or FREQUENCIES
         self.rows = FrequencyRows(self.eigensolver, self.number)
@@ -93,6 +100,7 @@ class Sweep:
         last = branch.points[-1]
         branch.special.append(self.solver.given(END, last))
         branch.renumber()
+        self.unfollowed.tell()
         warn, kinks = self.observer.warn, Kinks([self.solver], self.observer, self._load)
         kinks.index(branch)
         HiddenChanges([self.solver], self.observer, self._load).examine(branch)
@@ -115,8 +123,10 @@ class Sweep:
         if fast.doubt:
             self.observer.warn(fast.doubt)
         between = np.linspace(fast.low, fast.high, FAST, endpoint=False).ravel()
-        loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at, *between])
-        loads = np.unique([*loads, *fast.beside(loads)])
+        own = np.unique([*np.linspace(a, b, LOADS), *between])
+        own = np.unique([*own, *fast.beside(np.unique([*own, *self._asked]))])
+        apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
+        loads = np.unique([*apart, *self._asked])
         loads = loads if a < b else loads[::-1]
         x, _ = first_state(self.solver, a)
         branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])
@@ -184,7 +194,7 @@ class Sweep:
             if before is not None:
                 self._between(branch, before, row)
             branch.points.append(point)
-            if point.load in self.plan.at:
+            if point.load in self._asked:
                 self._special(branch, self.solver.given(USER, point))
             self.observer.progress(branch, point)
 
@@ -274,10 +284,11 @@ class Sweep:
             change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
             branch.unexplained.append(change)
             self.observer.warn(str(change))
-        elif told.entered > 0 and a.negative == 0:
+        elif told.entered > 0:
             self.observer.warn(
                 f"{told.entered} eigenvalues that are found at {self._load} = {b.load:.6g} and not at {a.load:.6g} are "
-                "complex at both: the rows before, which count none, may count too few. Ask for more frequencies."
+                f"complex at both: the rows before, which count {a.negative}, may count too few. Ask for more "
+                "frequencies."
             )
 
     def _within_bars(self, branch: Branch) -> None:

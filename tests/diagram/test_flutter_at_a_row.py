@@ -1,0 +1,71 @@
+"""Frequencies that meet at a load of the sweep itself, to round-off: found once, with the numbers on both sides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import nextafter
+
+import classics
+import pytest
+
+from rodfem import Diagram, Discretization, Plan, trace
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, USER
+
+pytestmark = pytest.mark.alone
+
+MESH = Discretization("auto", 4, 6)
+BECK = 20.0509536189738
+Found = list[tuple[str, float, int, int]]
+
+
+def swept(share: float, strong: float, span: tuple[float, float], *at: float) -> Diagram:
+    plan = Plan(depth=0, at=at, error_bars=False)
+    return trace(replace(classics.partly_following(share, span, strong), span=span), MESH, plan)
+
+
+def critical(diagram: Diagram) -> Found:
+    kinds = (FLUTTER, DIVERGENCE)
+    found = [
+        (str(s.kind), s.point.load, s.negative_before, s.negative_after) for s in diagram[0].special if s.kind in kinds
+    ]
+    return sorted(found, key=lambda one: one[1])
+
+
+@cache
+def without(share: float, strong: float) -> Found:
+    return critical(swept(share, strong, (2.0, 35.0)))
+
+
+@pytest.mark.parametrize("off", [-4e-13, 0.0, 4e-13])
+@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.parametrize(("share", "strong", "which"), [(1.0, 1.5, 0), (1.0, 1.5, 1), (0.4, 10.0, 3)])
+def test_a_load_that_is_asked_for_at_a_flutter_load(
+    share: float, strong: float, which: int, back: bool, off: float
+) -> None:
+    """A pair that is complex by round-off at one end of a step, and real at the row, was lost between the two."""
+    known = without(share, strong)
+    assert known[which][0] == str(FLUTTER)
+    diagram = swept(share, strong, (35.0, 2.0) if back else (2.0, 35.0), known[which][1] * (1 + off))
+    expected = [(kind, load, *(numbers[::-1] if back else numbers)) for kind, load, *numbers in known]
+    for one, other in zip(critical(diagram), expected, strict=True):
+        assert (one[0], *one[2:]) == (other[0], *other[2:]) and one[1] == pytest.approx(other[1], rel=1e-11)
+    assert not diagram.warnings and not diagram[0].unexplained
+
+
+@pytest.mark.parametrize("width", [0.03, -0.1])
+def test_a_row_of_the_grid_at_a_flutter_load(width: float) -> None:
+    load = 1.5 * BECK
+    diagram = swept(1.0, 1.5, (load * (1 - width), load * (1 + width)))
+    (flutter,) = critical(diagram)
+    assert flutter[1] == pytest.approx(load, rel=1e-11) and sorted(flutter[2:]) == [2, 4]
+
+
+@pytest.mark.parametrize(("span", "at"), [((0.3, 25.0), 0.1 * 3), ((0.0, 20.1), nextafter(20.1, 0.0))])
+def test_loads_that_differ_by_round_off_are_one(span: tuple[float, float], at: float) -> None:
+    """A step of one unit in the last place ended the sweep."""
+    diagram = swept(1.0, 10.0, span, at)
+    (flutter,) = critical(diagram)
+    assert flutter[1] == pytest.approx(BECK, abs=1e-9)
+    (asked,) = diagram.special(USER.words)
+    assert asked.point.load in span and diagram[0].ended == "end of range"
