@@ -246,6 +246,42 @@ FAULTS = {
         "return self.specials.reach(point)",
         "tests/diagram/test_fast_load.py",
     ),
+    "pairs-that-have-just-met-enter": Fault(
+        "rodfem/diagram/collisions.py",
+        "if other.discriminant < 0 and not just_met:",
+        "if other.discriminant < 0:",
+        "tests/diagram/test_flutter_at_a_row.py",
+    ),
+    "steps-of-round-off-in-a-sweep": Fault(
+        "rodfem/diagram/sweep.py",
+        "ONE_LOAD = 1e-12",
+        "ONE_LOAD = 0.0",
+        "tests/diagram/test_flutter_at_a_row.py",
+    ),
+    "slow-frequencies-are-round-off": Fault(
+        "rodfem/diagram/frequency_rows.py",
+        "slow = np.flatnonzero((abs(found.values) < SLOW * found.one) & pencil.slow)",
+        "slow = np.flatnonzero(abs(found.values) < 0.0)",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
+    "loci-count-what-is-nearest": Fault(
+        "rodfem/codim2/others.py",
+        "return int((abs(everything.unstable - shift)",
+        "return 0 * int((abs(everything.unstable - shift)",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
+    "extrema-of-a-load-are-not-looked-at": Fault(
+        "rodfem/diagram/unfollowed.py",
+        "(last or turn or self._rows % every == 1",
+        "(last or self._rows % every == 1",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
+    "of-unstable-rows-nothing-else-is-looked-at": Fault(
+        "rodfem/diagram/unfollowed.py",
+        "if len(found.unstable) > point.negative:",
+        "if len(found.unstable) > point.negative == 0:",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
     "corners-where-interpolated-states-have-them": Fault(
         f"{CONTINUATION}event_location.py",
         "                self.curve.solve(s)",

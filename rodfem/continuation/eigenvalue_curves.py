@@ -59,7 +59,7 @@ class Curves:
         """
         outside = 1.0 - np.minimum(np.add.reduceat(parts, self._begin, axis=0), 1.0)[self._span]
         a, b = last.values[:, None], found.values[None, :]
-        return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), found.one))
+        return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), min(found.one, found.natural)))
 
     def _keep(self, found: Frequencies, energy: np.ndarray) -> None:
         """Keep a basis of the span of each group of equal eigenvalues, orthonormal in the mass."""

@@ -57,7 +57,7 @@ class CriticalLoads:
         self.solver, self.eigensolver, self.number, self.warn = solver, eigensolver, number, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
         self.collisions, self._still, self._parted = Collisions(solver, eigensolver), 0, 0
-        self.hidden = HiddenEvents(lambda x: Measuring(solver, eigensolver, x), self.units.omega2)
+        self.hidden = HiddenEvents(lambda x: Measuring(solver, eigensolver, x))
         self._last: Side | None = None
         self._unclear = 0
 
@@ -221,7 +221,7 @@ class CriticalLoads:
                 return self._real(guess, load)[number]
 
             try:
-                found.append(self._zero(mu, loads[0], loads[1]))
+                found.append(self._zero(mu, loads[0], loads[1], self._near(guess, loads[0]).noise))
             except (ConvergenceError, IndexError, ValueError):
                 words = f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
                 return Told(doubts=[words])
@@ -239,10 +239,10 @@ class CriticalLoads:
                 out.doubts.append(str(trouble))
         return out
 
-    def _zero(self, mu: Callable[[float], float], low: float, high: float) -> float:
-        """Load at which ``mu`` vanishes: a bound where it does there but for noise, in which its sign says nothing."""
+    def _zero(self, mu: Callable[[float], float], low: float, high: float, noise: float) -> float:
+        """Load at which ``mu`` vanishes: a bound where it does there but for ``noise``: its sign says nothing then."""
         for load in (low, high):
-            if abs(mu(load)) <= REAL * self.units.omega2:
+            if abs(mu(load)) <= min(noise, REAL * self.units.omega2):
                 return load
         return zero_between(mu, low, high, ROUND_OFF * max(abs(low), abs(high)))
 

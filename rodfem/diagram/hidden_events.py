@@ -117,9 +117,9 @@ def lowest_of_parabola(loads: tuple[float, float, float], values: tuple[float, f
 class HiddenEvents:
     """Seeks loads of a step that show what its rows do not."""
 
-    def __init__(self, measured: Callable[[PETSc.Vec], Measuring], one: float) -> None:
-        """Know how a cluster is ``measured`` near an equilibrium, and the natural size, ``one``, of eigenvalues."""
-        self.measured, self.one = measured, one
+    def __init__(self, measured: Callable[[PETSc.Vec], Measuring]) -> None:
+        """Know how a cluster is ``measured`` near an equilibrium."""
+        self.measured = measured
         self.near: list[Lowest] = []
         self._told: set[int] = set()  # of what approached in the last step, what was lowest in it
 
@@ -197,17 +197,18 @@ class HiddenEvents:
         measured = self.measured(a.x)
         cluster = cluster_of(measured.pencil(a.load), a.found, approach.places)
         width, sign, single = b.load - a.load, approach.sign, len(approach.places) == 1
+        noise = min(a.found.noise, REAL * a.found.one)
 
         def value(t: float) -> float:
             here = measured(a.load + t * width, cluster)
             if single:
-                return sign * here.cluster.mean + REAL * max(self.one, abs(here.cluster.mean))
+                return sign * here.cluster.mean + max(noise, REAL * abs(here.cluster.mean))
             return sign * here.discriminant + float(REAL * abs(here.values).max()) ** 2
 
         t, lowest = lowest_between(value, 0.0, along, 1.0, WITHIN)
         load = a.load + t * width
         if single:
-            return Lowest(load, sign, lowest - REAL * self.one, cluster, lowest <= 2 * REAL * self.one)
+            return Lowest(load, sign, lowest - noise, cluster, lowest <= 2 * noise)
         return _several(measured.pencil(load), load, sign, cluster, below=lowest < 0)
 
 

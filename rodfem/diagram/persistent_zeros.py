@@ -10,7 +10,7 @@ from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.fem.newton import TOLERANCE
-from rodfem.stability.frequencies import REAL, Frequencies
+from rodfem.stability.frequencies import Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.stability.round_off import resolve
 
@@ -38,7 +38,7 @@ def family_of(pencil: NonsymmetricPencil, found: Frequencies, least: int) -> str
     system, moving = pencil.system, list[str]()
     if found.floating:
         return ""
-    for i in np.flatnonzero(abs(found.values) < REAL * found.one).tolist():
+    for i in np.flatnonzero(abs(found.values) < found.noise).tolist():
         mode = system.new_vector()
         mode.array[:] = found.vectors[:, i].real
         if system.drift(mode) <= CHAINED * system.stiffness_scale * system.norm(mode):

@@ -64,7 +64,7 @@ class Sweep:
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span, self.units = plan.over(solver.system.scene), solver.system.scene.units
         self._least = ONE_LOAD * max(map(abs, self.span))
-        self._asked = list[float]()
+        self._asked, self._extrema = list[float](), set[float]()
         for load in plan.at:
             known = (other for other in (*self.span, *self._asked) if abs(load - other) <= self._least)
             self._asked.append(next(known, load))
@@ -100,7 +100,6 @@ class Sweep:
         last = branch.points[-1]
         branch.special.append(self.solver.given(END, last))
         branch.renumber()
-        self.unfollowed.tell()
         warn, kinks = self.observer.warn, Kinks([self.solver], self.observer, self._load)
         kinks.index(branch)
         HiddenChanges([self.solver], self.observer, self._load).examine(branch)
@@ -127,6 +126,7 @@ class Sweep:
         own = np.unique([*own, *fast.beside(np.unique([*own, *self._asked]))])
         apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
         loads = np.unique([*apart, *self._asked])
+        self._extrema = {float(loads[abs(loads - turn).argmin()]) for turn in (*fast.turns, *fast.smooth)}
         loads = loads if a < b else loads[::-1]
         x, _ = first_state(self.solver, a)
         branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])
@@ -190,7 +190,7 @@ class Sweep:
         for row in rows:
             point, before, self.last = row.point, self.last, row
             self._record(point, row.found, on_the_way=True)
-            self.unfollowed.look(point, last=point.load == self.span[1])
+            self.unfollowed.look(point, last=point.load == self.span[1], turn=point.load in self._extrema)
             if before is not None:
                 self._between(branch, before, row)
             branch.points.append(point)
@@ -250,7 +250,7 @@ class Sweep:
         """Record the frequencies ``found`` at a point; a special point is not ``on_the_way`` of the curves."""
         values = found.values
         point.negative = found.unstable(found.noise)
-        still = int((abs(values) < REAL * self.units.omega2).sum())
+        still = int((abs(values) < min(found.noise, REAL * self.units.omega2)).sum())
         point.zero += still
         self._still = min(self._still, still)
         point.omega2 = [[float(v.real), float(v.imag)] for v in values[: self.number]]

@@ -22,30 +22,25 @@ class Unfollowed:
     """Looks at all eigenvalues of the mesh at some rows: more may be unstable than those that are followed."""
 
     def __init__(self, eigensolver: NonsymmetricSolver, observer: Observer) -> None:
-        """Look with the matrices of the ``eigensolver``; the ``observer`` is warned, once."""
+        """Look with the matrices of the ``eigensolver``; the ``observer`` is told, once."""
         self.eigensolver, self.observer = eigensolver, observer
-        self._rows, self._looked, self._said = 0, 0, False
+        self._rows, self._said = 0, False
         self._stable: Point | None = None
 
-    def look(self, point: Point, *, last: bool) -> None:
-        """Look at the ``point`` of the next row, if it is the ``last`` or its turn, or at the last that was stable."""
+    def look(self, point: Point, *, last: bool, turn: bool) -> None:
+        """Look at the ``point`` of the next row, if it is the ``last`` or one's turn, or at the last that was stable.
+
+        At a ``turn``, an extremum of what the load does, something may come and go.
+        """
         self._rows += 1
         if self._said:
             return
         if point.negative and self._stable is not None:
             self._examine(self._stable, MANY)
             self._stable = None
-        rarely, often = (last or self._rows % every == 1 for every in (RARELY, OFTEN))
+        rarely, often = (last or turn or self._rows % every == 1 for every in (RARELY, OFTEN))
         looked = often and not self._said and self._examine(point, MANY if rarely else LARGEST, said=last)
         self._stable = None if looked or point.negative else point
-
-    def tell(self) -> None:
-        """Say at how many rows nothing was looked for."""
-        if self._looked < self._rows and not self._said:
-            self.observer.note(
-                f"  at {self._looked} of {self._rows} loads all eigenvalues of the mesh were looked at, at the others "
-                "those nearest zero alone"
-            )
 
     def _examine(self, point: Point, largest: int, *, said: bool = True) -> bool:
         """Look at a point of a mesh with up to so many rows; False for one with more, which is ``said`` or not."""
@@ -55,21 +50,22 @@ class Unfollowed:
                 f"  the mesh has too many unknowns to look at all its eigenvalues at {point.load:.6g}: that the rod is "
                 "stable there is said of those nearest zero"
             )
-        if found is not None:
-            self._looked += 1
-            if len(found.unstable) > point.negative:
-                self._warn(point, found)
+        if found is not None and len(found.unstable) > point.negative:
+            self._warn(point, found)
         return found is not None
 
     def _warn(self, point: Point, found: Census) -> None:
         self._said = True
         value, number = found.unstable[-1], int(found.nearer[-1]) + 1
-        counted = f"{len(found.unstable)} eigenvalues are unstable, and {point.negative} are counted: " * bool(
-            point.negative
-        )
+        where = f"{self.eigensolver.system.scene.load} = {point.load:.6g}"
+        if point.negative:  # unstable all the same
+            self.observer.note(
+                f"  at {where} {len(found.unstable)} eigenvalues of this mesh are unstable, and {point.negative} are "
+                f"counted, as others are nearer to zero: for the loads of all of them spectrum={number} is needed"
+            )
+            return
         self.observer.warn(
-            f"At {self.eigensolver.system.scene.load} = {point.load:.6g} {counted}an eigenvalue of this mesh, omega^2 "
-            f"= {value:.6g}, is unstable and is not among those that are followed, as {number - 1} others "
-            "are nearer to zero. The rod may be unstable before and beyond, whatever else is said of it: ask for more "
-            f"frequencies, spectrum={number}."
+            f"At {where} an eigenvalue of this mesh, omega^2 = {value:.6g}, is unstable and is not among those that "
+            f"are followed, as {number - 1} others are nearer to zero. The rod may be unstable before and beyond, "
+            f"whatever else is said of it: ask for more frequencies, spectrum={number}."
         )

@@ -59,8 +59,8 @@ class FastLoad:
     """Ranges of the load, and by how much it may change in a step.
 
     ``low`` and ``high`` are the ends of the ranges, none where every function is a cubic; ``doubt`` says where one is
-    not even on the smallest, and is empty where all are.  At ``turns`` one has an extremum: what comes and goes does so
-    there, however smooth it is.
+    not even on the smallest, and is empty where all are.  At ``turns`` one has an extremum, and at ``smooth`` ones,
+    beside which it hardly changes: what comes and goes does so there.
     """
 
     def __init__(self, scene: Scene, span: tuple[float, float], name: str = "", **values: float) -> None:
@@ -70,12 +70,13 @@ class FastLoad:
         """
         first, last = sorted(span)
         self.doubt, ends, name = "", {first, last}, name or scene.load
-        turns = set[float]()
+        turns, smooth = set[float](), set[float]()
         for what, numbers in parameter_functions(scene, (name,), **values):
             for each, places in _looked_at(numbers, np.linspace(first, last, SEEN)):
                 seen = places, each(places[:, None])
                 least = np.maximum(each.least, NOISE * each.sizes(seen[1]))
-                turns |= _turns(*seen, least)
+                for turn, sharp in _turns(*seen, least):
+                    (turns if sharp else smooth).add(turn)
                 worst = _halved(lambda t, f=each: f(t[:, None]), seen, ends, least)  # type: ignore[misc]
                 if worst and not self.doubt:
                     self.doubt = (
@@ -84,7 +85,7 @@ class FastLoad:
                     )
         loads = np.array(sorted(ends) if len(ends) > 2 else [])
         self.low, self.high = loads[:-1], loads[1:]
-        self.turns, self.width = sorted(turns), last - first
+        self.turns, self.smooth, self.width = sorted(turns), sorted(smooth), last - first
 
     def beside(self, loads: np.ndarray) -> list[float]:
         """Loads at extrema that are not at one of the ``loads`` (n,), nor at another one.
@@ -185,13 +186,13 @@ def _looked_at(numbers: ParameterFunction, seen: np.ndarray) -> Iterator[tuple[P
         yield numbers, places
 
 
-def _turns(places: np.ndarray, values: np.ndarray, least: np.ndarray) -> set[float]:
+def _turns(places: np.ndarray, values: np.ndarray, least: np.ndarray) -> Iterator[tuple[float, bool]]:
     """Where components (n, m) have extrema between the first and the last of the ``places`` (n,).
 
-    Differences below the ``least`` of a component (m,) are none.  Where values hardly change beside it the rows of a
-    sweep tell.
+    Differences below the ``least`` of a component (m,) are none.  With each, whether values change beside it, so that
+    the rows of a sweep do not tell of it.
     """
-    found, width = set[float](), float(places[-1] - places[0])
+    width = float(places[-1] - places[0])
     defined = np.isfinite(values).all(axis=0)
     for y, lost in zip(values.T[defined], least[defined], strict=True):
         steps = np.diff(y)
@@ -202,9 +203,7 @@ def _turns(places: np.ndarray, values: np.ndarray, least: np.ndarray) -> set[flo
             some = slice(max(int(moving[i]) - 1, 0), int(moving[i + 1]) + 3)
             turn = _vertex(places[some], y[some])
             away = np.interp([turn - WINDOW * width, turn, turn + WINDOW * width], places, y)
-            if abs(away - away[1]).max() > SHARP * abs(away[1]):
-                found.add(turn)
-    return found
+            yield turn, bool(abs(away - away[1]).max() > SHARP * abs(away[1]))
 
 
 def _vertex(x: np.ndarray, y: np.ndarray) -> float:

@@ -35,7 +35,8 @@ class Frequencies:
     of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
     (n, k) are complex, or real where all eigenvalues are, with the n unknowns of this rank, ``weighed`` (n, k) are
     their products with the mass, and ``one`` is the natural size of the eigenvalues.  The rod is ``floating`` where
-    nothing holds it: it has zero eigenvalues.
+    nothing holds it: it has zero eigenvalues.  Of a rod that is held and has slow motions, as a stiff one on soft
+    springs, the ``floor`` is what round-off makes of zero; it is infinite elsewhere.
     """
 
     values: np.ndarray
@@ -45,6 +46,7 @@ class Frequencies:
     weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     one: float = 1.0
     floating: bool = False
+    floor: float = np.inf
 
     @property
     def far(self) -> float:
@@ -54,12 +56,22 @@ class Frequencies:
         """
         sizes = np.sort(abs(self.values))
         greatest = float(sizes[-1]) if len(sizes) else 0.0
-        return greatest if self.floating else min(greatest, SLOW * max(float(sizes[:2].max(initial=0.0)), self.one))
+        return greatest if self.floating else min(greatest, SLOW * self.natural)
+
+    @property
+    def natural(self) -> float:
+        """Natural size of the slowest motions: that of the two slowest eigenvalues, and at least that of bending.
+
+        Where slow motions are told from round-off it is theirs alone.
+        """
+        slowest = float(np.sort(abs(self.values))[:2].max(initial=0.0))
+        return max(slowest, self.one if np.isinf(self.floor) else self.floor)
 
     @property
     def noise(self) -> float:
         """Magnitude below which an eigenvalue counts as zero."""
-        return REAL * max(self.one, float(abs(self.values).min(initial=np.inf)))
+        least = REAL * float(abs(self.values).min(initial=np.inf))
+        return min(max(REAL * self.one, least), max(self.floor, least))
 
     def negative(self) -> list[int]:
         """Places of the negative real eigenvalues."""

@@ -50,7 +50,10 @@ PILE = 64
 
 
 class NonsymmetricSolver(PencilMatrices):
-    """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`."""
+    """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
+
+    ``slow`` says whether the rod has motions far slower than bending at its first state, whose round-off is asked for.
+    """
 
     def __init__(self, system: System) -> None:
         """Allocate the matrices of the pencil once."""
@@ -60,6 +63,7 @@ class NonsymmetricSolver(PencilMatrices):
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
         self._rows: sp.csr_matrix | None = None
         self.floating = system.scene.closed or floats(system.scene)
+        self.slow = False
 
     @property
     def rows(self) -> sp.csr_matrix:
@@ -96,7 +100,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def __init__(self, shared: NonsymmetricSolver) -> None:
         """Be the state that the matrices were just filled for."""
         super().__init__(shared)
-        self.turned, self._free, self._own = shared.turned, shared.free, slice(None)
+        self.turned, self._free, self._own, self.slow = shared.turned, shared.free, slice(None), shared.slow
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""

@@ -1,0 +1,102 @@
+"""Frequencies far below those of bending, of stiff rods on soft supports, and unstable ones beyond those followed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import classics
+import numpy as np
+import pytest
+from classics import column, push
+from scipy.linalg import eigvals
+
+from forms import loads
+from rodfem import Diagram, Discretization, End, Inertia, Plan, Scene, clamped, free, trace
+from rodfem.codim2.others import NEAREST
+
+pytestmark = pytest.mark.alone
+
+MESH = Discretization("auto", 4, 6)
+BECK = 20.0509536189738
+THIN = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.01))
+
+
+def swept(scene: Scene, **plan: Any) -> Diagram:
+    return trace(scene, MESH, Plan(depth=0, **plan))
+
+
+@pytest.mark.parametrize("k", [pytest.param(1e-3, marks=pytest.mark.long), 1e-6, 1e-8])
+def test_flutter_of_a_stiff_rod_on_soft_springs(k: float) -> None:
+    """Springs k and k/2 across its ends, a thrust that follows: two degrees of freedom, flutter from ``P = k/3`` on.
+
+    With a round-off of 1e-5 of ``EI/(m L^4)``, whatever the rod does, all complex pairs were real ones below 1e-5.
+    """
+    foot = End(
+        position=lambda c: (None, None, 0.0),
+        energy=lambda x, c: loads.spring(x.r, (c.k, 3 * c.k, 0.0)) + loads.rotational_spring(x.q, (0.0, 0.0, 1.0)),
+    )
+    tip = End(follower=push, energy=lambda x, c: loads.spring(x.r, (0.5 * c.k, 1.5 * c.k, 0.0)))
+    rod = column("soft springs", (foot, tip), (0.0, 0.9 * k), inertia=THIN, constants={"k": k, "B2": 1.3})
+    diagram = swept(rod)
+    (flutter,) = diagram.special("flutter")
+    assert flutter.point.load / k == pytest.approx(1 / 3, abs=max(3 * k, 1e-4 * 1e-8 / k, 1e-8) + 2e-5)
+    assert not diagram.warnings
+    point = diagram[0].points[70]
+    P = point.load / k
+    exact = eigvals([[1.5, 0.5 + P], [0.5, 0.5]], [[1.0, 0.5], [0.5, 1 / 3]])
+    found = np.array([complex(*value) for value in point.omega2[:2]]) / k
+    assert point.negative == 2 and sorted(found.imag) == pytest.approx(sorted(exact.imag), rel=1e-2)
+
+
+@pytest.mark.parametrize(("kr", "most"), [pytest.param(1e-5, 1.6, marks=pytest.mark.long), (1e-6, 1.28), (1e-7, 1.6)])
+def test_divergence_of_a_stiff_rod_on_a_soft_hinge(kr: float, most: float) -> None:
+    """A fifth of the thrust follows: ``theta'' = -3 (kr - 0.8 P) theta``, which is located, or said to lie between."""
+    hinge = End(
+        position=lambda c: (0.0, 0.0, 0.0), energy=lambda x, c: loads.rotational_spring(x.q, (c.kr, 1.7 * c.kr, 1.0))
+    )
+    tip = free(force=lambda c: (0.0, 0.0, -0.8 * c.P), follower=lambda c: (0.0, 0.0, -0.2 * c.P))
+    diagram = swept(column("hinge", (hinge, tip), (0.0, most * kr), inertia=THIN, constants={"kr": kr, "B2": 1.3}))
+    for point in diagram[0].points:
+        if abs(point.load / kr - 1.25) > 1e-2:
+            assert point.negative == int(point.load > 1.25 * kr)
+            assert point.omega2[0][0] / kr == pytest.approx(3 * (1 - 0.8 * point.load / kr), abs=1e-2)
+    found = [s.point.load / kr for s in diagram.special("divergence")]
+    assert found == pytest.approx([1.25], abs=1e-5) or (diagram[0].unexplained and diagram.warnings)
+
+
+def test_a_second_flutter_beyond_the_frequencies_that_are_followed() -> None:
+    """Soft in torsion: two dozen slow motions hide the pair that flutters at 8.02, where another one did before."""
+    inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0))
+    constants = {"P": 0.1, "B1": 0.1, "B2": 0.4, "C": 0.02}
+    rod = column("soft", (clamped(), free(follower=push)), (0.1, 9.0), inertia=inertia, constants=constants)
+    rod = rod.varying("P", (6.0, 8.6))
+    few = swept(rod, error_bars=False)
+    assert any(" 4 eigenvalues of this mesh are unstable, and 2 are counted" in words for words in few.notes)
+    found = swept(rod, spectrum=30, error_bars=False)
+    assert [s.point.load for s in found.special("flutter")] == pytest.approx([0.4 * BECK], rel=1e-8)
+
+
+def test_flutter_that_comes_and_goes_beyond_the_frequencies_that_are_followed() -> None:
+    """The greatest thrust is a little above Beck's load, between two looks: it is looked at there."""
+    thrust = lambda c: (0.0, 0.0, -(BECK + 0.04 - (c.p - 5.25) ** 2))  # noqa: E731
+    inertia, constants = (
+        Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)),
+        {"p": 0.0, "B2": 10.0, "C": 0.02},
+    )
+    ends = clamped(), free(follower=thrust)
+    rod = column("peak", ends, (0.0, 10.0), load="p", inertia=inertia, constants=constants)
+    (words,) = swept(rod, error_bars=False).warnings
+    assert words.startswith("At p = 5.") and "is not among those that are followed" in words
+
+
+def test_the_index_of_a_locus_counts_all_eigenvalues() -> None:
+    """The flutter of the strong plane of a ribbon, 60 times as stiff: five pairs of the weak one have fluttered."""
+    strong = 60.0
+    scene = classics.partly_following(1.0, (0.98 * strong * BECK, 1.02 * strong * BECK), strong)
+    diagram = trace(scene, Discretization("auto", 8, 6), Plan(depth=0, spectrum=30, error_bars=False))
+    flutter = min(diagram.special("flutter"), key=lambda s: abs(s.point.load / strong - BECK))
+    numbers = [flutter.negative_before, flutter.negative_after]
+    found = diagram.locus(flutter, "B2", (58.0, 62.0), (0.9 * strong * BECK, 1.1 * strong * BECK))
+    assert numbers == [10, 12] and found.index.tolist() == [numbers] * len(found.values)
+    assert diagram.assess(diagram[0].points[0], "dense").negative == 10
+    assert not found.marks and NEAREST not in found.note
