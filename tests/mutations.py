@@ -278,8 +278,8 @@ FAULTS = {
     ),
     "of-unstable-rows-nothing-else-is-looked-at": Fault(
         "rodfem/diagram/unfollowed.py",
-        "if len(found.unstable) > point.negative:",
-        "if len(found.unstable) > point.negative == 0:",
+        "len(found.unstable) > point.negative:",
+        "len(found.unstable) > point.negative == 0:",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "corners-where-interpolated-states-have-them": Fault(
