@@ -350,7 +350,7 @@ FAULTS = {
     ),
     "sweeps-have-no-rows-at-extrema": Fault(
         "rodfem/diagram/sweep.py",
-        "loads = np.unique([*loads, *fast.beside(loads)])",
+        "own = np.unique([*own, *fast.beside(np.unique([*own, *self._asked]))])",
         "pass",
         "tests/diagram/test_functions_between_rows.py",
     ),
@@ -1052,7 +1052,7 @@ FAULTS = {
         MISSED,
     ),
     "round-off-hides-no-divergence": Fault(
-        "rodfem/diagram/hidden_events.py", "lowest <= 2 * REAL * self.one)", "lowest < 0)", MISSED
+        "rodfem/diagram/hidden_events.py", "lowest <= 2 * noise)", "lowest < 0)", MISSED
     ),
     "two-that-cross-may-meet": Fault(
         "rodfem/diagram/hidden_events.py",
