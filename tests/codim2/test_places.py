@@ -35,8 +35,12 @@ def column(elements: int, degree: int) -> Diagram:
     )
 
 
-@cache
 def of_column(kind: str, number: int, elements: int = 4, degree: int = 6) -> Locus:
+    return located(kind, number, elements, degree)  # a default and the same number given are two keys of a cache
+
+
+@cache
+def located(kind: str, number: int, elements: int, degree: int) -> Locus:
     diagram = column(elements, degree)
     return diagram.locus(diagram.special(kind)[number], "share", (0.0, 1.2), (0.0, 40.0))
 
@@ -79,8 +83,10 @@ def test_the_same_column_in_units_of_a_molecule() -> None:
     check(found, "the double eigenvalue vanishes", DOUBLE_ZERO)
 
 
-@pytest.mark.parametrize("elements", [4, 5])
-@pytest.mark.parametrize(("number", "index"), [(0, [0, 2]), (1, [2, 2])])
+@pytest.mark.parametrize(
+    ("number", "index", "elements"),
+    [(0, [0, 2], 4), (1, [2, 2], 4), (0, [0, 2], 5), pytest.param(1, [2, 2], 5, marks=pytest.mark.long)],
+)
 def test_a_double_zero_counts_as_the_row_before_it(number: int, index: list[int], elements: int) -> None:
     """On either mesh the end is found, though left vectors beside it are not always."""
     found = of_column(FLUTTER, number, elements)
