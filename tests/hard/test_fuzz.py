@@ -41,14 +41,13 @@ def test_a_side_with_other_ordinates_is_said() -> None:
 
 
 @pytest.fixture
-def few_loads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sweeps of a quarter of their loads, and a third of the rows are counted densely: each of them costs much."""
-    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 26)
+def few_rows(monkeypatch: pytest.MonkeyPatch, few_loads: None) -> None:
+    """A third of the rows are counted densely: each of them costs much."""
     monkeypatch.setattr(comparison, "ROWS", (14, 5))
 
 
 @pytest.mark.parametrize(("seed", "number"), SCENES)
-@pytest.mark.usefixtures("few_loads")
+@pytest.mark.usefixtures("few_rows")
 def test_a_random_scene(seed: int, number: int) -> None:
     """Indices are those of dense matrices, special points within their bars; no symmetry is claimed that is none.
 
@@ -65,7 +64,7 @@ WIDE = [(1, 8), (1, 31)]
 
 
 @pytest.mark.parametrize(("seed", "number"), WIDE)
-@pytest.mark.usefixtures("few_loads")
+@pytest.mark.usefixtures("few_rows")
 def test_a_scene_of_the_wider_family(seed: int, number: int) -> None:
     rod, facts = wider.scene(seed, number)
     found = compared(rod, number, 0, facts)

@@ -56,6 +56,7 @@ def test_two_that_pass_one_another_stay_real() -> None:
         assert (found.values.imag == 0).all()
 
 
+@pytest.mark.usefixtures("few_loads")
 def test_flutter() -> None:
     """Where the body that goes with an eigenvalue is stationary two of them coincide, as in waves along the column."""
     diagram = trace(pushed(1e6), Discretization(elements=6, degree=5), Plan(error_bars=False))
