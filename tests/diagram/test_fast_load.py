@@ -34,7 +34,8 @@ def column(thrust: rodfem.problem.local_state.OfConstants, span: tuple[float, fl
     )
 
 
-@pytest.mark.parametrize("rate", [70.0, pytest.param(200.0, marks=pytest.mark.alone)])
+@pytest.mark.alone
+@pytest.mark.parametrize("rate", [70.0, 200.0])
 def test_a_thrust_that_is_a_fast_sine(rate: float) -> None:
     """It passes the critical one, ``pi^2/4``, twice in each of many periods."""
     once = asin(pi**2 / 12)
@@ -57,6 +58,7 @@ def test_ordinary_functions_bound_no_step() -> None:
         assert not len(fast.low)
 
 
+@pytest.mark.alone
 def test_a_notch_of_one_piece() -> None:
     """At ``P = 0.5123`` four fifths of the column soften, ahead of its free end: 80 % of Euler's load is too much.
 

@@ -216,7 +216,8 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
     assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
-@pytest.mark.parametrize("twisting", [1e-3, pytest.param(1e-4, marks=pytest.mark.alone)])
+@pytest.mark.alone
+@pytest.mark.parametrize("twisting", [1e-3, 1e-4])
 @pytest.mark.usefixtures("few_loads")
 def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
     """A rod that is so soft in torsion that dozens of motions are slower than those that flutter, at Beck's load.
@@ -279,7 +280,8 @@ def pflueger(z: np.ndarray) -> list[float]:
     return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
-@pytest.mark.parametrize("light", [pytest.param(1e-3, marks=pytest.mark.alone), 1e-5])
+@pytest.mark.alone
+@pytest.mark.parametrize("light", [1e-3, 1e-5])
 @pytest.mark.usefixtures("few_loads")
 def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
     """Two masses on a rod of 1e-5 of theirs: the eigenvalues that flutter, 27.5, are beside others of 1e10."""
