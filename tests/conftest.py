@@ -24,6 +24,12 @@ def collect_garbage() -> Iterator[None]:
 
 
 @pytest.fixture
+def few_loads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps have a quarter of their loads, where what is at each of a hundred is not what is tested."""
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 26)
+
+
+@pytest.fixture
 def folder(tmp_path: Path) -> Iterator[Path]:
     """Empty folder that all ranks share."""
     yield Path(MPI.COMM_WORLD.bcast(str(tmp_path)))

@@ -32,7 +32,11 @@ from rodfem.fem.fields import Discretization, Fields
 from rodfem.output.files import load_state
 from rodfem.problem.scene import Scene
 
-ALONE = [pytest.param(accuracy, marks=pytest.mark.alone) for accuracy in (1e-4, 1e-8, 1e-10)]
+ALONE = [
+    pytest.param(1e-4, marks=pytest.mark.alone),
+    pytest.param(1e-8, marks=[pytest.mark.alone, pytest.mark.long]),
+    pytest.param(1e-10, marks=pytest.mark.alone),
+]
 ACCURACIES = pytest.mark.parametrize("accuracy", [1e-6, *ALONE])
 CORD = {"fold": 7.8065554232, "shortening": 0.5793314271, "points": (49.34802200544679, 8.063525384097708)}
 """Spectral collocation and shooting; ``k0^2 - w^2`` with ``w = 2 pi`` and ``tan(w/2) = w/2``."""

@@ -56,7 +56,7 @@ def test_folds_that_only_a_finer_mesh_has() -> None:
     """A soft ring with an element of 1e-4: the third of its branches has one fold on one mesh, three on another."""
     scene = wider.scene(13, 134)[0]
     few, many = (
-        trace(scene, Discretization(how, *mesh), Plan(depth=1))
+        trace(scene, Discretization(how, *mesh), Plan(depth=1, most_branches=3))
         for how, mesh in (("auto", (10, 6)), ("pointwise", (14, 5)))
     )
     assert [sum(s.kind == FOLD for s in d.branches[2].special) for d in (few, many)] == [1, 3]

@@ -49,6 +49,7 @@ OTHERS: dict[str, tuple[Callable[[], Scene], Callable[[], Scene], Plan]] = {
 
 @pytest.mark.alone
 @pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.usefixtures("few_loads")
 def test_files_of_another_rod(folder: Path, name: str) -> None:
     """Its inertia, and what differs between the ends of the range alone; the rod itself is read."""
     scene, other, plan = OTHERS[name]
@@ -118,6 +119,7 @@ def test_values_of_events() -> None:
 
 
 @pytest.mark.alone
+@pytest.mark.usefixtures("few_loads")
 def test_a_diagram_that_is_read_keeps_its_plan(folder: Path) -> None:
     """Depth, loads asked for, and what else a file holds; of steps and events it says that it has them not."""
     plan = Plan((0.0, 6.0), at=(1.0,), depth=0, error_bars=False)

@@ -28,6 +28,7 @@ def swept(turned: float, second: float) -> Diagram:
 
 
 @pytest.mark.alone
+@pytest.mark.usefixtures("few_loads")
 def test_loads_of_one_state_of_a_family_are_said_to_be_that() -> None:
     """By what angle the strip is turned decides at which load it flutters; on alike springs it does not."""
     straight, turned = swept(0.0, 20.0), swept(0.7, 20.0)

@@ -100,6 +100,8 @@ def test_one_row_on_a_kink_says_nothing_of_those_beside_it() -> None:
     assert [x.verdict for x in words_of(branch)] == ["undecided", "stable", "stable"]
 
 
+@pytest.mark.usefixtures("few_loads")
+@pytest.mark.alone
 def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
     soft = lambda k: ufl.conditional(ufl.lt(abs(k), 1.0), 0.5 * k**2, 0.1 * k**2 + 0.8 * abs(k) - 0.4)  # noqa: E731
     rod = column(

@@ -17,14 +17,14 @@ pytestmark = pytest.mark.alone
 
 
 @pytest.mark.parametrize("down", [False, True])
-@pytest.mark.parametrize(("load", "share"), [(3.0, 0.02), (4.0, 0.1), (5.0, 0.2)])
+@pytest.mark.parametrize(("load", "share"), [(3.0, 0.02), pytest.param(4.0, 0.1, marks=pytest.mark.long), (5.0, 0.2)])
 def test_a_path_ends_at_its_fold(load: float, share: float, down: bool) -> None:
     """Beyond it there is one equilibrium, stable, and Newton's method finds it: the rod was said to be stable."""
     assert snapping(load, share, down).right
 
 
 @pytest.mark.parametrize("most", [5.0, 8.0])
-@pytest.mark.parametrize("lateral", [1e-3, 1e-4, 1e-5, 1e-7])
+@pytest.mark.parametrize("lateral", [1e-3, *(pytest.param(x, marks=pytest.mark.long) for x in (1e-4, 1e-5)), 1e-7])
 def test_an_imperfect_column_bends_and_does_not_diverge(lateral: float, most: float) -> None:
     found = bends(lateral, most)
     assert found.right and not found.said
@@ -50,7 +50,7 @@ def test_not_across_a_jump() -> None:
     assert diagram[0].points[-1].load < 1.003 and "could not be followed" in diagram[0].ended
 
 
-@pytest.mark.parametrize("apart", [0.1, 1e-2, 1e-3, 1e-5])
+@pytest.mark.parametrize("apart", [0.1, pytest.param(1e-2, marks=pytest.mark.long), 1e-3, 1e-5])
 def test_a_fold_pair_in_one_step(apart: float) -> None:
     """``u^3 - a u = P`` with folds at P = +-apart/2, beside a force that follows and does no work."""
     a = 3 * (apart / 4) ** (2 / 3)

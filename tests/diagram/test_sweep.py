@@ -174,7 +174,7 @@ def test_constraints_that_follow_from_others_are_refused() -> None:
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), (5, 7)])
+@pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), pytest.param(5, 7, marks=pytest.mark.long)])
 def test_eigenvalues_that_change_with_the_shift_are_said(
     elements: int, degree: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -188,12 +188,15 @@ def test_eigenvalues_that_change_with_the_shift_are_said(
 
 @pytest.mark.alone
 @pytest.mark.parametrize(("length", "stiffness"), [(1.0, 1.0), (1e-3, 7e-13), (1e-3, 3e-5), (1e4, 1e9)])
-def test_frequencies_of_a_rod_that_turns_freely_in_any_units(length: float, stiffness: float) -> None:
+def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
+    length: float, stiffness: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A pinned and free beam, tan(b) = tanh(b): b = 3.92660231, 7.06858275, and rigid rotations left out.
 
     Three multipliers hold the rotations: theirs is a size of their own, beside which round-off makes finite
     eigenvalues of the infinite ones.
     """
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 2)
     scene = Scene(
         name="pinned",
         interval=(0.0, length),
@@ -213,7 +216,9 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(length: float, stif
     assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
-@pytest.mark.parametrize("twisting", [1e-3, pytest.param(1e-4, marks=pytest.mark.alone)])
+@pytest.mark.alone
+@pytest.mark.parametrize("twisting", [1e-3, 1e-4])
+@pytest.mark.usefixtures("few_loads")
 def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
     """A rod that is so soft in torsion that dozens of motions are slower than those that flutter, at Beck's load.
 
@@ -242,6 +247,7 @@ def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
 
 
 @pytest.mark.parametrize(("elements", "degree"), [(4, 8), pytest.param(20, 4, marks=pytest.mark.alone)])
+@pytest.mark.usefixtures("few_loads")
 def test_infinite_eigenvalues_of_a_light_rod_are_left_out(elements: int, degree: int) -> None:
     """Pflueger's column with a mass of a hundred times its own: the twelfth eigenvalue is 5e7 times the first.
 
@@ -274,7 +280,9 @@ def pflueger(z: np.ndarray) -> list[float]:
     return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
-@pytest.mark.parametrize("light", [pytest.param(1e-3, marks=pytest.mark.alone), 1e-5])
+@pytest.mark.alone
+@pytest.mark.parametrize("light", [1e-3, 1e-5])
+@pytest.mark.usefixtures("few_loads")
 def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
     """Two masses on a rod of 1e-5 of theirs: the eigenvalues that flutter, 27.5, are beside others of 1e10."""
     inertia = Inertia(rho_A=lambda c: light, rho_I=lambda c: (0.0, 0.0, 0.0))
@@ -301,6 +309,7 @@ def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
     ]
 
 
+@pytest.mark.usefixtures("few_loads")
 def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bar of its ordinate, 1e-12 for a straight rod, is none of the load."""
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from math import pi
 
+import pytest
+
 from rodfem import Discretization, Ordinate, Plan, Scene, free, pinned, trace
 
 CURVATURE, LEAST = 4e-9, 3e-5
 """Own curvature of the rod; eigenvalues below the other are not compared: those below 1e-5 count as zero."""
 
 
+@pytest.mark.alone
 def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
     """A round rod on pins, with a curvature that a stiff twist hides: its lowest eigenvalues are 1 - P/pi^2.
 

@@ -38,6 +38,7 @@ def test_a_rotation_that_springs_allow_is_one(bending: float) -> None:
     assert "rotation about e3" in " ".join(map(str, system.symmetries))
 
 
+@pytest.mark.alone
 def test_it_is_undecided_where_the_spring_is_round_off() -> None:
     (branch,) = trace(hinge(1e10, 0.5), Discretization(elements=3, degree=4), Plan(depth=0))
     assert not any(point.stable for point in branch.points if point.load > 1.0)

@@ -25,7 +25,7 @@ def test_a_hard_locus(case: Case, value: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", ["branch point", "fold"])
-@pytest.mark.parametrize("width", [1e-6, 1e-7])
+@pytest.mark.parametrize("width", [pytest.param(1e-6, marks=pytest.mark.long), 1e-7])
 def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
     """Narrower than the least step: the curve ends before it, or a crossing is said to be one or such a gap."""
     found = loci.gap(kind, width)

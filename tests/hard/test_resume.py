@@ -89,6 +89,7 @@ def run_of(scene: Scene, plan: rodfem.Plan, folder: Path, comm: MPI.Comm = COMM)
 
 
 @pytest.mark.parametrize("name", [pytest.param(x, marks=[pytest.mark.alone] * (x != "hemitropic")) for x in CASES])
+@pytest.mark.usefixtures("few_loads")
 def test_interrupted_at_any_moment(folder: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Twice, at random moments: in the middle third of the points, and in the first quarter after that."""
     scene, plan = CASES[name][0](), CASES[name][1]

@@ -23,7 +23,15 @@ NEAR = 0.3
 """Of that value: other critical loads are farther away."""
 
 
-def peaked(kind: str, top: float, at: float, mesh: Discretization, curvature: float = 1.0, **plan: Any) -> Diagram:
+def peaked(
+    kind: str,
+    top: float,
+    at: float,
+    mesh: Discretization,
+    curvature: float = 1.0,
+    span: tuple[float, float] = (0.0, 10.0),
+    **plan: Any,
+) -> Diagram:
     """Sweep whose thrust is ``top`` above the critical one where it is greatest, ``at`` a value of its parameter."""
     critical, share = CRITICAL[kind]
 
@@ -32,7 +40,7 @@ def peaked(kind: str, top: float, at: float, mesh: Discretization, curvature: fl
 
     ends = clamped(), free(force=push(1 - share), follower=push(share))
     constants = {"p": 0.0, "B2": 10.0, "top": top, "at": at, "curvature": curvature}
-    scene = classics.column("peaked", ends, (0.0, 10.0), load="p", inertia=classics.BEAM, constants=constants)
+    scene = classics.column("peaked", ends, span, load="p", inertia=classics.BEAM, constants=constants)
     return run(scene, mesh, **plan)
 
 

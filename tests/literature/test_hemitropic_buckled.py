@@ -161,7 +161,13 @@ def errors(found: list[Branch]) -> list[tuple[str, float, float]]:
 
 @pytest.mark.parametrize(
     ("formulation", "elements", "degree"),
-    [("reduced", 24, 1), ("reduced", 16, 2), ("pointwise", 12, 2), ("reduced", 8, 4), ("reduced", 8, 6)],
+    [
+        ("reduced", 24, 1),
+        pytest.param("reduced", 16, 2, marks=pytest.mark.long),
+        ("pointwise", 12, 2),
+        pytest.param("reduced", 8, 4, marks=pytest.mark.long),
+        ("reduced", 8, 6),
+    ],
 )
 def test_error_estimates_bound_the_error(formulation: str, elements: int, degree: int) -> None:
     for name, true, estimate in errors(branches(formulation, elements, degree)):

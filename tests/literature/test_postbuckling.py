@@ -44,7 +44,7 @@ def test_material_that_is_not_linear(beside: float) -> None:
     assert abs(found.law.coefficient - pi**4 / 8 * (1 - beside)) <= found.law.uncertainty < 1e-5
 
 
-@pytest.mark.parametrize("excess", [0.3, 1e-3, 1e-4])
+@pytest.mark.parametrize("excess", [0.3, pytest.param(1e-3, marks=pytest.mark.long), 1e-4])
 def test_column_that_stretches(excess: float) -> None:
     """``P (1 - P/EA) = pi^2`` has two roots if EA exceeds 4 pi^2: it buckles, and is straight again when it is shorter.
 
@@ -139,7 +139,7 @@ def test_ring_of_intrinsic_twist(C: float) -> None:
     assert found.law.coefficient == pytest.approx((C - 11 / 8) / C, abs=1e-7)
 
 
-@pytest.mark.parametrize("beta", [1.0, 0.3, 0.01, 1e-3])
+@pytest.mark.parametrize("beta", [1.0, *(pytest.param(x, marks=pytest.mark.long) for x in (0.3, 0.01)), 1e-3])
 def test_foundation_that_is_softer_on_one_side(beta: float) -> None:
     """With ``beta x^3`` per length ``P = pi^2 + 8 beta/pi^3 x + pi^4/8 x^2 + ...``: two branches, a fold on one.
 

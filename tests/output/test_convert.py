@@ -32,14 +32,14 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.versions
 def test_vtk_reads_the_steps(saved: Path, tmp_path: Path) -> None:
-    vtk = pytest.importorskip("vtk")
-    from vtk.util.numpy_support import vtk_to_numpy
+    io = pytest.importorskip("vtkmodules.vtkIOHDF")  # without the other modules, whose import takes seconds
+    from vtkmodules.util.numpy_support import vtk_to_numpy
 
     path, modes = to_vtkhdf(saved, tmp_path)
     data = json.loads((saved / "diagram.json").read_text())["branches"][0]["columns"]
     with h5py.File(saved / "states.h5") as file:
         r = file["branches/first branch/r"][()]
-    reader = vtk.vtkHDFReader()
+    reader = io.vtkHDFReader()
     reader.SetFileName(str(path))
     reader.UpdateInformation()
     assert reader.GetNumberOfSteps() == len(data["load"])
@@ -55,7 +55,7 @@ def test_vtk_reads_the_steps(saved: Path, tmp_path: Path) -> None:
         assert v == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(v), 1)), abs=1e-6)
         for name in ("load", "energy", "negative"):
             assert shape.GetFieldData().GetArray(name).GetValue(0) == data[name][step]
-    reader = vtk.vtkHDFReader()
+    reader = io.vtkHDFReader()
     reader.SetFileName(str(modes))
     reader.Update()
     found = reader.GetOutputDataObject(0).GetPointData()

@@ -91,6 +91,14 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("browser")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rodfem.diagram.sweep.LOADS", 26)
+        computed(folder)
+    return folder
+
+
+def computed(folder: Path) -> None:
+    """Run what the pages show."""
     for name in ("locus", "follower"):
         scene, mesh, plan = RUNS[name]
         run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
@@ -101,7 +109,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     molecule = rescaled(scenes()["euler"], *DNA[:2], load=DNA[1])
     plan = Plan((0.0, 12.0 * DNA[1]), depth=1, error_bars=False)
     run(molecule, MESH, plan, folder / "molecule", figures=False, quiet=True)
-    return folder
 
 
 @pytest.fixture
@@ -184,7 +191,12 @@ def test_the_page_is_drawn_without_a_frame(opened: Callable[..., Any], browser: 
 
 @pytest.mark.parametrize(
     ("name", "size"),
-    [("pinned", PROJECTOR), ("pinned", SIZES[0]), ("pinned", SIZES[1]), ("locus", SIZES[0]), ("follower", SIZES[1])],
+    [
+        ("pinned", PROJECTOR),
+        *(pytest.param("pinned", size, marks=pytest.mark.long) for size in SIZES),
+        ("locus", SIZES[0]),
+        ("follower", SIZES[1]),
+    ],
 )
 def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, size: tuple[int, int]) -> None:
     page = opened(name, size)

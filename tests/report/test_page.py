@@ -49,7 +49,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     for name in ("pinned", "locus", "planar", "follower", "ring", "foundation", "guided", "accurate"):
         scene, mesh, plan = RUNS[name]
-        run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("rodfem.diagram.sweep.LOADS", 26)
+            run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
     run(
         scenes()["euler"],
         MESH,

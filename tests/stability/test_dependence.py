@@ -70,7 +70,7 @@ def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
         trace(shortened(rod="inextensible"), Discretization("pointwise", *mesh), PLAN)
 
 
-@pytest.mark.parametrize("planar", ["e2", None])
+@pytest.mark.parametrize("planar", [pytest.param("e2", marks=pytest.mark.alone), None])
 def test_a_range_that_ends_where_the_rod_is_taut(planar: str | None) -> None:
     """Its ends are as far apart as it is long at P = 0: nothing is missing there, and that is what is said."""
     scene = shortened(planar=planar, span=(0.3, 0.0))

@@ -47,6 +47,7 @@ def test_what_is_infinite_is_not_found(body: float) -> None:
     assert body_of(3.306966, float(found.values[0].real)) == pytest.approx(body, rel=1e-4)
 
 
+@pytest.mark.alone
 def test_two_that_pass_one_another_stay_real() -> None:
     """Those of the two planes do at P = 17.2383, where round-off, 1e-6 of them, made complex pairs of them."""
     solver = Solver(pushed(1e6), Discretization(elements=6, degree=5))
@@ -56,6 +57,8 @@ def test_two_that_pass_one_another_stay_real() -> None:
         assert (found.values.imag == 0).all()
 
 
+@pytest.mark.usefixtures("few_loads")
+@pytest.mark.alone
 def test_flutter() -> None:
     """Where the body that goes with an eigenvalue is stationary two of them coincide, as in waves along the column."""
     diagram = trace(pushed(1e6), Discretization(elements=6, degree=5), Plan(error_bars=False))

@@ -167,7 +167,7 @@ def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
     assert [p.soft for p in again[1].points] == [p.soft for p in branch.points]
 
 
-@pytest.mark.parametrize("elements", [23, 27, 33])
+@pytest.mark.parametrize("elements", [27, *(pytest.param(n, marks=pytest.mark.long) for n in (23, 33))])
 def test_a_mesh_that_pins_a_buckle_is_found_out_without_error_bars(elements: int) -> None:
     """The derivative along the rod solves the linearised equations of the rod, not of this mesh: by how much tells.
 
