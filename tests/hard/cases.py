@@ -178,6 +178,16 @@ SWEEPS = (
         "round-off", EXACT, "Beck, by the characteristic equation", "B2/B1 - 1", thrusts.two_planes, (1e-6,),
         (2e-2, 1e-2, 1e-3, 1e-6, 1e-9, 1e-10),
     ),
+    Case(
+        "a flutter load that is asked for", "the pair is real at that row and complex, by round-off, from the next one "
+        "on", EXACT, "Beck, by the characteristic equation", "distance, relative", thrusts.asked, (4e-13,),
+        (0.0, 1e-14, -1e-14, 1e-13, -1e-13, 4e-13, -4e-13, 1e-11, -1e-11, 1e-9),
+    ),
+    Case(
+        "flutter of a stiff rod on soft springs", "frequencies far below those of bending, in which round-off is "
+        "measured", EXACT, "two degrees of freedom, P = k/3", "k in EI/L^3", thrusts.soft_springs, (1e-7,),
+        (1e-5, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8),
+    ),
     *(
         Case(
             f"{kind} that comes and goes{where}", "complex pairs, or negative eigenvalues, of a range within one "

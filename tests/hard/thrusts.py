@@ -13,12 +13,15 @@ import classics
 from diagram.test_close_critical_loads import BECK, DIVERGES, FLUTTERS, SHARE
 from hard.case import Change, Measured, compare, run, said
 
-from rodfem import Diagram, Discretization, clamped, free
+from forms import loads as springs
+from rodfem import Diagram, Discretization, End, Inertia, clamped, free
 
 MESH = Discretization("pointwise", 4, 6)
 AT_ROW, BETWEEN = 5.0, 5.0371
 """Values of the parameter: one of a row of the sweep, and one between two rows."""
 CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE), "late flutter": (FLUTTERS, SHARE)}
+THIN = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.01))
+"""Of a rod that resists spinning alone."""
 NEAR = 0.3
 """Of that value: other critical loads are farther away."""
 
@@ -65,3 +68,27 @@ def two_planes(apart: float) -> Measured:
     strong = 1.0 + apart
     diagram = run(classics.partly_following(1.0, (0.0, 30.0), strong), MESH)
     return compare(diagram.special("flutter"), [Change(BECK, 0, 2), Change(BECK * strong, 2, 4)], said(diagram))
+
+
+def asked(off: float) -> Measured:
+    """The same in two planes, asked for at the second flutter load, or ``off`` that, relative: a row is there."""
+    strong = 1.5
+    plan = {"at": (BECK * strong * (1 + off),)}
+    diagram = run(classics.partly_following(1.0, (0.0, 35.0), strong), MESH, **plan)
+    return compare(diagram.special("flutter"), [Change(BECK, 0, 2), Change(BECK * strong, 2, 4)], said(diagram))
+
+
+def soft_springs(k: float) -> Measured:
+    """A stiff rod on springs k and k/2 across its ends: two degrees of freedom, of which it flutters at ``P = k/3``.
+
+    ``EI``, the length and the mass are one: bending makes a difference of 2e-3 k in that.
+    """
+    foot = End(
+        position=lambda c: (None, None, 0.0),
+        energy=lambda x, c: springs.spring(x.r, (c.k, 3 * c.k, 0.0)) + springs.rotational_spring(x.q, (0.0, 0.0, 1.0)),
+    )
+    tip = End(follower=classics.push, energy=lambda x, c: springs.spring(x.r, (0.5 * c.k, 1.5 * c.k, 0.0)))
+    constants = {"k": k, "B2": 1.3}
+    scene = classics.column("soft springs", (foot, tip), (0.0, 0.9 * k), inertia=THIN, constants=constants)
+    diagram = run(scene, MESH)
+    return compare(diagram.special("flutter"), [Change(k / 3, 0, 2)], said(diagram))
