@@ -13,6 +13,7 @@ from rodfem.stability.census import census
 from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
 from rodfem.stability.outside import LARGEST
+from rodfem.stability.slow_motions import with_floor
 
 NUMBER = 10
 """Eigenvalues that are sought besides those of the locus."""
@@ -57,7 +58,7 @@ def all_looked_at(pencil: NonsymmetricPencil) -> bool:
 
 
 def _found(pencil: NonsymmetricPencil, size: int) -> Frequencies:
-    return pencil.near(NUMBER + size, SHIFT * pencil.system.scene.units.omega2)
+    return with_floor(pencil, pencil.near(NUMBER + size, SHIFT * pencil.system.scene.units.omega2))
 
 
 def _unstable(found: Frequencies, chosen: np.ndarray) -> int:

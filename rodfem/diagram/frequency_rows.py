@@ -17,12 +17,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.linalg.matrices import rounding_of
 from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.followed_pairs import FollowedPairs
-from rodfem.stability.frequencies import ALIKE, EPS, NEAR_ZERO, REAL, Frequencies, named
-from rodfem.stability.inertia import NOISE
+from rodfem.stability.frequencies import ALIKE, NEAR_ZERO, REAL, Frequencies, named
 from rodfem.stability.nonsymmetric import BEYOND, NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.slow_motions import begins_slowly, without_round_off
 from rodfem.tolerances import unit
 
 FREQUENCIES = 6
@@ -35,11 +34,6 @@ BESIDE = 1e-4
 """Relative distance of a shift from the pair that is sought there."""
 AGAIN = 1e-7
 """Eigenvalues of two shifts that differ by less than this, relative to them or to one, were found twice."""
-MANY = 100.0
-"""Round-off of the inverse eigenvalues, in units of the largest and of eps.
-
-Measured up to 50 for Greenhill's rod, but 1e6 and more for some eigenvalues: those are not covered.
-"""
 EVERY = 20
 """Loads from one certificate to the next."""
 NEAR = 1e-3
@@ -48,8 +42,6 @@ AGREED = 1e-8
 """Difference of an inverse eigenvalue followed and one found anew, over the greatest: far ones of SLEPc have 1e-10."""
 WORTH, LONGEST = 4, 16
 """Loads for which to follow is worth its beginning; most loads solved for anew before it is tried again."""
-SLOW, SOLVED, CLEAR = 1e-3, 1e-9, 10.0
-"""Part of the natural size below which eigenvalues are slow, what a state leaves open of them, and times that."""
 NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
 
 
@@ -80,8 +72,7 @@ class FrequencyRows:
     def first(self, x: PETSc.Vec) -> str:
         """Find the eigenvalues of ``x``, the state of the first point; in words, if any, what other shifts find."""
         self._first = leftmost(self.eigensolver.at(x), self.number)
-        sizes = abs(self._first.values) / self._first.one
-        self.eigensolver.slow = not self._first.floating and bool(((sizes > CLEAR * SOLVED) & (sizes < SLOW)).any())
+        self.eigensolver.slow = begins_slowly(self._first)
         if self.eigensolver.slow:
             self._first = leftmost(self.eigensolver.at(x), self.number)
         return differ(self.eigensolver.at(x), self.number, self._first)
@@ -118,7 +109,7 @@ class FrequencyRows:
         found = self.followed.at(pencil, point.load)
         if found is None:
             return None
-        return in_order(_without_round_off(pencil, found))
+        return in_order(without_round_off(pencil, found))
 
     def _proved(self, pencil: NonsymmetricPencil, point: Point, found: Frequencies) -> bool:
         """Whether what was followed to a point is proved to be all that is as near to the shift."""
@@ -193,7 +184,7 @@ def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE
     one = pencil.system.scene.units.omega2
     found = pencil.near(sought(number), SHIFT * one)
     pairs = _beyond(before, found)
-    found = _without_round_off(pencil, found)
+    found = without_round_off(pencil, found)
     for pair in pairs:
         found = _joined(found, pencil.near(2, pair * (1 + BESIDE)))
     return in_order(found)
@@ -284,29 +275,3 @@ def _among(some: np.ndarray, others: np.ndarray, tolerance: float) -> bool:
 def _numbers(found: Frequencies) -> tuple[int, int, int]:
     """Numbers of complex, of negative, and of unstable eigenvalues."""
     return int((found.values.imag != 0).sum()), found.diverged(), found.unstable(found.noise)
-
-
-def _without_round_off(pencil: NonsymmetricPencil, found: Frequencies) -> Frequencies:
-    """Eigenvalues of a ``pencil`` found next to the shift, imaginary parts that are round-off of real ones dropped.
-
-    The solver has ``1 / (mu - shift)`` to round-off of the largest of them: ``mu`` to ``eps |mu - shift|^2 / min |mu -
-    shift|``, and one near zero to that of the matrix.
-    """
-    apart = abs(found.values - SHIFT * found.one)
-    doubt = MANY * EPS * apart**2 / apart.min()
-    slow = np.flatnonzero((abs(found.values) < SLOW * found.one) & pencil.slow)
-    if len(slow):
-        found = replace(found, floor=max(SOLVED * found.one, float(doubt[slow].max()), _rounding(pencil, found, slow)))
-    sizes = np.maximum(abs(found.values), NEAR_ZERO * found.far)
-    doubt = np.maximum(REAL * sizes, doubt)
-    if len(slow):
-        doubt[slow] = np.minimum(doubt, np.maximum(REAL * abs(found.values), found.floor))[slow]
-    return replace(found, values=np.where(abs(found.values.imag) < doubt, found.values.real, found.values))
-
-
-def _rounding(pencil: NonsymmetricPencil, found: Frequencies, slow: np.ndarray) -> float:
-    """Round-off of the ``slow`` ones of some eigenvalues by errors of the matrix's entries."""
-    energy = abs(pencil.squares(found.vectors[:, slow], found.weighed[:, slow]))
-    vectors = found.vectors[:, slow].T
-    rounded = [rounding_of(pencil.matrix, v, v) / e for v, e in zip(vectors, energy.tolist(), strict=True) if e > 0]
-    return NOISE * max(rounded, default=0.0)

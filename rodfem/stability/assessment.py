@@ -22,6 +22,7 @@ from rodfem.stability.methods import AUTO, METHODS, find
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
+from rodfem.stability.slow_motions import noise_of_slow
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
@@ -152,9 +153,10 @@ class Assessor(Workspace):
         if self.inertia is None:
             with as_failure(self.system.comm):
                 found = self._method(name).nearest(x, max(number, 1))
-            scale = ZERO * least_eigenvalue(self.system)
+            pencil = self.nonsymmetric.at(x)
+            scale = min(ZERO * least_eigenvalue(self.system), noise_of_slow(pencil, found.values))
             bad = int(((found.values.real < -scale) | (abs(found.values.imag) > scale)).sum())
-            everything = census(self.nonsymmetric.at(x))
+            everything = census(pencil)
             if everything is not None:
                 bad = max(bad, len(everything.unstable))
             index, zero, nothing = bad, self.system.active_drifts(x), np.zeros(0)

@@ -45,7 +45,29 @@ def test_flutter_of_a_stiff_rod_on_soft_springs(k: float) -> None:
     P = point.load / k
     exact = eigvals([[1.5, 0.5 + P], [0.5, 0.5]], [[1.0, 0.5], [0.5, 1 / 3]])
     found = np.array([complex(*value) for value in point.omega2[:2]]) / k
-    assert point.negative == 2 and sorted(found.imag) == pytest.approx(sorted(exact.imag), rel=1e-2)
+    assert point.negative == 2 == diagram.assess(point).negative and sorted(found.imag) == pytest.approx(
+        sorted(exact.imag), rel=1e-2
+    )
+
+
+def test_springs_that_soften_with_the_parameter() -> None:
+    """The first state is not slow: springs ``k = 10^-p``, a thrust of ``0.05 p k`` with ``P = k/3`` at ``p = 20/3``."""
+    k = lambda c: 10.0**-c.p  # noqa: E731
+    foot = End(
+        position=lambda c: (None, None, 0.0),
+        energy=lambda x, c: loads.spring(x.r, (k(c), 3 * k(c), 0.0)) + loads.rotational_spring(x.q, (0.0, 0.0, 1.0)),
+    )
+    tip = End(
+        follower=lambda c: (0.0, 0.0, -0.05 * c.p * k(c)),
+        energy=lambda x, c: loads.spring(x.r, (0.5 * k(c), 1.5 * k(c), 0.0)),
+    )
+    constants = {"p": 2.0, "B2": 1.3}
+    rod = column("softens", (foot, tip), (2.0, 8.0), load="p", inertia=THIN, constants=constants)
+    diagram = swept(rod, error_bars=False)
+    (flutter,) = diagram.special("flutter")
+    assert flutter.point.load == pytest.approx(20 / 3, abs=1e-4) and not diagram.warnings
+    found = diagram.locus(flutter, "B2", (1.2, 1.4))
+    assert found.index.tolist() == [[0, 2]] * len(found.values)
 
 
 @pytest.mark.parametrize(("kr", "most"), [pytest.param(1e-5, 1.6, marks=pytest.mark.long), (1e-6, 1.28), (1e-7, 1.6)])
