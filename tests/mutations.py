@@ -270,6 +270,18 @@ FAULTS = {
         "not pencil.slow",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
+    "between-looks-nothing-is-compared": Fault(
+        "rodfem/diagram/unfollowed.py",
+        "in self.far.look(point, found):",
+        "in self.far.look(point, found)[:0]:",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
+    "two-that-meet-at-the-first-load-are-no-eigenvalues": Fault(
+        "rodfem/diagram/frequency_rows.py",
+        " or agree(with_means(found), with_means(other))",
+        "",
+        "tests/diagram/test_flutter_at_a_row.py",
+    ),
     "loci-count-what-is-nearest": Fault(
         "rodfem/codim2/others.py",
         "return int((abs(everything.unstable - shift)",
@@ -284,8 +296,8 @@ FAULTS = {
     ),
     "of-unstable-rows-nothing-else-is-looked-at": Fault(
         "rodfem/diagram/unfollowed.py",
-        "len(found.unstable) > point.negative:",
-        "len(found.unstable) > point.negative == 0:",
+        "point.negative:\n            self._warn(point.load,",
+        "point.negative == 0:\n            self._warn(point.load,",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "corners-where-interpolated-states-have-them": Fault(

@@ -18,10 +18,11 @@ from rodfem.continuation.flutter import Located, locate_flutter
 from rodfem.continuation.kinds import FLUTTER, Kind
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.held import at_load
+from rodfem.diagram.side import Side
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
 from rodfem.stability.cluster_noise import ClusterNoise, noise_of
-from rodfem.stability.frequencies import MULTIPLE, Frequencies
+from rodfem.stability.frequencies import MULTIPLE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import TINY, round_off, unit
 
@@ -59,15 +60,6 @@ class Critical:
     cluster: Cluster | None = None
     note: str = ""
     still: int = 0
-
-
-@dataclass(frozen=True)
-class Side:
-    """One end of a step: its ``load``, the equilibrium ``x`` there, and the eigenvalues ``found``."""
-
-    load: float
-    x: PETSc.Vec
-    found: Frequencies
 
 
 @dataclass

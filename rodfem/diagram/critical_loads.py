@@ -19,11 +19,12 @@ from rodfem.continuation.complex_pairs import strange
 from rodfem.continuation.interpolant import SHARP
 from rodfem.continuation.kinds import DIVERGENCE
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.collisions import Collisions, Critical, Measuring, Side, Told
+from rodfem.diagram.collisions import Collisions, Critical, Measuring, Told
 from rodfem.diagram.divergence_loads import Mean, interpolated_zero
 from rodfem.diagram.frequency_rows import Row, leftmost
 from rodfem.diagram.held import at_load
 from rodfem.diagram.hidden_events import HiddenEvents, signature
+from rodfem.diagram.side import Side
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import cluster_of

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.followed_pairs import FollowedPairs
-from rodfem.stability.frequencies import ALIKE, NEAR_ZERO, REAL, Frequencies, named
+from rodfem.stability.frequencies import ALIKE, NEAR_ZERO, REAL, Frequencies, groups, named
 from rodfem.stability.nonsymmetric import BEYOND, NonsymmetricPencil, NonsymmetricSolver
 from rodfem.stability.slow_motions import begins_slowly, without_round_off
 from rodfem.tolerances import unit
@@ -203,14 +203,23 @@ def differ(pencil: NonsymmetricPencil, number: int, found: Frequencies) -> str:
 
     Eigenvalues of a singular pencil, ``S x = M x = 0`` for some ``x``, are any numbers, with residuals of round-off; so
     are those that round-off makes of the infinite ones of a pencil that is badly scaled.  Both change with the shift.
+    So do two that are about to meet, by the root of round-off, but not their mean.
     """
     other = in_order(pencil.near(sought(number), OTHER * SHIFT * found.one))
-    if agree(found, other):
+    if agree(found, other) or agree(with_means(found), with_means(other)):
         return ""
     first, second = (
         ", ".join(f"{v:.6g}" if v.imag else f"{v.real:.6g}" for v in f.values[:2].tolist()) for f in (found, other)
     )
     return f"beginning with {first} from one shift and with {second} from another"
+
+
+def with_means(found: Frequencies) -> Frequencies:
+    """Frequencies with their mean for those that are near one another."""
+    values = np.empty_like(found.values)
+    for group in groups(found.values, found.far, NEAR):
+        values[group] = found.values[group].mean()
+    return replace(found, values=values)
 
 
 def _joined(found: Frequencies, beside: Frequencies) -> Frequencies:

@@ -18,13 +18,14 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.complex_pairs import upper
+from rodfem.diagram.side import Side
 from rodfem.roots import lowest_between
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
 from rodfem.stability.cluster_noise import noise_of
 from rodfem.stability.frequencies import ALIKE, REAL, Frequencies, groups
 
 if TYPE_CHECKING:
-    from rodfem.diagram.collisions import Measuring, Side
+    from rodfem.diagram.collisions import Measuring
     from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 NEAR = 0.3
@@ -149,7 +150,7 @@ class HiddenEvents:
             turns = i not in before and (third.load - a.load) * (b.load - a.load) < 0 and DIP * min(f[0], f[2]) > f[1]
             beside = min(f[0], f[2]) if turns and along < BESIDE else min(f[1], f[2])
             if -BESIDE < along < 1 + BESIDE and low < NEAR * beside:
-                lowest = self._lowest(here, a, b, min(max(along, 0.1), 0.9))
+                lowest = self.lowest(here, a, b, min(max(along, 0.1), 0.9))
                 part = (lowest.load - a.load) / (b.load - a.load)
                 if part > 1 - EDGE or (part < EDGE and not turns):
                     continue  # lower beyond a row: in the next step, or in one that has told of it
@@ -192,8 +193,11 @@ class HiddenEvents:
         self.near += [] if lowest.open or lowest.crossing else [lowest]
         return lowest.open
 
-    def _lowest(self, approach: Approach, a: Side, b: Side, along: float) -> Lowest:
-        """Where between two sides what approaches zero is lowest."""
+    def lowest(self, approach: Approach, a: Side, b: Side, along: float) -> Lowest:
+        """Where an ``approach`` is lowest from ``a`` to ``b``; the search begins this part of the way ``along``.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where the eigenvalues are not followed.
+        """
         measured = self.measured(a.x)
         cluster = cluster_of(measured.pencil(a.load), a.found, approach.places)
         width, sign, single = b.load - a.load, approach.sign, len(approach.places) == 1

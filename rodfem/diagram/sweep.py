@@ -22,6 +22,7 @@ from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.critical_loads import CriticalLoads
+from rodfem.diagram.far_meetings import FarMeetings
 from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
@@ -73,7 +74,7 @@ class Sweep:
         self.rows = FrequencyRows(self.eigensolver, self.number)
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, self.number, observer.warn)
-        self.unfollowed = Unfollowed(self.eigensolver, observer)
+        self.unfollowed = Unfollowed(self.eigensolver, FarMeetings(self.critical.hidden), observer)
         self.invariants = Invariants(solver)
         self.last: Row | None = None
         self._still = self.number  # frequencies that are zero at all loads

@@ -1,16 +1,23 @@
 """Unstable eigenvalues of a sweep that are not among those that it follows: looked for from time to time, and said.
 
 Of a mesh with many rows fewer rows of the sweep are looked at, among them the last one that is stable; of one with very
-many none is, which is said.
+many none is, which is said.  Between the looks :mod:`rodfem.diagram.far_meetings` tells what may come and go.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rodfem.continuation.branch import Point
 from rodfem.continuation.observer import Observer
+from rodfem.errors import ConvergenceError
 from rodfem.stability.census import MANY, Census, census
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.outside import LARGEST
+
+if TYPE_CHECKING:
+    from rodfem.diagram.far_meetings import FarMeetings
+    from rodfem.diagram.hidden_events import Lowest
 
 OFTEN = 5
 """Rows from one look at all eigenvalues of the mesh to the next."""
@@ -21,9 +28,12 @@ RARELY = 25
 class Unfollowed:
     """Looks at all eigenvalues of the mesh at some rows: more may be unstable than those that are followed."""
 
-    def __init__(self, eigensolver: NonsymmetricSolver, observer: Observer) -> None:
-        """Look with the matrices of the ``eigensolver``; the ``observer`` is told, once."""
-        self.eigensolver, self.observer = eigensolver, observer
+    def __init__(self, eigensolver: NonsymmetricSolver, far: FarMeetings, observer: Observer) -> None:
+        """Look with the matrices of the ``eigensolver``; the ``observer`` is told, once.
+
+        ``far`` compares what is seen at one look with what is seen at others.
+        """
+        self.eigensolver, self.observer, self.far = eigensolver, observer, far
         self._rows, self._said = 0, False
         self._stable: Point | None = None
 
@@ -51,16 +61,46 @@ class Unfollowed:
                 "stable there is said of those nearest zero"
             )
         if found is not None and len(found.unstable) > point.negative:
-            self._warn(point, found)
+            self._warn(point.load, point.negative, found)
+        elif found is not None and not self._said:
+            self._meetings(point, found)
         return found is not None
 
-    def _warn(self, point: Point, found: Census) -> None:
+    def _meetings(self, point: Point, found: Census) -> None:
+        """Say what may come and go between the last looks and this one."""
+        name = self.eigensolver.system.scene.load
+        try:
+            for lowest in self.far.look(point, found):
+                self._meeting(point, lowest)
+        except ConvergenceError as trouble:
+            self.observer.note(
+                f"  whether frequencies that are not followed meet, and part again, before {name} = {point.load:.6g} "
+                f"is not known ({trouble})"
+            )
+
+    def _meeting(self, point: Point, lowest: Lowest) -> None:
+        """Say that eigenvalues meet, or may, and have parted at the ``point``."""
+        if self._said:
+            return
+        found = census(self.far.hidden.measured(point.x).pencil(lowest.load))
+        if found is not None and len(found.unstable) > point.negative:
+            self._warn(lowest.load, point.negative, found)
+            return
+        self._said = True
+        self.observer.warn(
+            f"Two frequencies beyond those that are followed come so near one another at "
+            f"{self.eigensolver.system.scene.load} = {lowest.load:.8g}, omega^2 = {lowest.cluster.mean:.6g}, that "
+            "whether they meet there, and part again, is not known."
+        )
+
+    def _warn(self, load: float, negative: int, found: Census) -> None:
+        """Say which eigenvalue is unstable at a ``load``, where so many are known to be (``negative``)."""
         self._said = True
         value, number = found.unstable[-1], int(found.nearer[-1]) + 1
-        where = f"{self.eigensolver.system.scene.load} = {point.load:.6g}"
-        if point.negative:  # unstable all the same
+        where = f"{self.eigensolver.system.scene.load} = {load:.6g}"
+        if negative:  # unstable all the same
             self.observer.note(
-                f"  at {where} {len(found.unstable)} eigenvalues of this mesh are unstable, and {point.negative} are "
+                f"  at {where} {len(found.unstable)} eigenvalues of this mesh are unstable, and {negative} are "
                 f"counted, as others are nearer to zero: for the loads of all of them spectrum={number} is needed"
             )
             return

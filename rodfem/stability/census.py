@@ -13,10 +13,13 @@ is left out.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eig, eigh
+import scipy.sparse as sp
+from scipy.linalg import eigh
 from scipy.sparse.linalg import splu
 
 from rodfem.errors import ConvergenceError
@@ -24,7 +27,6 @@ from rodfem.linalg.matrices import gathered
 from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.stability.outside import inverse_with_mass
-from rodfem.tolerances import TINY
 
 CLEAR = 1e-5
 """Imaginary part, relative to its eigenvalue, above which that is complex, and negative real part, to natural size.
@@ -41,43 +43,80 @@ MOST = 4000
 """Rows of a pencil that each rank factors by itself."""
 
 
+@dataclass(frozen=True)
+class Motions:
+    """Vectors of ``K m`` for the finite eigenvalues ``values`` (k,), ``mu = omega^2``, nearest to the shift first.
+
+    ``inverse`` is ``K`` (h, h), ``mass`` is ``m`` (h, h), ``lower`` is ``L`` (h, n); ``nu`` (k,), ``right`` (n, k) and
+    ``left`` (k, n) are those eigenvalues of ``L^t K L`` and their vectors.
+    """
+
+    values: np.ndarray
+    nu: np.ndarray
+    right: np.ndarray
+    left: np.ndarray
+    inverse: np.ndarray
+    mass: sp.csr_matrix
+    lower: np.ndarray
+
+    @cached_property
+    def operator(self) -> np.ndarray:
+        """``K m`` (h, h), which is smooth in parameters of the rod."""
+        return np.asarray(self.inverse @ self.mass)
+
+    def vectors(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Right (h, j) and left vectors (j, h) of ``K m`` for j of the eigenvalues; their product is the identity."""
+        right = self.inverse @ (self.lower @ self.right[:, places])
+        return right / self.nu[places], self.left[places] @ self.lower.T
+
+
 class Census(NamedTuple):
-    """Eigenvalues ``unstable`` (k,), ``mu = omega^2``, and how many are ``nearer`` (k,) to the shift than each."""
+    """Eigenvalues ``unstable`` (k,), ``mu = omega^2``, and how many are ``nearer`` (k,) to the shift than each.
+
+    ``motions`` has all finite ones; the unstable ones have these places there.
+    """
 
     unstable: np.ndarray
     nearer: np.ndarray
+    motions: Motions
 
 
 def census(pencil: NonsymmetricPencil, largest: int = MANY) -> Census | None:
-    """Unstable eigenvalues among all finite ones of a ``pencil``; None where more than ``largest`` rows have mass.
+    """All finite eigenvalues of a ``pencil``, the unstable ones apart; None where more than ``largest`` rows have mass.
 
     Those that round-off may have made unstable are left out.  None also where the shift is an eigenvalue.
     """
     found = _inverse(pencil, largest)
     if found is None:
         return None
-    inverse, round_off = found
-    values, unstable = _values(np.linalg.eigvals(inverse), round_off)
-    if unstable.any():  # whether they are, their vectors tell
-        nu, left, right = eig(inverse, left=True, right=True)
-        condition = 1.0 / np.maximum(abs(np.einsum("ij,ij->j", left.conj(), right)), TINY)
-        values, unstable = _values(nu, round_off * condition)
-    return Census(values[unstable] * pencil.system.scene.units.omega2, np.flatnonzero(unstable))
+    inverse, mass, lower, round_off = found
+    nu, right = np.linalg.eig(lower.T @ inverse @ lower)  # the vectors have norm one
+    left = np.linalg.inv(right)
+    order, values, unstable = _values(nu, round_off * np.linalg.norm(left, axis=1))
+    values = values * pencil.system.scene.units.omega2
+    motions = Motions(values, nu[order], right[:, order], left[order], inverse, mass, lower)
+    return Census(values[unstable], np.flatnonzero(unstable), motions)
 
 
-def _values(nu: np.ndarray, round_off: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Finite eigenvalues of ``nu`` (n,), nearest to the shift first, and which are unstable beyond their round-off."""
+def _values(nu: np.ndarray, round_off: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places of the finite eigenvalues ``nu`` (n,), nearest to the shift first, ``mu``, and which are unstable.
+
+    They are beyond the ``round_off`` (n,) of each.
+    """
     order = np.argsort(-abs(nu), kind="stable")
-    order = order[abs(nu[order]) > np.broadcast_to(round_off, nu.shape)[order]]
-    nu, doubt = nu[order], np.broadcast_to(round_off, nu.shape)[order] / abs(nu[order])
-    values = SHIFT + 1.0 / nu
-    doubt = np.maximum(CLEAR, doubt)
+    order = order[abs(nu[order]) > round_off[order]]
+    doubt = np.maximum(CLEAR, round_off[order] / abs(nu[order]))
+    values = SHIFT + 1.0 / nu[order]
     complex_ones = abs(values.imag) > doubt * abs(values - SHIFT)
-    return values, complex_ones & (abs(values.imag) > CLEAR) | (values.real < -doubt * abs(values - SHIFT))
+    unstable = complex_ones & (abs(values.imag) > CLEAR) | (values.real < -doubt * abs(values - SHIFT))
+    return order, values, unstable
 
 
-def _inverse(pencil: NonsymmetricPencil, largest: int) -> tuple[np.ndarray, float] | None:
-    """``L^t K L`` of a pencil in units of natural sizes, and its round-off; None for too many rows, or no factors."""
+def _inverse(pencil: NonsymmetricPencil, largest: int) -> tuple[np.ndarray, sp.csr_matrix, np.ndarray, float] | None:
+    """``K``, ``m``, ``L`` of a pencil in units of natural sizes, and the round-off of ``L^t K L``.
+
+    None for too many rows, or no factors.
+    """
     try:
         factors = pencil.eliminated(SHIFT * pencil.system.scene.units.omega2)
         if factors is not None:
@@ -96,4 +135,4 @@ def _inverse(pencil: NonsymmetricPencil, largest: int) -> tuple[np.ndarray, floa
     masses, ways = eigh(m)  # a quaternion's own length has no mass
     lower = ways[:, masses > 0.0] * np.sqrt(masses[masses > 0.0])
     round_off = ROUNDED * max(float(np.linalg.norm(inverse, 2)), 1.0) * float(masses.max(initial=0.0))
-    return np.asarray(lower.T @ inverse @ lower), round_off
+    return inverse, sparse, lower, round_off

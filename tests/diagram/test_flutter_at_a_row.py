@@ -68,6 +68,20 @@ def test_a_row_of_the_grid_at_a_flutter_load(width: float) -> None:
     assert flutter[1] == pytest.approx(load, rel=1e-11) and sorted(flutter[2:]) == [2, 4]
 
 
+@pytest.mark.parametrize(
+    ("share", "strong", "which", "to"), [(1.0, 1.5, 0, 25.0), (1.0, 1.5, 1, 25.0), (0.4, 10.0, 3, 4.0)]
+)
+def test_a_range_that_begins_at_a_flutter_load(share: float, strong: float, which: int, to: float) -> None:
+    """Two shifts find two that meet there apart by the root of round-off: no sweep was to be trusted."""
+    known = without(share, strong)
+    diagram = swept(share, strong, (known[which][1], to))
+    inside = [one for one in known if min(known[which][1], to) < one[1] < max(known[which][1], to)]
+    found = [one for one in critical(diagram) if abs(one[1] - known[which][1]) > 1e-9]
+    assert [one[0] for one in found] == [one[0] for one in inside]
+    assert [one[1] for one in found] == pytest.approx([one[1] for one in inside], rel=1e-11)
+    assert not diagram.warnings and not diagram[0].unexplained
+
+
 @pytest.mark.parametrize(("span", "at"), [((0.3, 25.0), 0.1 * 3), ((0.0, 20.1), nextafter(20.1, 0.0))])
 def test_loads_that_differ_by_round_off_are_one(span: tuple[float, float], at: float) -> None:
     """A step of one unit in the last place ended the sweep."""

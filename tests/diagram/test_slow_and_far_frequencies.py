@@ -12,6 +12,7 @@ from hard.thrusts import THIN, on_soft_springs
 from scipy.linalg import eigvals
 
 from forms import loads
+from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, End, Inertia, Plan, Scene, clamped, free, trace
 from rodfem.codim2.others import NEAREST
 
@@ -103,6 +104,25 @@ def test_flutter_that_comes_and_goes_beyond_the_frequencies_that_are_followed() 
     rod = column("peak", ends, (0.0, 10.0), load="p", inertia=inertia, constants=constants)
     (words,) = swept(rod, error_bars=False).warnings
     assert words.startswith("At p = 5.") and "is not among those that are followed" in words
+
+
+@pytest.mark.parametrize(("above", "said"), [(2e-4, 1), (-2e-4, 0)])
+def test_flutter_between_two_looks_where_no_load_turns(above: float, said: int) -> None:
+    """A thrust of ``p`` and a stiffness of ``(1 + p^2)/2`` times: both grow, and their ratio is greatest at ``p = 1``.
+
+    It passes Beck's load within 0.02 of that, a fifth of the way from one look at all frequencies to the next.
+    """
+    inertia, constants = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)), {"p": 1.0, "b": 1.0 + above}
+    rod = column(
+        "ratio", (clamped(), free(follower=lambda c: (0.0, 0.0, -BECK * c.b * c.p))), (0.25, 2.3),
+        load="p", inertia=inertia, constants=constants,
+        energy=lambda v, k, c: bending_and_twist(k, ((1 + c.p**2) / 2, 10.0, 0.02)),
+    )  # fmt: skip
+    found = swept(rod, error_bars=False)
+    assert not found.special("flutter") and len(found.warnings) == said
+    for words in found.warnings:
+        assert words.startswith("At p = ") and "is not among those that are followed" in words
+        assert float(words.split()[3]) == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_index_of_a_locus_counts_all_eigenvalues() -> None:

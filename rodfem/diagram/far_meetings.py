@@ -1,0 +1,159 @@
+r"""Frequencies beyond those that a sweep follows which meet, and part again, between two looks at all of them.
+
+At each look all eigenvalues ``nu`` and right and left vectors ``Y``, ``Z`` of a matrix ``T``, smooth in the load, are
+known (:mod:`rodfem.stability.census`).  With ``Z^t Y = 1`` and a parabola through ``Z^t T Y`` at three looks,
+
+    Z^t T(t) Y = diag(nu) + E(t),        E(0) = 0,
+
+two eigenvalues ``i``, ``j`` have to first order the discriminant
+
+    D(t) = ((nu_i + E_ii - nu_j - E_jj) / 2)^2 + E_ij E_ji .
+
+It becomes negative only where the product is: motions that the load does not couple, or couples by a potential, cross
+or turn away from one another.  Equal eigenvalues are one group: ``D`` has the means of two groups, and the trace of the
+product of their blocks, over its size.  Where the lowest ``D`` is near zero or below, that of the invariant subspace
+is sought by equilibria (:mod:`rodfem.diagram.hidden_events`).
+
+The upper half of a mesh's eigenvalues is left out: it tells of the mesh rather than of the rod.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rodfem.continuation.branch import Point
+from rodfem.diagram.hidden_events import NEAR, Approach, HiddenEvents, Lowest
+from rodfem.diagram.side import Side
+from rodfem.errors import ConvergenceError
+from rodfem.stability.census import Census
+from rodfem.stability.frequencies import ALIKE, REAL, Frequencies, groups
+from rodfem.stability.nonsymmetric import NonsymmetricPencil
+
+RESOLVED = 0.5
+"""Part of a mesh's eigenvalues, nearest to zero, that are compared."""
+FOUND = 1e-4
+"""Relative distance within which an eigenvalue is found again."""
+EDGE = 0.1
+"""Part of the way from one look to the next, at either end, in which no search begins."""
+ASIDE = 0.1
+"""Distance of a shift from the mean of eigenvalues, over their standard deviation: it is none of them."""
+PLACES = np.linspace(0.0, 1.0, 21)
+"""Parts of the way from one look to the next at which the discriminants are evaluated."""
+
+
+class Look(NamedTuple):
+    """A ``point`` and the ``census`` of its state."""
+
+    point: Point
+    census: Census
+
+
+class Meeting(NamedTuple):
+    """Eigenvalues (k,), ``mu = omega^2`` at a look, that may meet this part of the way ``along`` to the next one."""
+
+    values: np.ndarray
+    along: float
+
+
+class FarMeetings:
+    """Compares looks of a sweep at all eigenvalues of its mesh."""
+
+    def __init__(self, hidden: HiddenEvents) -> None:
+        """Measure, and seek lowest values, as the search among eigenvalues that are followed does (``hidden``)."""
+        self.hidden = hidden
+        self._looks: list[Look] = []
+
+    def look(self, point: Point, census: Census) -> list[Lowest]:
+        """What may meet, and part again, between the last looks and the one at a ``point``, whose ``census`` is given.
+
+        Raises :class:`ConvergenceError` where eigenvalues are not found again.
+        """
+        self._looks = [*self._looks[-2:], Look(point, census)]
+        if len(self._looks) < 3:
+            return []
+        a = self._looks[1]
+        out: list[Lowest] = []
+        for b, found in zip(self._looks[::2], point.x.comm.tompi4py().bcast(_meetings(*self._looks)), strict=True):
+            for meeting in found:
+                lowest = self._lowest(a, b, meeting)
+                out += [lowest] if lowest.open else []
+        return out
+
+    def _lowest(self, a: Look, b: Look, meeting: Meeting) -> Lowest:
+        """Where on the way from one look to another eigenvalues are nearest."""
+        pencil = self.hidden.measured(a.point.x).pencil(a.point.load)
+        found, chosen = _again(pencil, meeting.values)
+        first, second = (Side(look.point.load, look.point.x, found) for look in (a, b))
+        approach = Approach(chosen, 1, float(meeting.values.var()))
+        return self.hidden.lowest(approach, first, second, meeting.along)
+
+
+def _meetings(before: Look, here: Look, after: Look) -> tuple[list[Meeting], list[Meeting]]:
+    """What may meet on the way from a look to that ``before``, and on the way to that ``after`` it."""
+    of, T = here.census.motions, [look.census.motions.operator for look in (before, here, after)]
+    places = np.setdiff1d(np.arange(int(RESOLVED * len(of.nu))), here.census.nearer)
+    if not len(places) or not T[0].shape == T[1].shape == T[2].shape:  # sections have mass at some loads only
+        return [], []
+    Y, Z = of.vectors(places)
+    E = [Z @ (other @ Y) for other in T]
+    # E(t) = t first + t^2 second is the difference to the look after it at t = 1, to that before it at t = s
+    loads = [look.point.load for look in (before, here, after)]
+    s = (loads[0] - loads[1]) / (loads[2] - loads[1])
+    second = (E[0] - E[1] - s * (E[2] - E[1])) / (s * (s - 1.0))
+    first = E[2] - E[1] - second
+    mu, followed = of.values[places].real, (np.arange(len(of.nu)) < len(here.point.omega2))[places]
+    pairs = Pairs(of.nu[places].real, first, second)
+    found = [
+        [Meeting(mu[both], along) for both, along in pairs.near(way) if not followed[both].all()] for way in (s, 1.0)
+    ]
+    return found[0], found[1]
+
+
+class Pairs:
+    """Discriminants of all pairs of eigenvalues ``nu`` (k,), or of groups of equal ones, as functions of a parameter.
+
+    The matrix changes by ``t first + t^2 second`` (k, k).
+    """
+
+    def __init__(self, nu: np.ndarray, first: np.ndarray, second: np.ndarray) -> None:
+        """Find the groups, and the products of their blocks."""
+        self.groups = groups(nu, float(abs(nu).max()), ALIKE)
+        member = np.zeros((len(nu), len(self.groups)))
+        for g, group in enumerate(self.groups):
+            member[group, g] = 1.0
+        sizes = member.sum(axis=0)
+        changes = (np.diag(first).real, np.diag(second).real)
+        self.mean, *self._changes = ((part @ member) / sizes for part in (nu, *changes))
+        products = first * first.T, first * second.T + second * first.T, second * second.T
+        self._products = [member.T @ part.real @ member / (np.add.outer(sizes, sizes) / 2.0) for part in products]
+
+    def near(self, way: float) -> list[tuple[list[int], float]]:
+        """Places of eigenvalues whose discriminant comes near zero, or below, for ``t`` from 0 to ``way``.
+
+        Part of the way at which it is lowest.
+        """
+        (of1, of2), (by1, by2, by3), t = self._changes, self._products, way * PLACES[:, None]
+        mean, t2 = self.mean + t * (of1 + t * of2), (t**2)[:, :, None]
+        product = t2 * (by1 + t[:, :, None] * (by2 + t[:, :, None] * by3))
+        D = (mean[:, :, None] - mean[:, None, :]) ** 2 / 4.0 + product
+        i, j = np.triu_indices(len(self.groups), 1)
+        k = D.argmin(axis=0)[i, j]
+        chosen = D[k, i, j] < NEAR * np.minimum(D[0, i, j], D[-1, i, j])
+        chosen &= product[k, i, j] < -((REAL * self.mean[i]) ** 2)
+        along = np.clip(PLACES[k], EDGE, 1.0 - EDGE)
+        return [(self.groups[i[n]] + self.groups[j[n]], float(along[n])) for n in np.flatnonzero(chosen)]
+
+
+def _again(pencil: NonsymmetricPencil, values: np.ndarray) -> tuple[Frequencies, list[int]]:
+    """Eigenvalues near some ``values`` (k,), with vectors, and the places of those among them."""
+    found = pencil.near(len(values) + 2, float(values.mean() + ASIDE * values.std()))
+    left, chosen = list(range(len(found.values))), list[int]()
+    for value in values.tolist():
+        place = min(left, key=lambda i: abs(found.values[i] - value))
+        if abs(found.values[place] - value) > FOUND * abs(value):
+            raise ConvergenceError(f"the eigenvalue {value:.6g} is not found again")
+        left.remove(place)
+        chosen.append(place)
+    return found, chosen
