@@ -409,7 +409,7 @@ FAULTS = {
         LOCI,
     ),
     "loci-say-nothing-of-what-is-too-fast": Fault(
-        "rodfem/codim2/locus.py",
+        "rodfem/codim2/follow.py",
         'said = [tracer.doubt, sharp, hidden, nearest, reasons.sentence if reasons else ""]',
         'said = [sharp, hidden, nearest, reasons.sentence if reasons else ""]',
         LOCI,
@@ -1569,13 +1569,13 @@ FAULTS = {
         IN_WORDS,
     ),
     "stable-in-a-plane-is-stable": Fault(
-        "rodfem/codim2/locus.py",
+        "rodfem/codim2/follow.py",
         "planar=bool(scene.planar)",
         "planar=False",
         IN_WORDS,
     ),
     "loci-of-unresolved-points-are-resolved": Fault(
-        "rodfem/codim2/locus.py",
+        "rodfem/codim2/follow.py",
         "if doubtful or special.resolved is False:",
         "if False:",
         LOCI,

@@ -103,7 +103,8 @@ class _Loci:
 
     def _locus(self, special: SpecialPoint) -> Locus:
         """Locus of a special point, from its file where the run goes on; said, and saved."""
-        from rodfem.codim2.locus import Locus, locus
+        from rodfem.codim2.follow import locus
+        from rodfem.codim2.locus import Locus
 
         file = self.output / f"locus-{len(self.saved) + 1}.json"
         found = Locus.read(file) if self.known and file.exists() else None

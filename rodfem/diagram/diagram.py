@@ -207,12 +207,12 @@ class Diagram:
         load
             Least and greatest load, by default those of the diagram.
         steps
-            Control of the step, by default :data:`rodfem.codim2.locus.STEPS`.
+            Control of the step, by default :data:`rodfem.codim2.follow.STEPS`.
 
         Raises :class:`~rodfem.errors.InputError` for a parameter, bounds or a kind of special point that make no sense,
         and :class:`~rodfem.errors.ConvergenceError` where the special point is not found again.
         """
-        from rodfem.codim2.locus import STEPS, locus
+        from rodfem.codim2.follow import STEPS, locus
 
         found = [branch for branch in self.branches if any(special is mine for mine in branch.special)]
         if not found:

@@ -27,7 +27,8 @@ from shooting_solver import Problem, Rod
 from forms import loads
 from forms.energy import bending_and_twist
 from rodfem.app.run import run
-from rodfem.codim2.locus import STEPS, Locus, locus
+from rodfem.codim2.follow import STEPS, locus
+from rodfem.codim2.locus import Locus
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl

@@ -40,7 +40,7 @@ from rodfem import (
     trace,
 )
 from rodfem.app.terminal import Report
-from rodfem.codim2.locus import locus
+from rodfem.codim2.follow import locus
 from rodfem.continuation.branch import Point
 from rodfem.continuation.follow import _to_load
 from rodfem.continuation.index_chain import Row, breaks, chained, explain

@@ -26,7 +26,7 @@ import rodfem
 import rodfem.app.run
 from rodfem import clamped, free
 from rodfem.app.run_terminal import Terminal
-from rodfem.codim2 import locus as locus_module
+from rodfem.codim2 import follow
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.journal import Journal
@@ -144,15 +144,15 @@ def test_loci_are_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = rodfem.Plan((60.0, 5.0), depth=0, error_bars=False, locus=("k0", 9.0, 9.8))
     run_of(scene, plan, folder / "whole")
     followed: list[str] = []
-    follow = locus_module.locus
+    really = follow.locus
 
     def counted(*arguments: Any) -> rodfem.Locus:
         if len(followed) == 1 and not (folder / "again").exists():
             raise Struck
         followed.append("locus")
-        return follow(*arguments)
+        return really(*arguments)
 
-    monkeypatch.setattr(locus_module, "locus", counted)
+    monkeypatch.setattr(follow, "locus", counted)
     with pytest.raises(Struck):
         run_of(scene, plan, folder / "cut")
     assert not contents(folder / "cut")["complete"]
