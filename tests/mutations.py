@@ -270,6 +270,12 @@ FAULTS = {
         "not pencil.slow",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
+    "differences-along-a-locus-by-the-bounds-alone": Fault(
+        "rodfem/codim2/collision.py",
+        "np.minimum(DIFFERENCE, INSIDE * self.plane.room(p) / width)",
+        "np.full(2, DIFFERENCE)",
+        "tests/codim2/test_locus.py",
+    ),
     "between-looks-nothing-is-compared": Fault(
         "rodfem/diagram/unfollowed.py",
         "in self.far.look(point, found):",

@@ -35,6 +35,8 @@ FAR = 1e-6
 """Step of the secants from which on they tell the slope of ``D``."""
 DIFFERENCE = 1e-3
 """Step of the central differences of ``D``, relative to the bounds."""
+INSIDE = 0.01
+"""Greatest such step over the distance from what is not admissible, as a mass of zero: ``D`` has a pole there."""
 FEWER = 1e-5
 """Pairs whose ``D`` differ by more than this, over the square of their mean, are not equal by a symmetry."""
 SPLIT = 1.1
@@ -68,10 +70,12 @@ class Collision:
         width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
         basis, forward = _basis(near), tangent[0] / width
         gradient, clearest = np.zeros(2), here
+        steps = np.minimum(DIFFERENCE, INSIDE * self.plane.room(p) / width)
         for which in (0, 1):
             system.line = self.plane.line(p, (np.arange(2) == which) * width)
-            low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-DIFFERENCE, DIFFERENCE))
-            gradient[which] = (high.discriminant - low.discriminant) / (2 * DIFFERENCE)
+            step = float(steps[which])
+            low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-step, step))
+            gradient[which] = (high.discriminant - low.discriminant) / (2 * step)
             clearest = max((clearest, low, high), key=lambda m: m.spread)
         if not np.linalg.norm(gradient):
             raise ConvergenceError("the discriminant is constant")

@@ -95,6 +95,7 @@ class Plane:
         self.bounds = np.array(bounds, dtype=float)
         self.width = self.bounds[:, 1] - self.bounds[:, 0]
         self.sizes = np.array([size(x) for x in abs(self.bounds).max(axis=1)])
+        self._admissible = np.array([scene.parameters[name].admissible for name in self.names])
 
     def line(self, origin: np.ndarray, direction: np.ndarray) -> Line:
         """Line on which the scalar unknown ``load`` stands for ``t`` in ``origin + t direction``."""
@@ -113,6 +114,10 @@ class Plane:
         if over[which] <= 0:
             return None
         return which, float(self.bounds[which, int(p[which] > self.bounds[which, 1])])
+
+    def room(self, p: np.ndarray) -> np.ndarray:
+        """Distances (2,) of the parameters ``p`` (2,) from values that are not admissible."""
+        return np.asarray(abs(self._admissible - p[:, None]).min(axis=1))
 
     @contextmanager
     def kept(self) -> Iterator[None]:

@@ -236,6 +236,11 @@ def test_a_load_that_does_not_change_has_no_turning_points() -> None:
     found = locus(solver, flutter, "B2", ((0.0, 25.0), (1.0, 12.0)))
     assert found.values[:, 0] == pytest.approx(double(20.0, 120.0, 0.0)[0], rel=1e-11)
     assert not found.marks and (found.index == [0, 2]).all()
+    # nor does it depend on the mass, which is a thousandth of its bounds here: central differences had it zero
+    found = locus(solver, flutter, "m", ((0.0, 25.0), (1e-3, 1e3)), steps=WIDE, error_bars=0)
+    assert found.ended == ("m = 0.001, its bound", "m = 1000, its bound")
+    assert found.values[:, 0] == pytest.approx(double(20.0, 120.0, 0.0)[0], rel=1e-10)
+    assert found.omega2 * found.values[:, 1] == pytest.approx(double(20.0, 120.0, 0.0)[1], rel=1e-8)
 
 
 def swept(scene: Scene) -> tuple[StaticSolver, Branch]:
