@@ -276,6 +276,18 @@ FAULTS = {
         "np.full(2, DIFFERENCE)",
         "tests/codim2/test_locus.py",
     ),
+    "determinants-with-their-stiffness": Fault(
+        f"{CONTINUATION}branch_solver.py",
+        "determinant=index.determinant - self._stiffness(x)",
+        "determinant=index.determinant",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "the-first-mesh-that-does-not-help-is-the-last": Fault(
+        "rodfem/diagram/frequency_mesh.py",
+        "(WORSE if least > FINE else 1)",
+        "1",
+        "tests/adaptivity/test_accuracy_control.py",
+    ),
     "between-looks-nothing-is-compared": Fault(
         "rodfem/diagram/unfollowed.py",
         "in self.far.look(point, found):",

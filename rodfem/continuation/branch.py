@@ -66,7 +66,8 @@ class Point:
     estimate
         Error of the discretisation in load and ordinate, where an accuracy was asked for.
     determinant
-        Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index.
+        Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index, over
+        what changes of the rod's stiffnesses make of it.
     soft
         Eigenvalues near zero, by name: :class:`~rodfem.stability.soft_mode.SoftMode`.
     nearest

@@ -159,9 +159,18 @@ class BranchSolver(StaticSolver):
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.negative(x),
             mesh=self.mesh,
-            determinant=index.determinant,
+            determinant=index.determinant - self._stiffness(x),
             nearest=index.nearest,
         )
+
+    def _stiffness(self, x: PETSc.Vec) -> float:
+        """Logarithm of what stiffnesses that alter along a branch make of the determinant of the saddle matrix.
+
+        High modes are local: to each strain a node of the mesh adds the logarithm of its stiffness.
+        """
+        if not self.convexity.alters:
+            return 0.0
+        return self.system.fields.discretization.degree * self.convexity.logarithm(x)
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
         """Left-most eigenvalues by SLEPc, if asked for; :class:`ConvergenceError` where they contradict the inertia."""

@@ -1,8 +1,9 @@
 r"""Pairs of crossings inside one step: an eigenvalue that passes zero and comes back leaves the index as it was.
 
 The index of two neighbouring rows does not show them.  The determinant of the saddle matrix does, the product of all
-eigenvalues up to factors that change little: on the way to its lowest value it falls before the step and rises after
-it.  A simple eigenvalue gives it a parabola near such a pair, a double one the square of one,
+eigenvalues up to factors that change little (what stiffnesses make of it that change with the load or the strains is
+divided out): on the way to its lowest value it falls before the step and rises after it.  A simple eigenvalue gives it
+a parabola near such a pair, a double one the square of one,
 
     det^(1/m)(s) ~ c ((s - s_m)^2 - r^2),    crossings at s_m -+ r,    m = 1, 2,
 

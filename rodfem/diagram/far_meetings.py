@@ -39,6 +39,10 @@ EDGE = 0.1
 """Part of the way from one look to the next, at either end, in which no search begins."""
 ASIDE = 0.1
 """Distance of a shift from the mean of eigenvalues, over their standard deviation: it is none of them."""
+CLEAR = 100.0
+"""Products of the changes of two eigenvalues above this, over their doubts, are none of round-off."""
+SMALL = 0.3
+"""Part of an eigenvalue up to which its change is one of first order: near a double one, with one vector, it is not."""
 PLACES = np.linspace(0.0, 1.0, 21)
 """Parts of the way from one look to the next at which the discriminants are evaluated."""
 
@@ -84,7 +88,7 @@ class FarMeetings:
     def _lowest(self, a: Look, b: Look, meeting: Meeting) -> Lowest:
         """Where on the way from one look to another eigenvalues are nearest."""
         pencil = self.hidden.measured(a.point.x).pencil(a.point.load)
-        found, chosen = _again(pencil, meeting.values)
+        found, chosen = _again(pencil, meeting.values, a.census.motions.values)
         first, second = (Side(look.point.load, look.point.x, found) for look in (a, b))
         approach = Approach(chosen, 1, float(meeting.values.var()))
         return self.hidden.lowest(approach, first, second, meeting.along)
@@ -104,7 +108,7 @@ def _meetings(before: Look, here: Look, after: Look) -> tuple[list[Meeting], lis
     second = (E[0] - E[1] - s * (E[2] - E[1])) / (s * (s - 1.0))
     first = E[2] - E[1] - second
     mu, followed = of.values[places].real, (np.arange(len(of.nu)) < len(here.point.omega2))[places]
-    pairs = Pairs(of.nu[places].real, first, second)
+    pairs = Pairs(of.nu[places].real, first, second, of.doubt[places])
     found = [
         [Meeting(mu[both], along) for both, along in pairs.near(way) if not followed[both].all()] for way in (s, 1.0)
     ]
@@ -114,10 +118,10 @@ def _meetings(before: Look, here: Look, after: Look) -> tuple[list[Meeting], lis
 class Pairs:
     """Discriminants of all pairs of eigenvalues ``nu`` (k,), or of groups of equal ones, as functions of a parameter.
 
-    The matrix changes by ``t first + t^2 second`` (k, k).
+    The matrix changes by ``t first + t^2 second`` (k, k); the eigenvalues are in ``doubt`` (k,) by round-off.
     """
 
-    def __init__(self, nu: np.ndarray, first: np.ndarray, second: np.ndarray) -> None:
+    def __init__(self, nu: np.ndarray, first: np.ndarray, second: np.ndarray, doubt: np.ndarray) -> None:
         """Find the groups, and the products of their blocks."""
         self.groups = groups(nu, float(abs(nu).max()), ALIKE)
         member = np.zeros((len(nu), len(self.groups)))
@@ -126,6 +130,7 @@ class Pairs:
         sizes = member.sum(axis=0)
         changes = (np.diag(first).real, np.diag(second).real)
         self.mean, *self._changes = ((part @ member) / sizes for part in (nu, *changes))
+        self._round_off = np.array([max(REAL * abs(nu[g]).max(), CLEAR * doubt[g].max()) for g in self.groups])
         products = first * first.T, first * second.T + second * first.T, second * second.T
         self._products = [member.T @ part.real @ member / (np.add.outer(sizes, sizes) / 2.0) for part in products]
 
@@ -141,14 +146,19 @@ class Pairs:
         i, j = np.triu_indices(len(self.groups), 1)
         k = D.argmin(axis=0)[i, j]
         chosen = D[k, i, j] < NEAR * np.minimum(D[0, i, j], D[-1, i, j])
-        chosen &= product[k, i, j] < -((REAL * self.mean[i]) ** 2)
+        chosen &= product[k, i, j] < -self._round_off[i] * self._round_off[j]
+        for own in (i, j):
+            size = SMALL * abs(self.mean[own])
+            chosen &= (abs(mean[k, own] - self.mean[own]) < size) & (-product[k, i, j] < size**2)
         along = np.clip(PLACES[k], EDGE, 1.0 - EDGE)
         return [(self.groups[i[n]] + self.groups[j[n]], float(along[n])) for n in np.flatnonzero(chosen)]
 
 
-def _again(pencil: NonsymmetricPencil, values: np.ndarray) -> tuple[Frequencies, list[int]]:
-    """Eigenvalues near some ``values`` (k,), with vectors, and the places of those among them."""
-    found = pencil.near(len(values) + 2, float(values.mean() + ASIDE * values.std()))
+def _again(pencil: NonsymmetricPencil, values: np.ndarray, known: np.ndarray) -> tuple[Frequencies, list[int]]:
+    """Eigenvalues near some ``values`` (k,) of those ``known``, with vectors, and the places of the ``values``."""
+    shift = float(values.mean() + ASIDE * values.std())
+    between = int((abs(known - shift) < abs(values - shift).max()).sum())
+    found = pencil.near(max(between, len(values)) + 2, shift)
     left, chosen = list(range(len(found.values))), list[int]()
     for value in values.tolist():
         place = min(left, key=lambda i: abs(found.values[i] - value))

@@ -32,6 +32,10 @@ REFINED = 1.5
 """Ratio of the numbers of elements of one mesh and the next."""
 MOST = 8
 """Number of refinements."""
+WORSE, FINE = 3, 1e-6
+"""Refinements after each other that do not help before the best mesh is taken: coarse ones do not see all yet.  Below
+this change one is enough: that is round-off.
+"""
 
 
 def frequency_mesh(
@@ -49,16 +53,17 @@ def frequency_mesh(
     mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
     first = System(scene, mesh, comm)
     values = _frequencies(first, loads, number)
-    best, least = mesh, np.inf
+    best, least, worse = mesh, np.inf, 0
     for _ in range(MOST):
         finer = replace(mesh, elements=ceil(REFINED * mesh.elements))
         richer = _frequencies(System(scene, finer, comm, symmetries=first.symmetries), loads, number)
         one = scene.units.omega2
         change = max(_change(v[:number], w, one) for v, w in zip(values, richer, strict=True))
-        if change >= least:
-            break
-        best, least = mesh, change
-        if change < accuracy / MARGIN:
+        if change < least:
+            best, least, worse = mesh, change, 0
+        else:
+            worse += 1
+        if worse >= (WORSE if least > FINE else 1) or least < accuracy / MARGIN:
             break
         mesh, values = finer, richer
     return best, least

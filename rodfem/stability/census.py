@@ -48,7 +48,7 @@ class Motions:
     """Vectors of ``K m`` for the finite eigenvalues ``values`` (k,), ``mu = omega^2``, nearest to the shift first.
 
     ``inverse`` is ``K`` (h, h), ``mass`` is ``m`` (h, h), ``lower`` is ``L`` (h, n); ``nu`` (k,), ``right`` (n, k) and
-    ``left`` (k, n) are those eigenvalues of ``L^t K L`` and their vectors.
+    ``left`` (k, n) are those eigenvalues of ``L^t K L`` and their vectors, ``doubt`` (k,) the round-off of ``nu``.
     """
 
     values: np.ndarray
@@ -58,6 +58,7 @@ class Motions:
     inverse: np.ndarray
     mass: sp.csr_matrix
     lower: np.ndarray
+    doubt: np.ndarray
 
     @cached_property
     def operator(self) -> np.ndarray:
@@ -92,9 +93,10 @@ def census(pencil: NonsymmetricPencil, largest: int = MANY) -> Census | None:
     inverse, mass, lower, round_off = found
     nu, right = np.linalg.eig(lower.T @ inverse @ lower)  # the vectors have norm one
     left = np.linalg.inv(right)
-    order, values, unstable = _values(nu, round_off * np.linalg.norm(left, axis=1))
+    doubt = round_off * np.linalg.norm(left, axis=1)
+    order, values, unstable = _values(nu, doubt)
     values = values * pencil.system.scene.units.omega2
-    motions = Motions(values, nu[order], right[:, order], left[order], inverse, mass, lower)
+    motions = Motions(values, nu[order], right[:, order], left[order], inverse, mass, lower, doubt[order])
     return Census(values[unstable], np.flatnonzero(unstable), motions)
 
 

@@ -64,6 +64,26 @@ def test_a_notch_that_other_terms_hide() -> None:
     np.testing.assert_allclose(found, [0.3712 - off, 0.3712 + off], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("above", "other", "power"), [(1e-4, 2.0, 1), (1e-6, 1.0, 3), pytest.param(1e-2, 9.0, 1, marks=pytest.mark.long)]
+)
+def test_a_pair_where_stiffness_and_thrust_both_grow(above: float, other: float, power: int) -> None:
+    """Stiffness ``((1 + P^2)/2)^n``, thrust ``P^n (1 + a)`` of Euler's: unstable where ``2 P (1 + a)^(1/n) > 1 + P^2``.
+
+    Determinants of all modes grew a hundredfold from row to row, which hid the one that comes and goes: "stable".
+    """
+    growth = (1 + above) ** (1 / power)
+    rod = cantilever(
+        lambda v, k, c: ((1 + c.P**2) / 2) ** power * bending_and_twist(k, (1.0, other, 1.0)),
+        lambda c: EULER * (1 + above) * c.P**power,
+        (0.25, 2.3),
+    )
+    diagram = trace(rod, MESH, Plan(depth=0, error_bars=False))
+    half = sqrt(growth**2 - 1)
+    np.testing.assert_allclose(branch_points(diagram), [growth - half, growth + half], rtol=0, atol=1e-9)
+    assert not diagram.warnings
+
+
 def test_a_kink_is_no_peak() -> None:
     for thrust in (lambda c: abs(c.P - 1.234), lambda c: ufl.max_value(c.P, 1.234)):
         assert not FastLoad(cantilever(constant, thrust), (0.0, 4.0)).doubt
