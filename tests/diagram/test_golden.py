@@ -36,8 +36,9 @@ def test_all_cases_are_recorded() -> None:
 
 
 def marked(name: str) -> Any:
-    """A case with the runs that have it besides the serial one."""
+    """A case with the runs that have it besides the serial one; those that state another once more are long."""
     marks = [] if name in VARIED else [pytest.mark.alone]
+    marks += [pytest.mark.long] if name.startswith("docs ") and name.removeprefix("docs ") in REPEATED else []
     return pytest.param(name, marks=[*marks, pytest.mark.versions] if name.removeprefix("demo ") in DEMOS else marks)
 
 

@@ -70,9 +70,10 @@ def test_what_an_eigensolver_leaves_open() -> None:
     assert noise_of(pencil, off).discriminant_left == pytest.approx(1e-6 * measured.discriminant, rel=1e-3)
 
 
-def test_flutter_of_steel_by_other_factors() -> None:
+def test_flutter_of_steel_by_other_factors(monkeypatch: pytest.MonkeyPatch) -> None:
     """MUMPS leaves 1e-10 of a flutter load in newtons; that is in its bar."""
-    scene = wider.scene(14, 463)[0]
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)  # about the load alone
+    scene = wider.scene(14, 463)[0].varying("P", (2.48e5, 2.54e5))
     first, other = (
         next(s for s in trace(scene, Discretization("pointwise", 12, 5, factors=how), Plan())[0].special if s.omega2)
         for how in ("chain", "petsc")
