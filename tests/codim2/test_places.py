@@ -75,6 +75,7 @@ def test_column_whose_load_follows_in_part(kind: str, number: int, mark: str, ex
     check(of_column(kind, number), mark, exact)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_the_same_column_in_units_of_a_molecule() -> None:
     """Pairs at and next to the double zero: one of the end and one of a row beside it were 1e-7, and 0.1, off."""
