@@ -75,6 +75,7 @@ def test_column_whose_load_follows_in_part(kind: str, number: int, mark: str, ex
     check(of_column(kind, number), mark, exact)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_the_same_column_in_units_of_a_molecule() -> None:
     """Pairs at and next to the double zero: one of the end and one of a row beside it were 1e-7, and 0.1, off."""
@@ -87,7 +88,11 @@ def test_the_same_column_in_units_of_a_molecule() -> None:
 
 @pytest.mark.parametrize(
     ("number", "index", "elements"),
-    [(0, [0, 2], 4), (1, [2, 2], 4), (0, [0, 2], 5), pytest.param(1, [2, 2], 5, marks=pytest.mark.long)],
+    [
+        (0, [0, 2], 4),
+        (1, [2, 2], 4),
+        *(pytest.param(*x, 5, marks=pytest.mark.long) for x in ((0, [0, 2]), (1, [2, 2]))),
+    ],
 )
 def test_a_double_zero_counts_as_the_row_before_it(number: int, index: list[int], elements: int) -> None:
     """On either mesh the end is found, though left vectors beside it are not always."""
@@ -97,7 +102,7 @@ def test_a_double_zero_counts_as_the_row_before_it(number: int, index: list[int]
     assert found.index[:3].tolist() == [index] * 3
 
 
-@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_a_coarse_mesh_displaces_turning_points_along_the_curve(number: int) -> None:
     """The bar is the difference from a finer mesh, whose own error is some 1e-5 of that and may be 1/32."""
     mark, exact = (("turns in P", TURNS_IN_LOAD), ("turns in share", TURNS_IN_SHARE))[number]

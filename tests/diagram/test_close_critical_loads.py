@@ -92,7 +92,9 @@ columns = cache(swept)
 
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0), (19.0, 21.0)])
-@pytest.mark.parametrize("strong", [1 + 1e-6, 1.001, 1.005, 1.01, 1.012, 1.02])
+@pytest.mark.parametrize(
+    "strong", [1 + 1e-6, 1.005, 1.01, *(pytest.param(x, marks=pytest.mark.long) for x in (1.001, 1.012, 1.02))]
+)
 def test_two_flutters(strong: float, span: tuple[float, float]) -> None:
     """In one step, or in two that follow one another: what is born lies where the other one was before."""
     diagram = columns(strong, span)
@@ -104,7 +106,7 @@ def test_two_flutters(strong: float, span: tuple[float, float]) -> None:
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("strong", [1.005, 1.02])
+@pytest.mark.parametrize("strong", [1.005, pytest.param(1.02, marks=pytest.mark.long)])
 def test_numbers_between_two_flutters(strong: float) -> None:
     """Of complex eigenvalues, by the frequency equation of either plane, at every row."""
     for p in columns(strong, (19.0, 21.0))[0].points:
@@ -118,7 +120,7 @@ def test_numbers_between_two_flutters(strong: float) -> None:
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("strong", [1 + 1e-9, 1 + 1e-10])
+@pytest.mark.parametrize("strong", [1 + 1e-9, pytest.param(1 + 1e-10, marks=pytest.mark.long)])
 def test_flutters_that_are_one_to_round_off(strong: float) -> None:
     """Four eigenvalues that are taken for two equal pairs: the bar of their load has those of both."""
     for span in ((19.0, 21.0), (10.0, 30.0)):
@@ -176,7 +178,15 @@ def humped(strong: float, top: float, curvature: float, span: tuple[float, float
 
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(4.0, 6.0), (6.0, 4.0)])
-@pytest.mark.parametrize(("top", "curvature"), [(1e-3, 1.0), (1e-6, 1.0), (1e-3, 0.02), (-1e-3, -1.0), (-1e-6, -1.0)])
+@pytest.mark.parametrize(
+    ("top", "curvature"),
+    [
+        *(pytest.param(*x, marks=pytest.mark.long) for x in ((1e-3, 1.0), (-1e-3, -1.0))),
+        (1e-6, 1.0),
+        (1e-3, 0.02),
+        (-1e-6, -1.0),
+    ],
+)
 def test_flutter_and_its_reverse_in_a_step(top: float, curvature: float, span: tuple[float, float]) -> None:
     """Rows every 0.1 show none of it, where it takes 0.002 or 0.06 of the parameter; nor of a range without flutter."""
     diagram = in_steps(0.1, humped(10.0, top, curvature, span))
@@ -214,7 +224,13 @@ FLUTTERS = float(
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(4.5, 18.0), (18.0, 4.5)])
 @pytest.mark.parametrize(
-    "strong", [1.002, 1.035, BACK / DIVERGES + 1e-3, FLUTTERS / DIVERGES + 1e-4, FLUTTERS / DIVERGES]
+    "strong",
+    [
+        1.002,
+        BACK / DIVERGES + 1e-3,
+        FLUTTERS / DIVERGES,
+        *(pytest.param(x, marks=pytest.mark.long) for x in (1.035, FLUTTERS / DIVERGES + 1e-4)),
+    ],
 )
 def test_flutter_and_divergence(strong: float, span: tuple[float, float]) -> None:
     """In one step: of one plane flutter, or the end of divergence, and divergence of the other one."""

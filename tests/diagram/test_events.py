@@ -113,7 +113,7 @@ def test_zeros_without_a_change_of_sign(of: Callable[[float], float], exact: lis
     assert not found.warnings
 
 
-@pytest.mark.parametrize("largest", [0.3, 0.11])
+@pytest.mark.parametrize("largest", [0.3, pytest.param(0.11, marks=pytest.mark.long)])
 def test_corners_on_a_curved_branch(largest: float) -> None:
     """Each is found where interpolated states are not equilibria, and beside a row, where no sample is between."""
     rod = classics.imperfect_column()

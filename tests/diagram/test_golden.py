@@ -21,6 +21,7 @@ from golden_cases import (
     record,
     single_branches,
 )
+from literature.test_classics import CRITICAL
 
 NUMBERS = numbers()
 
@@ -36,8 +37,14 @@ def test_all_cases_are_recorded() -> None:
 
 
 def marked(name: str) -> Any:
-    """A case with the runs that have it besides the serial one."""
+    """A case with the runs that have it besides the serial one; those that state another once more are long.
+
+    So are classical problems of a closed form, which ``tests/literature/test_classics.py`` compares with it.
+    """
     marks = [] if name in VARIED else [pytest.mark.alone]
+    kind, _, scene = name.partition(" ")
+    again = scene in REPEATED if kind == "docs" else kind == "classic" and scene in CRITICAL and name not in VARIED
+    marks += [pytest.mark.long] if again else []
     return pytest.param(name, marks=[*marks, pytest.mark.versions] if name.removeprefix("demo ") in DEMOS else marks)
 
 

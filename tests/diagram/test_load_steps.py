@@ -59,14 +59,14 @@ def test_a_fold_pair_in_one_step(apart: float) -> None:
     assert diagram.warnings and diagram[0].points[-1].load <= apart / 2
 
 
-@pytest.mark.parametrize("given", [(1e-1, 6), (1e-3, 8)])
+@pytest.mark.parametrize("given", [pytest.param((1e-1, 6), marks=pytest.mark.long), (1e-3, 8)])
 def test_a_ring_under_loads_that_follow(given: tuple[float, int]) -> None:
     """As under a pressure that has a potential: no end holds its rotation, and Newton's method went round at random."""
     found = floats(given)
     assert found.right and not found.said
 
 
-@pytest.mark.parametrize("width", [1e-2, 1e-3, 1e-6])
+@pytest.mark.parametrize("width", [1e-2, pytest.param(1e-3, marks=pytest.mark.long), 1e-6])
 def test_a_peak_of_the_load_between_rows(width: float) -> None:
     """The load is critical on either side of its peak; of one that is too narrow to be followed it is said."""
     found = peak(width)

@@ -37,7 +37,7 @@ def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
     [
         (loci.peak, 1e-4, "no convergence with steps of 1e-06"),
         (loci.peak, 1e-6, "changes too fast with b about b = 0.512"),
-        (loci.ridge, 5e-3, "no convergence with steps of 1e-06"),
+        pytest.param(loci.ridge, 5e-3, "no convergence with steps of 1e-06", marks=pytest.mark.long),
     ],
 )
 def test_a_peak_that_is_not_followed_is_said(measure: Callable[[float], Measured], width: float, words: str) -> None:

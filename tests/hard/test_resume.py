@@ -88,7 +88,17 @@ def run_of(scene: Scene, plan: rodfem.Plan, folder: Path, comm: MPI.Comm = COMM)
     return rodfem.run(scene, MESH, plan, folder, figures=False, quiet=True, comm=comm)
 
 
-@pytest.mark.parametrize("name", [pytest.param(x, marks=[pytest.mark.alone] * (x != "hemitropic")) for x in CASES])
+RECALLED = ("family", "crooked")
+"""Cases all of whose steps are recalled, and compared, in another test that is not long."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(x, marks=[pytest.mark.alone] * (x != "hemitropic") + [pytest.mark.long] * (x in RECALLED))
+        for x in CASES
+    ],
+)
 @pytest.mark.usefixtures("few_loads")
 def test_interrupted_at_any_moment(folder: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Twice, at random moments: in the middle third of the points, and in the first quarter after that."""

@@ -59,7 +59,13 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("command", commands())
+ON_TWO = "mpirun"
+"""A demo that is run by another command, too, on two processes: long."""
+
+
+@pytest.mark.parametrize(
+    "command", [pytest.param(x, marks=[pytest.mark.long] * x.startswith(ON_TWO)) for x in commands()]
+)
 def test_a_command(command: str, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The last of those that go together need the results of the others before."""
     words, answers = shlex.split(command), HOME / "docs" / "course" / "solutions" / "03_2.py"

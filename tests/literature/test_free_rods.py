@@ -151,7 +151,7 @@ def with_mass_at_nose(m: float, stiffness: tuple[float, float, float], span: tup
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("mesh", [MESH, Discretization("pointwise", 8, 5)])
+@pytest.mark.parametrize("mesh", [MESH, pytest.param(Discretization("pointwise", 8, 5), marks=pytest.mark.long)])
 @pytest.mark.usefixtures("few_loads")
 def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretization) -> None:
     """The compression is ``P (m + s)/(1 + m)``.  In each plane two eigenvalues are zero at all loads: by Galerkin.

@@ -12,6 +12,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -111,14 +112,19 @@ def computed(folder: Path) -> None:
     run(molecule, MESH, plan, folder / "molecule", figures=False, quiet=True)
 
 
+@cache
+def as_it_is(folder: Path) -> str:
+    """The page of a run."""
+    return page_of(payload_of(folder))
+
+
 @pytest.fixture
 def opened(browser: Any, results: Path, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Opens the page of a run; at the end the console is empty."""
 
     def open_page(name: str, size: tuple[int, int] = SIZES[0], change: Callable[[dict[str, Any]], Any] = dict) -> Any:
-        payload = payload_of(results / name)
         path = tmp_path / "report.html"
-        path.write_text(page_of(change(payload)))
+        path.write_text(as_it_is(results / name) if change is dict else page_of(change(payload_of(results / name))))
         metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         browser.get(path.as_uri())
