@@ -288,10 +288,34 @@ FAULTS = {
         "1",
         "tests/adaptivity/test_accuracy_control.py",
     ),
+    "looks-are-compared-with-the-middle-one-alone": Fault(
+        "rodfem/diagram/far_meetings.py",
+        "for here in [0] * first + [1] + [2] * last:",
+        "for here in [1]:",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
+    "where-loads-change-fast-no-more-rows-are-looked-at": Fault(
+        "rodfem/diagram/unfollowed.py",
+        "(often or fast) and not",
+        "often and not",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
+    "bumps-on-what-grows": Fault(
+        "rodfem/problem/fast_load.py",
+        "fine, _ = _parted(function, seen, edges, (FINE,",
+        "fine, _ = _parted(function, seen, edges, (CLOSE,",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
+    "one-step-a-range": Fault(
+        "rodfem/problem/fast_load.py",
+        "(self.high - self.low) / STEPS",
+        "(self.high - self.low)",
+        "tests/diagram/test_functions_between_rows.py",
+    ),
     "between-looks-nothing-is-compared": Fault(
         "rodfem/diagram/unfollowed.py",
-        "in self.far.look(point, found):",
-        "in self.far.look(point, found)[:0]:",
+        "in self.far.look(point, found, last=last):",
+        "in self.far.look(point, found, last=last)[:0]:",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "two-that-meet-at-the-first-load-are-no-eigenvalues": Fault(

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rodfem.continuation.branch import Point
-from rodfem.diagram.hidden_events import NEAR, Approach, HiddenEvents, Lowest
+from rodfem.diagram.hidden_events import Approach, HiddenEvents, Lowest
 from rodfem.diagram.side import Side
 from rodfem.errors import ConvergenceError
 from rodfem.stability.census import Census
@@ -39,6 +39,8 @@ EDGE = 0.1
 """Part of the way from one look to the next, at either end, in which no search begins."""
 ASIDE = 0.1
 """Distance of a shift from the mean of eigenvalues, over their standard deviation: it is none of them."""
+LOWER = 0.7
+"""Part of the discriminants at both looks below which a lowest one is near zero: a parabola is not what loads do."""
 CLEAR = 100.0
 """Products of the changes of two eigenvalues above this, over their doubts, are none of round-off."""
 SMALL = 0.3
@@ -69,19 +71,22 @@ class FarMeetings:
         self.hidden = hidden
         self._looks: list[Look] = []
 
-    def look(self, point: Point, census: Census) -> list[Lowest]:
+    def look(self, point: Point, census: Census, *, last: bool) -> list[Lowest]:
         """What may meet, and part again, between the last looks and the one at a ``point``, whose ``census`` is given.
 
-        Raises :class:`ConvergenceError` where eigenvalues are not found again.
+        The ``last`` look is compared with those before it, as none comes after it.  Raises :class:`ConvergenceError`
+        where eigenvalues are not found again.
         """
+        first = len(self._looks) == 2
         self._looks = [*self._looks[-2:], Look(point, census)]
         if len(self._looks) < 3:
             return []
-        a = self._looks[1]
         out: list[Lowest] = []
-        for b, found in zip(self._looks[::2], point.x.comm.tompi4py().bcast(_meetings(*self._looks)), strict=True):
-            for meeting in found:
-                lowest = self._lowest(a, b, meeting)
+        for here in [0] * first + [1] + [2] * last:
+            beside = [i for i in (here - 1, here + 1) if 0 <= i < 3]
+            found = point.x.comm.tompi4py().bcast(_meetings(self._looks, here, beside))
+            for i, meeting in found:
+                lowest = self._lowest(self._looks[here], self._looks[i], meeting)
                 out += [lowest] if lowest.open else []
         return out
 
@@ -94,25 +99,23 @@ class FarMeetings:
         return self.hidden.lowest(approach, first, second, meeting.along)
 
 
-def _meetings(before: Look, here: Look, after: Look) -> tuple[list[Meeting], list[Meeting]]:
-    """What may meet on the way from a look to that ``before``, and on the way to that ``after`` it."""
-    of, T = here.census.motions, [look.census.motions.operator for look in (before, here, after)]
-    places = np.setdiff1d(np.arange(int(RESOLVED * len(of.nu))), here.census.nearer)
+def _meetings(looks: list[Look], here: int, beside: list[int]) -> list[tuple[int, Meeting]]:
+    """What may meet on the way from one of three looks to those ``beside`` it, with the place of each of these."""
+    of, T = looks[here].census.motions, [look.census.motions.operator for look in looks]
+    places = np.setdiff1d(np.arange(int(RESOLVED * len(of.nu))), looks[here].census.nearer)
     if not len(places) or not T[0].shape == T[1].shape == T[2].shape:  # sections have mass at some loads only
-        return [], []
+        return []
     Y, Z = of.vectors(places)
-    E = [Z @ (other @ Y) for other in T]
-    # E(t) = t first + t^2 second is the difference to the look after it at t = 1, to that before it at t = s
-    loads = [look.point.load for look in (before, here, after)]
-    s = (loads[0] - loads[1]) / (loads[2] - loads[1])
-    second = (E[0] - E[1] - s * (E[2] - E[1])) / (s * (s - 1.0))
-    first = E[2] - E[1] - second
-    mu, followed = of.values[places].real, (np.arange(len(of.nu)) < len(here.point.omega2))[places]
-    pairs = Pairs(of.nu[places].real, first, second, of.doubt[places])
-    found = [
-        [Meeting(mu[both], along) for both, along in pairs.near(way) if not followed[both].all()] for way in (s, 1.0)
-    ]
-    return found[0], found[1]
+    one, other = (i for i in range(3) if i != here)
+    to_one, to_other = (Z @ ((T[i] - T[here]) @ Y) for i in (one, other))
+    # E(t) = t first + t^2 second is the difference to one other look at t = 1, and to the other one at t = s
+    ways = [look.point.load - looks[here].point.load for look in looks]
+    s = ways[other] / ways[one]
+    second = (to_other - s * to_one) / (s * (s - 1.0))
+    pairs = Pairs(of.nu[places].real, to_one - second, second, of.doubt[places])
+    mu, followed = of.values[places].real, (np.arange(len(of.nu)) < len(looks[here].point.omega2))[places]
+    found = ((i, pair) for i in beside for pair in pairs.near(ways[i] / ways[one]))
+    return [(i, Meeting(mu[both], along)) for i, (both, along) in found if not followed[both].all()]
 
 
 class Pairs:
@@ -145,7 +148,7 @@ class Pairs:
         D = (mean[:, :, None] - mean[:, None, :]) ** 2 / 4.0 + product
         i, j = np.triu_indices(len(self.groups), 1)
         k = D.argmin(axis=0)[i, j]
-        chosen = D[k, i, j] < NEAR * np.minimum(D[0, i, j], D[-1, i, j])
+        chosen = D[k, i, j] < LOWER * np.minimum(D[0, i, j], D[-1, i, j])
         chosen &= product[k, i, j] < -self._round_off[i] * self._round_off[j]
         for own in (i, j):
             size = SMALL * abs(self.mean[own])

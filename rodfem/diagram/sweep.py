@@ -34,7 +34,7 @@ from rodfem.diagram.missed_loads import missed_loads
 from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
-from rodfem.diagram.unfollowed import Unfollowed
+from rodfem.diagram.unfollowed import OFTEN, Unfollowed
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
 from rodfem.problem.fast_load import FastLoad
@@ -65,7 +65,7 @@ class Sweep:
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span, self.units = plan.over(solver.system.scene), solver.system.scene.units
         self._least = ONE_LOAD * max(map(abs, self.span))
-        self._asked, self._extrema = list[float](), set[float]()
+        self._asked, self._extrema, self._fast = list[float](), set[float](), list[tuple[float, float]]()
         for load in plan.at:
             known = (other for other in (*self.span, *self._asked) if abs(load - other) <= self._least)
             self._asked.append(next(known, load))
@@ -128,6 +128,7 @@ class Sweep:
         apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
         loads = np.unique([*apart, *self._asked])
         self._extrema = {float(loads[abs(loads - turn).argmin()]) for turn in (*fast.turns, *fast.smooth)}
+        self._fast = fast.ranges_below(OFTEN * abs(b - a) / (LOADS - 1))
         loads = loads if a < b else loads[::-1]
         x, _ = first_state(self.solver, a)
         branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])
@@ -191,7 +192,9 @@ class Sweep:
         for row in rows:
             point, before, self.last = row.point, self.last, row
             self._record(point, row.found, on_the_way=True)
-            self.unfollowed.look(point, last=point.load == self.span[1], turn=point.load in self._extrema)
+            last, turn = point.load == self.span[1], point.load in self._extrema
+            fast = any(low <= point.load <= high for low, high in self._fast)
+            self.unfollowed.look(point, last=last, turn=turn, fast=fast)
             if before is not None:
                 self._between(branch, before, row)
             branch.points.append(point)

@@ -37,10 +37,10 @@ class Unfollowed:
         self._rows, self._said = 0, False
         self._stable: Point | None = None
 
-    def look(self, point: Point, *, last: bool, turn: bool) -> None:
+    def look(self, point: Point, *, last: bool, turn: bool, fast: bool) -> None:
         """Look at the ``point`` of the next row, if it is the ``last`` or one's turn, or at the last that was stable.
 
-        At a ``turn``, an extremum of what the load does, something may come and go.
+        At a ``turn``, an extremum of what the load does, or where that changes ``fast``, something may come and go.
         """
         self._rows += 1
         if self._said:
@@ -49,11 +49,15 @@ class Unfollowed:
             self._examine(self._stable, MANY)
             self._stable = None
         rarely, often = (last or turn or self._rows % every == 1 for every in (RARELY, OFTEN))
-        looked = often and not self._said and self._examine(point, MANY if rarely else LARGEST, said=last)
+        largest = MANY if rarely else LARGEST
+        looked = (often or fast) and not self._said and self._examine(point, largest, said=last, last=last)
         self._stable = None if looked or point.negative else point
 
-    def _examine(self, point: Point, largest: int, *, said: bool = True) -> bool:
-        """Look at a point of a mesh with up to so many rows; False for one with more, which is ``said`` or not."""
+    def _examine(self, point: Point, largest: int, *, said: bool = True, last: bool = False) -> bool:
+        """Look at a point of a mesh with up to so many rows; False for one with more, which is ``said`` or not.
+
+        After the ``last`` look comes no other one.
+        """
         found = census(self.eigensolver.at(point.x), largest)
         if found is None and said:
             self.observer.note(
@@ -63,14 +67,14 @@ class Unfollowed:
         if found is not None and len(found.unstable) > point.negative:
             self._warn(point.load, point.negative, found)
         elif found is not None and not self._said:
-            self._meetings(point, found)
+            self._meetings(point, found, last=last)
         return found is not None
 
-    def _meetings(self, point: Point, found: Census) -> None:
+    def _meetings(self, point: Point, found: Census, *, last: bool) -> None:
         """Say what may come and go between the last looks and this one."""
         name = self.eigensolver.system.scene.load
         try:
-            for lowest in self.far.look(point, found):
+            for lowest in self.far.look(point, found, last=last):
                 self._meeting(point, lowest)
         except ConvergenceError as trouble:
             self.observer.note(

@@ -3,8 +3,9 @@
 Along a branch that does not move the steps are as long as the states allow, and pass whole periods of a force that is a
 sine of the load.  A range in which one of the functions is not the cubic through four of its values is halved; a step
 is to be no longer than the ranges that it leads into.  Between the loads at which they are looked at expressions of UFL
-are bounded by interval arithmetic (:mod:`rodfem.problem.enclosure`): no peak is too narrow to be seen.  Of a function
-without such bounds, one that compares the load in Python, a peak between :data:`SEEN` loads is not.
+are bounded by interval arithmetic (:mod:`rodfem.problem.enclosure`): no peak is too narrow to be seen, though it may be
+too low: it is to be :data:`FINE` of what the function varies by about it.  Of a function without such bounds, one that
+compares the load in Python, a peak between :data:`SEEN` loads is not.
 """
 
 from __future__ import annotations
@@ -23,14 +24,23 @@ if TYPE_CHECKING:
     from rodfem.continuation.branch import Point
     from rodfem.problem.scene import Scene
 
+STEPS = 2
+"""Steps in each range: what comes and goes is found by three rows."""
 KNOWN = np.array([0.0, 0.27, 0.71, 1.0])
 """Where in a range the cubic is that of the function."""
 ASKED = np.array([0.113, 0.382, 0.487, 0.618, 0.873])
 """Where in a range the two are compared."""
 POLYNOMIAL = 1e-9
 """Difference, relative to the variation over the whole range, up to which a function is a cubic."""
-CLOSE = 0.005
-"""Difference, relative to the variation over a piece, up to which a cubic tells a function there."""
+CLOSE, FINE = 0.005, 1e-4
+"""Difference, relative to the variation over a piece, up to which a cubic tells a function there.
+
+Where the smaller one makes ranges that are narrow something small happens: a bump on a function that grows.
+"""
+NARROW = 16
+"""Ratio of the length of a range to that of a narrow one in it.  Of smooth functions the smaller difference halves
+ranges three times, everywhere.
+"""
 NOISE = 1e-12
 """Difference in a component, over the largest one of its function, that is round-off."""
 SEEN = 501
@@ -98,6 +108,18 @@ class FastLoad:
                 found.append(turn)
         return found[len(loads) :]
 
+    def ranges_below(self, length: float) -> list[tuple[float, float]]:
+        """Ranges shorter than a ``length``; those that touch are one."""
+        out: list[tuple[float, float]] = []
+        for low, high in zip(self.low.tolist(), self.high.tolist(), strict=True):
+            if high - low >= length:
+                continue
+            if out and out[-1][1] == low:
+                out[-1] = out[-1][0], high
+            else:
+                out.append((low, high))
+        return out
+
     def reach(self, point: Point) -> float:
         """Largest step from a ``point`` of a branch, by the slope of the load there."""
         return self.room(point.load, point.slope)
@@ -109,7 +131,7 @@ class FastLoad:
             return float("inf")
         # the same whichever way the branch goes: ranges are told by their distance and their length
         away = np.maximum(0.0, np.maximum(self.low - load, load - self.high))
-        return float((away + self.high - self.low).min() / rate)
+        return float((away + (self.high - self.low) / STEPS).min() / rate)
 
 
 def _halved(function: Function, seen: Seen, ends: set[float], least: np.ndarray) -> list[float]:
@@ -118,31 +140,53 @@ def _halved(function: Function, seen: Seen, ends: set[float], least: np.ndarray)
     Return loads about which they do not.
     """
     first, last = seen[0][[0, -1]]
-    off, size = told(function, np.array([first]), np.array([last]), seen)
+    off, size, _ = told(function, np.array([first]), np.array([last]), seen)
     if not np.any(off > np.maximum(POLYNOMIAL * size, least)):  # nor where it is not defined, nan
         return []
     edges = np.linspace(first, last, PIECES + 1)
     size = np.maximum(size[0], np.ptp(function(edges), axis=0))
     kink = STEEP * size / (PIECES * 2**DEEPEST)
     least = np.maximum(POLYNOMIAL * size, least)
-    low, high = edges[:-1], edges[1:]
-    ends |= set(edges.tolist())
+    coarse, doubtful = _parted(function, seen, edges, (CLOSE, least, kink))
+    fine, _ = _parted(function, seen, edges, (FINE, least, kink))
+    length = np.diff(coarse)[np.clip(np.searchsorted(coarse, fine[:-1], side="right") - 1, 0, len(coarse) - 2)]
+    narrow = np.flatnonzero(NARROW * np.diff(fine) <= length)
+    ends |= {*coarse.tolist(), *fine[narrow].tolist(), *fine[narrow + 1].tolist()}
+    return doubtful
+
+
+def _parted(
+    function: Function, seen: Seen, edges: np.ndarray, limits: tuple[float, np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, list[float]]:
+    """Ends, in ascending order, of ranges in which cubics tell a ``function``, and loads about which none does.
+
+    The first ranges are those between the ``edges``.  The ``limits`` of differences are one relative to the variation
+    over a range, the least that counts (m,), and that of a kink (m,).
+    """
+    close, least, kink = limits
+    low, high, ends = edges[:-1], edges[1:], [edges]
     for depth in range(DEEPEST + 1):
         untold, broken = np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
         block = max(1, AT_ONCE // (len(least) * (len(KNOWN) + len(ASKED))))
         for some in (slice(i, i + block) for i in range(0, len(low), block)):
-            off, varied = told(function, low[some], high[some], seen)
-            untold[some] = np.any(off > np.maximum(CLOSE * varied, least), axis=1)
+            off, _, size = told(function, low[some], high[some], seen)
+            untold[some] = np.any(off > np.maximum(close * size, least), axis=1)
             broken[some] = untold[some] & np.any(off > kink, axis=1)
         low, high, middle = low[untold], high[untold], (low + high)[untold] / 2
         if depth < DEEPEST:
-            ends |= set(middle.tolist())
+            ends.append(middle)
             low, high = (np.stack(both, axis=1).ravel() for both in ((low, middle), (middle, high)))
-    return middle[broken[untold]].tolist()
+    return np.unique(np.concatenate(ends)), middle[broken[untold]].tolist()
 
 
-def told(function: Function, low: np.ndarray, high: np.ndarray, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
-    """How far a function is from a cubic, beyond round-off, and how much it varies, by range and component: (p, m).
+def told(
+    function: Function, low: np.ndarray, high: np.ndarray, seen: Seen
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How far a function is from a cubic, beyond round-off, by range and component: (p, m).
+
+    With that is returned how much it varies, and the lesser of that and of its mean size: where it grows by orders of
+    magnitude small differences count, too.
+
 
     Parameters
     ----------
@@ -170,7 +214,8 @@ def told(function: Function, low: np.ndarray, high: np.ndarray, seen: Seen) -> t
         off[which] = np.maximum(off[which], np.maximum.reduceat(away, begin))
         least[which] = np.minimum(least[which], np.minimum.reduceat(y, begin))
         most[which] = np.maximum(most[which], np.maximum.reduceat(y, begin))
-    return np.maximum(off - ROUND_OFF * np.maximum(abs(least), abs(most)), 0.0), most - least
+    off = np.maximum(off - ROUND_OFF * np.maximum(abs(least), abs(most)), 0.0)
+    return off, most - least, np.minimum(most - least, abs(values).mean(axis=1))
 
 
 def _looked_at(numbers: ParameterFunction, seen: np.ndarray) -> Iterator[tuple[ParameterFunction, np.ndarray]]:

@@ -42,5 +42,5 @@ class FastPlane:
             return numbers(a + t[:, None] * (b - a))
 
         seen = on_chord(there)
-        off, size = told(on_chord, np.zeros(1), np.ones(1), (there, seen))
+        off, _, size = told(on_chord, np.zeros(1), np.ones(1), (there, seen))
         return not np.any(off > np.maximum(CLOSE * size, np.maximum(numbers.least, NOISE * numbers.sizes(seen))))

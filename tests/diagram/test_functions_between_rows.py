@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import log, pi, sqrt
 from typing import Any
 
@@ -62,6 +63,33 @@ def test_a_notch_that_other_terms_hide() -> None:
     off = WIDTH * sqrt(-log(0.4))
     found = branch_points(trace(rod, MESH, Plan(depth=0)))
     np.testing.assert_allclose(found, [0.3712 - off, 0.3712 + off], rtol=0, atol=1e-9)
+
+
+def test_a_bump_that_is_small_beside_what_the_thrust_grows_by() -> None:
+    """Thrust ``2 P + 0.0024 exp(-t^2)`` of Euler's: critical before and after the bump, and at 0.5."""
+    thrust = lambda P: 2 * P + 0.0024 * np.exp(-(((P - 0.4992) / 3e-4) ** 2)) - 1.0  # noqa: E731
+    rod = cantilever(
+        lambda v, k, c: bending_and_twist(k, (1.0, 20.0, 1.0)),
+        lambda c: EULER * (2 * c.P + 0.0024 * ufl.exp(-(((c.P - 0.4992) / 3e-4) ** 2))),
+        (0.0, 1.0),
+    )
+    exact = [brentq(thrust, *ends, xtol=1e-14) for ends in ((0.4985, 0.4992), (0.4992, 0.4997), (0.4997, 0.5002))]
+    np.testing.assert_allclose(branch_points(trace(rod, MESH, Plan(depth=0))), exact, rtol=0, atol=1e-9)
+
+
+def test_every_wave_of_a_thrust_that_grows_as_the_stiffness_does() -> None:
+    """Both grow as ``exp(8 P)``; their ratio is ``0.999 + 0.002 sin(300 P)``: critical twice in each wave."""
+    ratio = lambda P: -0.001 + 0.002 * np.sin(300 * P)  # noqa: E731
+    rod = cantilever(
+        lambda v, k, c: ufl.exp(8 * c.P) * bending_and_twist(k, (1.0, 9.0, 1.0)),
+        lambda c: EULER * ufl.exp(8 * c.P) * (0.999 + 0.002 * ufl.sin(300 * c.P)),
+        (0.0, 0.2),
+    )
+    grid = np.linspace(0.0, 0.2, 20001)
+    exact = [brentq(ratio, *ends, xtol=1e-14) for ends in pairwise(grid) if ratio(ends[0]) * ratio(ends[1]) < 0]
+    found = branch_points(trace(rod, MESH, Plan(depth=0, error_bars=False)))
+    assert len(exact) == 20
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from typing import Any
 import classics
 import numpy as np
 import pytest
+import ufl
 from classics import column, push
 from hard.thrusts import THIN, on_soft_springs
 from scipy.linalg import eigvals
@@ -125,6 +126,32 @@ def test_flutter_between_two_looks_where_no_load_turns(above: float, said: int) 
     for words in found.warnings:
         assert words.startswith("At p = ") and "is not among those that are followed" in words
         assert float(words.split()[3]) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("growth", "ratio", "unstable"),
+    [
+        (3.0, lambda p: 1 + 0.3 * (0.005**2 - (p - 0.013) ** 2), (0.008, 0.018)),  # between the first two looks
+        (8.0, lambda p: 0.97 + 0.0305 * ufl.exp(-(((p - 0.53) / 0.02) ** 2)), (0.52743, 0.53257)),  # of three rows
+    ],
+)
+def test_flutter_between_looks_where_thrust_and_stiffness_grow(
+    growth: float, ratio: Any, unstable: tuple[float, float]
+) -> None:
+    """Both grow exponentially; their ratio passes Beck's for half a row, or for a row that is on the way."""
+    inertia, constants = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)), {"p": 0.0}
+    rod = column(
+        "growing",
+        (clamped(), free(follower=lambda c: (0.0, 0.0, -BECK * ufl.exp(growth * c.p) * ratio(c.p)))),
+        (0.0, 1.0),
+        load="p",
+        inertia=inertia,
+        constants=constants,
+        energy=lambda v, k, c: bending_and_twist(k, (ufl.exp(growth * c.p), 10.0 * ufl.exp(growth * c.p), 0.02)),
+    )
+    (words,) = swept(rod, error_bars=False).warnings
+    assert "is not among those that are followed" in words
+    assert unstable[0] < float(words.split()[3]) < unstable[1]
 
 
 @pytest.mark.usefixtures("few_loads")
