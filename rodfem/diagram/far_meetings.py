@@ -12,7 +12,8 @@ two eigenvalues ``i``, ``j`` have to first order the discriminant
 It becomes negative only where the product is: motions that the load does not couple, or couples by a potential, cross
 or turn away from one another.  Equal eigenvalues are one group: ``D`` has the means of two groups, and the trace of the
 product of their blocks, over its size.  Where the lowest ``D`` is near zero or below, that of the invariant subspace
-is sought by equilibria (:mod:`rodfem.diagram.hidden_events`).
+is sought by equilibria (:mod:`rodfem.diagram.hidden_events`).  It is sought, too, wherever vectors have nearly become
+one: the two are about to meet, or have just parted, and no parabola through looks is so sharp.
 
 The upper half of a mesh's eigenvalues is left out: it tells of the mesh rather than of the rod.
 """
@@ -41,6 +42,8 @@ ASIDE = 0.1
 """Distance of a shift from the mean of eigenvalues, over their standard deviation: it is none of them."""
 LOWER = 0.7
 """Part of the discriminants at both looks below which a lowest one is near zero: a parabola is not what loads do."""
+ONE = 0.9
+"""Square of the cosine of two vectors, of two groups the mean of its sums, from which on they are nearly one."""
 CLEAR = 100.0
 """Products of the changes of two eigenvalues above this, over their doubts, are none of round-off."""
 SMALL = 0.3
@@ -71,23 +74,18 @@ class FarMeetings:
         self.hidden = hidden
         self._looks: list[Look] = []
 
-    def look(self, point: Point, census: Census, *, last: bool) -> list[Lowest]:
+    def look(self, point: Point, census: Census) -> list[Lowest]:
         """What may meet, and part again, between the last looks and the one at a ``point``, whose ``census`` is given.
 
-        The ``last`` look is compared with those before it, as none comes after it.  Raises :class:`ConvergenceError`
-        where eigenvalues are not found again.
+        Raises :class:`ConvergenceError` where eigenvalues are not found again.
         """
-        first = len(self._looks) == 2
         self._looks = [*self._looks[-2:], Look(point, census)]
         if len(self._looks) < 3:
             return []
         out: list[Lowest] = []
-        for here in [0] * first + [1] + [2] * last:
-            beside = [i for i in (here - 1, here + 1) if 0 <= i < 3]
-            found = point.x.comm.tompi4py().bcast(_meetings(self._looks, here, beside))
-            for i, meeting in found:
-                lowest = self._lowest(self._looks[here], self._looks[i], meeting)
-                out += [lowest] if lowest.open else []
+        for i, meeting in point.x.comm.tompi4py().bcast(_meetings(self._looks)):
+            lowest = self._lowest(self._looks[1], self._looks[i], meeting)
+            out += [lowest] if lowest.open else []
         return out
 
     def _lowest(self, a: Look, b: Look, meeting: Meeting) -> Lowest:
@@ -99,32 +97,34 @@ class FarMeetings:
         return self.hidden.lowest(approach, first, second, meeting.along)
 
 
-def _meetings(looks: list[Look], here: int, beside: list[int]) -> list[tuple[int, Meeting]]:
-    """What may meet on the way from one of three looks to those ``beside`` it, with the place of each of these."""
-    of, T = looks[here].census.motions, [look.census.motions.operator for look in looks]
-    places = np.setdiff1d(np.arange(int(RESOLVED * len(of.nu))), looks[here].census.nearer)
+def _meetings(looks: list[Look]) -> list[tuple[int, Meeting]]:
+    """What may meet on the way from the second of three looks to each of the others, with the place of that."""
+    of, T = looks[1].census.motions, [look.census.motions.operator for look in looks]
+    places = np.setdiff1d(np.arange(int(RESOLVED * len(of.nu))), looks[1].census.nearer)
     if not len(places) or not T[0].shape == T[1].shape == T[2].shape:  # sections have mass at some loads only
         return []
     Y, Z = of.vectors(places)
-    one, other = (i for i in range(3) if i != here)
-    to_one, to_other = (Z @ ((T[i] - T[here]) @ Y) for i in (one, other))
-    # E(t) = t first + t^2 second is the difference to one other look at t = 1, and to the other one at t = s
-    ways = [look.point.load - looks[here].point.load for look in looks]
-    s = ways[other] / ways[one]
-    second = (to_other - s * to_one) / (s * (s - 1.0))
-    pairs = Pairs(of.nu[places].real, to_one - second, second, of.doubt[places])
-    mu, followed = of.values[places].real, (np.arange(len(of.nu)) < len(looks[here].point.omega2))[places]
-    found = ((i, pair) for i in beside for pair in pairs.near(ways[i] / ways[one]))
+    back, on = (Z @ ((T[i] - T[1]) @ Y) for i in (0, 2))
+    # E(t) = t first + t^2 second is the difference to the third look at t = 1, and to the first one at t = s
+    loads = [look.point.load for look in looks]
+    s = (loads[0] - loads[1]) / (loads[2] - loads[1])
+    second = (back - s * on) / (s * (s - 1.0))
+    pairs = Pairs(of.nu[places].real, on - second, second, of.doubt[places], of.right[:, places])
+    mu, followed = of.values[places].real, (np.arange(len(of.nu)) < len(looks[1].point.omega2))[places]
+    found = ((i, pair) for i, way in ((0, s), (2, 1.0)) for pair in pairs.near(way))
     return [(i, Meeting(mu[both], along)) for i, (both, along) in found if not followed[both].all()]
 
 
 class Pairs:
     """Discriminants of all pairs of eigenvalues ``nu`` (k,), or of groups of equal ones, as functions of a parameter.
 
-    The matrix changes by ``t first + t^2 second`` (k, k); the eigenvalues are in ``doubt`` (k,) by round-off.
+    The matrix changes by ``t first + t^2 second`` (k, k); the eigenvalues are in ``doubt`` (k,) by round-off, and have
+    the ``vectors`` (n, k) of norm one.
     """
 
-    def __init__(self, nu: np.ndarray, first: np.ndarray, second: np.ndarray, doubt: np.ndarray) -> None:
+    def __init__(
+        self, nu: np.ndarray, first: np.ndarray, second: np.ndarray, doubt: np.ndarray, vectors: np.ndarray
+    ) -> None:
         """Find the groups, and the products of their blocks."""
         self.groups = groups(nu, float(abs(nu).max()), ALIKE)
         member = np.zeros((len(nu), len(self.groups)))
@@ -134,6 +134,7 @@ class Pairs:
         changes = (np.diag(first).real, np.diag(second).real)
         self.mean, *self._changes = ((part @ member) / sizes for part in (nu, *changes))
         self._round_off = np.array([max(REAL * abs(nu[g]).max(), CLEAR * doubt[g].max()) for g in self.groups])
+        self._one = member.T @ abs(vectors.conj().T @ vectors) ** 2 @ member / np.minimum.outer(sizes, sizes)
         products = first * first.T, first * second.T + second * first.T, second * second.T
         self._products = [member.T @ part.real @ member / (np.add.outer(sizes, sizes) / 2.0) for part in products]
 
@@ -153,6 +154,7 @@ class Pairs:
         for own in (i, j):
             size = SMALL * abs(self.mean[own])
             chosen &= (abs(mean[k, own] - self.mean[own]) < size) & (-product[k, i, j] < size**2)
+        chosen |= self._one[i, j] > ONE
         along = np.clip(PLACES[k], EDGE, 1.0 - EDGE)
         return [(self.groups[i[n]] + self.groups[j[n]], float(along[n])) for n in np.flatnonzero(chosen)]
 

@@ -50,14 +50,11 @@ class Unfollowed:
             self._stable = None
         rarely, often = (last or turn or self._rows % every == 1 for every in (RARELY, OFTEN))
         largest = MANY if rarely else LARGEST
-        looked = (often or fast) and not self._said and self._examine(point, largest, said=last, last=last)
+        looked = (often or fast) and not self._said and self._examine(point, largest, said=last)
         self._stable = None if looked or point.negative else point
 
-    def _examine(self, point: Point, largest: int, *, said: bool = True, last: bool = False) -> bool:
-        """Look at a point of a mesh with up to so many rows; False for one with more, which is ``said`` or not.
-
-        After the ``last`` look comes no other one.
-        """
+    def _examine(self, point: Point, largest: int, *, said: bool = True) -> bool:
+        """Look at a point of a mesh with up to so many rows; False for one with more, which is ``said`` or not."""
         found = census(self.eigensolver.at(point.x), largest)
         if found is None and said:
             self.observer.note(
@@ -67,14 +64,14 @@ class Unfollowed:
         if found is not None and len(found.unstable) > point.negative:
             self._warn(point.load, point.negative, found)
         elif found is not None and not self._said:
-            self._meetings(point, found, last=last)
+            self._meetings(point, found)
         return found is not None
 
-    def _meetings(self, point: Point, found: Census, *, last: bool) -> None:
+    def _meetings(self, point: Point, found: Census) -> None:
         """Say what may come and go between the last looks and this one."""
         name = self.eigensolver.system.scene.load
         try:
-            for lowest in self.far.look(point, found, last=last):
+            for lowest in self.far.look(point, found):
                 self._meeting(point, lowest)
         except ConvergenceError as trouble:
             self.observer.note(
