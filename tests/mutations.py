@@ -294,12 +294,6 @@ FAULTS = {
         "",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
-    "where-loads-change-fast-no-more-rows-are-looked-at": Fault(
-        "rodfem/diagram/unfollowed.py",
-        "(often or fast) and not",
-        "often and not",
-        "tests/diagram/test_slow_and_far_frequencies.py",
-    ),
     "bumps-on-what-grows": Fault(
         "rodfem/problem/fast_load.py",
         "fine, _ = _parted(function, seen, edges, (FINE,",

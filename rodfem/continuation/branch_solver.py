@@ -166,9 +166,11 @@ class BranchSolver(StaticSolver):
     def _stiffness(self, x: PETSc.Vec) -> float:
         """Logarithm of what stiffnesses that alter along a branch make of the determinant of the saddle matrix.
 
-        High modes are local: to each strain a node of the mesh adds the logarithm of its stiffness.
+        High modes are local: to each strain a node of the mesh adds the logarithm of its stiffness.  Where constraints
+        take strains away, as in a plane, their stiffness is not in the matrix, and nothing is divided out.
         """
-        if not self.convexity.alters:
+        scene = self.system.scene
+        if not self.convexity.alters or scene.planar or scene.constraints:
             return 0.0
         return self.system.fields.discretization.degree * self.convexity.logarithm(x)
 
