@@ -16,10 +16,12 @@ import hemitropic_cases
 import numpy as np
 import pytest
 import reference_values
+import ufl
 from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
+from forms.energy import bending_and_twist
 from rodfem.app.run import run
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
@@ -30,6 +32,7 @@ from rodfem.diagram.trace import trace
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.output.files import load_state
+from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Scene
 
 ALONE = [
@@ -183,6 +186,23 @@ def test_bad_accuracy(accuracy: float) -> None:
     scene = hemitropic_cases.scene()
     with pytest.raises(InputError, match=r"is not attainable: ask for one between 1e-11 .round-off. and 0.1"):
         Plan(scene.span, accuracy=accuracy).check(scene)
+
+
+@pytest.mark.alone
+def test_accuracy_of_a_sweep_of_a_soft_notch() -> None:
+    """Coarse meshes do not see it: the first refinement changes less than the second.  By 200 Hermite elements."""
+    softness = lambda s: 0.9 * ufl.exp(-(((s - 0.31) / 0.03) ** 2))  # noqa: E731
+    rod = classics.column(
+        "notch",
+        (clamped(), free(follower=classics.push)),
+        (15.0, 20.0),
+        energy=lambda v, k, c: (
+            (1 - 0.9 * ufl.exp(-(((c.s - 0.31) / 0.03) ** 2))) * bending_and_twist(k, (1.0, 30.0, 10.0))
+        ),
+        inertia=classics.BEAM,
+    )
+    (flutter,) = trace(rod, plan=Plan(accuracy=1e-2, depth=0)).special(FLUTTER)
+    assert flutter.point.load == pytest.approx(17.9732, rel=1e-3) and not flutter.note
 
 
 @pytest.mark.alone
