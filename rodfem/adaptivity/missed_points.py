@@ -17,17 +17,16 @@ from petsc4py import PETSc
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.determinants import LARGEST, Logarithm, LowModes, steep, whole
 from rodfem.continuation.locate import ORDERED
+from rodfem.continuation.pair_search import vertex
 from rodfem.continuation.states_between import point_between
-from rodfem.continuation.touching import vertex
 from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import ZERO_BAND
 from rodfem.stability.round_off import quotient_error
 
 LESS = 0.9
 """A least value over the greatest ones on both sides of it, above which it is no dip."""
-LARGEST = 600.0
-"""Largest logarithm of the ratio of two determinants."""
 KNOWN = 0.5
 """Part of a test function that it may change by on a richer mesh: more, and its sign is in doubt."""
 
@@ -39,13 +38,9 @@ def missed_points(branch: Branch, meshes: Meshes) -> Iterator[str]:
     determinant of the saddle matrix is, the eigenvalue nearest to zero.
     """
     rows = branch.points
-    logarithms = np.array([p.determinant for p in rows])
-    largest = np.max(logarithms, where=np.isfinite(logarithms), initial=-inf)
-    sizes = np.exp(np.clip(logarithms - largest, -LARGEST, 0.0))
-    determinants = sizes * [(-1.0) ** p.negative for p in rows]
     for name, points, values, of in (
         ("the slope of the load along the branch", "folds", np.array([p.slope for p in rows]), _slope),
-        ("the eigenvalue nearest to zero", "branch points", determinants, _nearest),
+        ("the eigenvalue nearest to zero", "branch points", _determinants(rows, meshes), _nearest),
     ):
         for i in dips(values):
             mesh = rows[i].mesh
@@ -66,6 +61,17 @@ def missed_points(branch: Branch, meshes: Meshes) -> Iterator[str]:
                 f"{branch.name}: Near {richer.system.scene.load} = {point.load:.8g} {name} {found}: a pair of {points} "
                 "may be missing there, use more elements."
             )
+
+
+def _determinants(rows: list[Point], meshes: Meshes) -> np.ndarray:
+    """Determinants at ``rows`` over the largest one, signed; those of the low modes where the others change much."""
+    functions: dict[int, Logarithm] = dict.fromkeys({p.mesh for p in rows}, whole)
+    if steep(rows):
+        sigma = max(meshes.solvers[0].inertia.scale, *(p.nearest for p in rows))
+        functions = {mesh: LowModes(meshes.solvers[mesh], sigma) for mesh in functions}
+    logarithms = np.array([functions[p.mesh](p) for p in rows])
+    largest = np.max(logarithms, where=np.isfinite(logarithms), initial=-inf)
+    return np.exp(np.clip(logarithms - largest, -LARGEST, 0.0)) * [(-1.0) ** p.negative for p in rows]
 
 
 def dips(values: np.ndarray) -> list[int]:

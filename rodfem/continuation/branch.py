@@ -66,8 +66,7 @@ class Point:
     estimate
         Error of the discretisation in load and ordinate, where an accuracy was asked for.
     determinant
-        Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index, over
-        what changes of the rod's stiffnesses make of it.
+        Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index.
     soft
         Eigenvalues near zero, by name: :class:`~rodfem.stability.soft_mode.SoftMode`.
     nearest

@@ -159,20 +159,9 @@ class BranchSolver(StaticSolver):
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.negative(x),
             mesh=self.mesh,
-            determinant=index.determinant - self._stiffness(x),
+            determinant=index.determinant,
             nearest=index.nearest,
         )
-
-    def _stiffness(self, x: PETSc.Vec) -> float:
-        """Logarithm of what stiffnesses that alter along a branch make of the determinant of the saddle matrix.
-
-        High modes are local: to each strain a node of the mesh adds the logarithm of its stiffness.  Where constraints
-        take strains away, as in a plane, their stiffness is not in the matrix, and nothing is divided out.
-        """
-        scene = self.system.scene
-        if not self.convexity.alters or scene.planar or scene.constraints:
-            return 0.0
-        return self.system.fields.discretization.degree * self.convexity.logarithm(x)
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
         """Left-most eigenvalues by SLEPc, if asked for; :class:`ConvergenceError` where they contradict the inertia."""

@@ -57,6 +57,7 @@ class SpecialSearch:
         self._touching, self._balance = Touching(), EnergyBalance()
         self._short = (-inf, inf, 0)
         self._lost: tuple[Row, Row] | None = None
+        self._early: Point | None = None
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
@@ -84,12 +85,12 @@ class SpecialSearch:
             If shorter steps are to be tried.
         """
         self._on(b)
-        settled = self._open[0]
+        settled, self._early = self._open[0], None
         try:
             found = self._shown_by(a, b)
             self._check_step([*rows, b])
         except (Gap, Unresolved):
-            self._open = [settled]
+            self._open = [self._early or settled]
             raise
         return found
 
@@ -114,6 +115,8 @@ class SpecialSearch:
         self._open = [b]
         between = [] if changed else self._touching.between(self.solver, a, b)
         self._touching.add(b, told=changed or any(row.arclength > a.arclength for row in between))
+        if between and between[0].arclength < a.arclength:  # the step before is the one that may be too long
+            self._early = between[0]
         return self._examined(self._among([*rows, *between, b]))
 
     def _check_step(self, rows: Sequence[Point]) -> None:

@@ -117,16 +117,6 @@ class Convexity:
             mine = min(mine, _vertices(least[:, -GRID:]).min(initial=1.0))
         return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
 
-    def logarithm(self, x: PETSc.Vec) -> float:
-        """Logarithm of the determinant of the second derivative at ``x``: mean on each element, their sum.
-
-        It is nan where one is not positive.
-        """
-        gauss = slice(1, self.system.fields.discretization.degree + 2)
-        signs, logarithms = np.linalg.slogdet(self._by_element(x)[:, gauss])
-        mine = np.where(signs > 0, logarithms, np.nan).mean(axis=1).sum()
-        return float(self.system.comm.allreduce(float(mine)))
-
     def _by_element(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives by element of this rank and place on it, (cells, places, size, size)."""
         return self._matrices(x).reshape(self.system.fields.owned_cells, self.places, self.size, self.size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from math import log, pi, sqrt
 from typing import Any
@@ -16,6 +17,7 @@ from scipy.optimize import brentq
 from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Plan, clamped, free, trace
 from rodfem.continuation.kinds import FLUTTER
+from rodfem.continuation.pair_search import PairSearch
 from rodfem.problem.fast_load import FastLoad
 from rodfem.problem.scene import Scene
 
@@ -110,6 +112,77 @@ def test_a_pair_where_stiffness_and_thrust_both_grow(above: float, other: float,
     half = sqrt(growth**2 - 1)
     np.testing.assert_allclose(branch_points(diagram), [growth - half, growth + half], rtol=0, atol=1e-9)
     assert not diagram.warnings
+
+
+@pytest.mark.parametrize("mesh", [MESH, Discretization("auto", 64, 2)])
+def test_a_pair_of_a_planar_rod_whose_stiffness_and_thrust_both_grow(mesh: Discretization) -> None:
+    """As above with ``n = 3``; the stiffness out of the plane grows as well, and is not in the saddle matrix."""
+    rod = cantilever(
+        lambda v, k, c: ((1 + c.P**2) / 2) ** 3 * bending_and_twist(k, (1.0, 9.0, 1.0)),
+        lambda c: EULER * (1 + 1e-4) * c.P**3,
+        (0.25, 2.3),
+        planar="e1",
+    )
+    growth = (1 + 1e-4) ** (1 / 3)
+    half = sqrt(growth**2 - 1)
+    found = branch_points(trace(rod, mesh, Plan(depth=0, error_bars=False)))
+    np.testing.assert_allclose(found, [growth - half, growth + half], rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("foundation", "width"),
+    [
+        (lambda c: 1e6 * ufl.exp(6 * c.P), 1.0),
+        pytest.param(lambda c: 100 * ufl.exp(3 * c.P), 0.1, marks=pytest.mark.long),
+        (lambda c: 100 * (1 + c.P), 1.0),  # the first state between two rows is one of the branch points, to round-off
+    ],
+)
+def test_a_pair_on_a_foundation_that_grows(foundation: Callable[[Any], Any], width: float) -> None:
+    """A foundation against turning about the axis leaves Euler's load as it is, and changes determinants a lot."""
+    rod = cantilever(
+        lambda v, k, c: bending_and_twist(k, (1.0, 9.0, 1.0)),
+        lambda c: EULER * (1 + 1e-6 - width * (c.P - 1.03) ** 2),
+        (0.25, 2.3),
+        potential=lambda x, c: foundation(c) * x.q[3] ** 2,
+    )
+    diagram, half = trace(rod, MESH, Plan(depth=0, error_bars=False)), 1e-3 / sqrt(width)
+    np.testing.assert_allclose(branch_points(diagram), [1.03 - half, 1.03 + half], rtol=0, atol=1e-9)
+    assert not diagram.warnings
+
+
+def on_a_parabola(rate: float, middle: float, half: float, width: float, **given: Any) -> Scene:
+    """Stiffness and thrust grow as ``exp(rate P)``; the thrust over Euler's is one at ``middle +- half``."""
+    grows = lambda c: ufl.exp(rate * (c.P - 1.2))  # noqa: E731
+    return cantilever(
+        lambda v, k, c: grows(c) * bending_and_twist(k, (1.0, 9.0, 1.0)),
+        lambda c: EULER * grows(c) * (1 - width * ((c.P - middle) ** 2 - half**2)),
+        (0.25, 2.3),
+        **given,
+    )
+
+
+@pytest.mark.parametrize(
+    ("mesh", "rate", "middle", "half", "width"),
+    [
+        (MESH, -3.0, 1.7, 0.005, 1.0),  # far softer than at the first state
+        (Discretization("auto", 8, 4), 6.0, 0.577969481203928, 0.004279936560449184, 0.97),  # a row beside the pair
+    ],
+)
+def test_a_pair_where_all_grows_or_falls_by_orders(
+    mesh: Discretization, rate: float, middle: float, half: float, width: float
+) -> None:
+    found = branch_points(trace(on_a_parabola(rate, middle, half, width, planar="e1"), mesh, Plan(depth=0)))
+    np.testing.assert_allclose(found, [middle - half, middle + half], rtol=0, atol=1e-6)
+
+
+def test_a_pair_of_the_step_before_is_not_lost_where_it_takes_shorter_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stiffness and thrust grow by ``exp(20)``: the pair is seen a row late, and not located in a step as long."""
+    monkeypatch.setattr(PairSearch, "around", lambda *_: [])
+    middle, half = 1.9872997412390028, 0.00394407636623445
+    rod = on_a_parabola(10.0, middle, half, 0.34082715866434293)
+    diagram = trace(rod, Discretization("auto", 8, 4), Plan(depth=0, error_bars=False))
+    unstable = [p.load for p in diagram[0].points if p.negative]
+    assert middle - half < min(unstable) < middle < max(unstable) < middle + half
 
 
 def test_a_kink_is_no_peak() -> None:

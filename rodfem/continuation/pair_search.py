@@ -1,0 +1,178 @@
+"""Search for a state between neighbouring rows whose index is not theirs, towards the lowest value of a determinant.
+
+Successive parabolic interpolation (Brent 1973, chapter 5) of the test functions of
+:mod:`rodfem.continuation.determinants`, of which three rows determine the parabola.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, isfinite
+
+from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.determinants import Logarithm, relative
+from rodfem.continuation.states_between import midpoint, point_between
+from rodfem.stability.round_off import resolve
+
+LOWER = 0.5
+"""A vertex above this share of the lowest value known is no pair's, once the vertex is believed."""
+MULTIPLICITIES = (1, 2)
+TRIES = 10
+"""Interpolations until a lowest value is given up."""
+CLOSER = 4
+"""Interpolations after which the vertex is believed."""
+MARGIN = 1e-3
+"""Part of a step, at its ends, in which no state is solved."""
+DEEP = 0.05
+"""A determinant below this share of those of both neighbours is looked at from nearer by."""
+NEARER = 4.0
+"""Ratio of successive distances from such a row."""
+LEAST = 1e-4
+"""Least of them, relative to the step."""
+Sample = tuple[float, float]
+"""Arclength, and a value whose lowest is sought."""
+
+
+class PairSearch:
+    """Search by one test function; ``solver`` has the mesh of the rows, which are neighbours on a branch."""
+
+    def __init__(self, solver: BranchSolver, logarithm: Logarithm) -> None:
+        """With the ``logarithm`` of the size of the test function."""
+        self.solver, self.logarithm = solver, logarithm
+
+    def inside(self, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
+        """A state between the neighbours ``p`` and ``q`` among three ``rows`` whose index is not theirs, if found."""
+        # det^(1/m) is a parabola near m coinciding crossings; its vertex is tried for each m
+        for multiplicity in MULTIPLICITIES:
+            samples = [(row.arclength, self._relative(row, p, multiplicity)) for row in rows]
+            if all(isfinite(value) for _, value in samples):
+                found = self.lowest(samples, p, q, multiplicity)
+                if found is not None:
+                    return [found]
+        return []
+
+    def dips(self, rows: Sequence[Point], p: Point, q: Point) -> bool:
+        """Whether a parabola through three rows has its vertex between the neighbours ``p`` and ``q`` among them."""
+        samples = [[(row.arclength, self._relative(row, p, m)) for row in rows] for m in MULTIPLICITIES]
+        return any(p.arclength < vertex(x)[0] < q.arclength for x in samples)
+
+    def around(self, rows: Sequence[Point]) -> list[Point]:
+        """A state near the middle one of three rows whose index is not theirs, where that row's determinant is low."""
+        p, a, b = rows
+        if p.negative != a.negative or not self._relative(a, min(p, b, key=self.logarithm), 1) < LOWER:
+            return []
+        # states nearer and nearer to the low row, until a parabola through them sees the pair
+        step = min(a.arclength - p.arclength, b.arclength - a.arclength)
+        size = step / NEARER
+        while size > LEAST * step:
+            before = point_between(self.solver, p, a, a.arclength - size)
+            after = point_between(self.solver, a, b, a.arclength + size)
+            if before is None or after is None:
+                return []
+            for state in (before, after):
+                if self._differs(state, a):
+                    return [state]
+            closer = [before, a, after]
+            found = self.inside(closer, before, a) or self.inside(closer, a, after)
+            if found or not self._relative(a, min(before, after, key=self.logarithm), 1) < DEEP:
+                return found
+            size /= NEARER
+        return []
+
+    def beside(self, end: Point, inner: Point) -> list[Point]:
+        """A state near the row ``end`` of a branch, towards its neighbour ``inner``, whose index is not theirs.
+
+        It is looked for where the determinant at the end is far below the neighbour's.
+        """
+        if end.negative != inner.negative:
+            return []
+        step = inner.arclength - end.arclength
+        size, far = step / NEARER, inner
+        while abs(size) > LEAST * abs(step) and self._relative(end, far, 1) < DEEP:
+            first, last = sorted((end, far), key=arclength)
+            near = point_between(self.solver, first, last, end.arclength + size)
+            if near is None:
+                return []
+            if self._differs(near, end):
+                return [near]
+            rows = sorted((end, near, far), key=arclength)
+            found = self.inside(rows, *rows[:2]) or self.inside(rows, *rows[1:])
+            if found:
+                return found
+            far, size = near, size / NEARER
+        return []
+
+    def halved(self, a: Point, b: Point) -> list[Point]:
+        """A state between two neighbours whose index is not theirs, found from these two and the state half-way."""
+        middle = midpoint(self.solver, a, b)
+        if middle is None or a.negative != b.negative:
+            return []
+        if self._differs(middle, a):
+            return [middle]
+        rows = [a, middle, b]
+        return self.inside(rows, a, middle) or self.inside(rows, middle, b)
+
+    def lowest(self, samples: list[Sample], p: Point, q: Point, multiplicity: int) -> Point | None:
+        """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs.
+
+        The rows are ``p`` and ``q``.  ``samples`` are arclengths and values of the test function, relative to that at
+        ``p``, for as many coinciding eigenvalues as ``multiplicity`` says.
+        """
+        known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
+        least, touched = min(value for _, value in known), None
+        margin = MARGIN * (q.arclength - p.arclength)
+        for tried in range(TRIES):
+            s, value = vertex(samples)
+            # the first parabolas reach too far to tell how low it is
+            if not p.arclength < s < q.arclength or (value > LOWER * least and tried >= CLOSER):
+                break
+            s = min(max(s, p.arclength + margin), q.arclength - margin)
+            if any(s == other for other, _ in samples):
+                break
+            state = point_between(self.solver, p, q, s)
+            if state is None:
+                break
+            low, high = self._index(state, p)
+            if low == high != p.negative:
+                return state
+            if low != high:  # beside one of two crossings: a state between them has another index
+                touched = touched or state
+            size = self._relative(state, p, multiplicity)
+            known = sorted([*known, (s, size)])
+            # the next parabola goes through the lowest value and its two neighbours
+            least, middle = min((value, i) for i, (_, value) in enumerate(known))
+            if not 0 < middle < len(known) - 1:
+                break
+            samples = known[middle - 1 : middle + 2]
+        return touched
+
+    def _index(self, state: Point, row: Point) -> tuple[int, int]:
+        """Least and greatest index of a state, which has more eigenvalues that count as zero than a row, or not."""
+        if state.zero <= row.zero:
+            return state.negative, state.negative
+        return resolve(self.solver.inertia.at(state.x))
+
+    def _differs(self, state: Point, row: Point) -> bool:
+        """Whether the index of a state is not known to be that of a row."""
+        return self._index(state, row) != (row.negative, row.negative)
+
+    def _relative(self, row: Point, other: Point, multiplicity: int) -> float:
+        """Root of the test function at a row over that at another."""
+        return relative(self.logarithm, row, other, multiplicity)
+
+
+def arclength(row: Point) -> float:
+    """Arclength of a row along its branch."""
+    return row.arclength
+
+
+def vertex(samples: Sequence[Sample]) -> Sample:
+    """Vertex of the parabola through three samples; at infinity where it has no lowest value."""
+    (a, f), (b, g), (c, h) = samples
+    first, second = (g - f) / (b - a), (h - g) / (c - b)
+    curvature = (second - first) / (c - a)
+    if not curvature > 0:
+        return inf, 0.0
+    s = (a + b) / 2 - first / (2 * curvature)
+    return s, g + (s - b) * (first + curvature * (s - a))
