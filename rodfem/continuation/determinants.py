@@ -24,7 +24,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import ROUGH
 
-STEEP = 0.5
+STEEP = 1.0
 """Change of the logarithm of a determinant, from row to row, above which it may hide a pair of crossings."""
 FAR = 0.1
 """Ratio of two shifts below which both are tried."""
@@ -50,17 +50,20 @@ def functions(solver: BranchSolver, rows: Sequence[Point]) -> Iterator[Logarithm
     if steep(rows):
         nearest, usual = max(_nearest(solver, row) for row in rows), solver.inertia.scale
         yield LowModes(solver, max(nearest, usual))
-        if nearest < FAR * usual:
+        if 0.0 < nearest < FAR * usual:
             yield LowModes(solver, nearest)
 
 
 def _nearest(solver: BranchSolver, row: Point) -> float:
-    """Distance of the eigenvalue nearest zero from zero at a row, symmetry modes left out."""
+    """Distance of the eigenvalue nearest zero from zero at a row, symmetry modes left out; 0 where a count fails."""
     if row.nearest:
         return row.nearest
     inertia = solver.inertia
     found, kept = inertia.at(row.x), inertia.vectors
-    found.count()
+    try:
+        found.count()
+    except ConvergenceError:
+        return 0.0
     inertia.vectors = []
     (value,), _ = found.nearest(1, ROUGH)
     inertia.vectors = kept
@@ -82,8 +85,10 @@ class LowModes:
                 return value
         found = self.solver.inertia.at(row.x)
         try:
-            found.below(0.0)
-            value = found.factors.determinant()
+            value = row.determinant
+            if not row.nearest:  # that was counted by two shifts, and its determinant is that of the second one
+                found.below(0.0)
+                value = found.factors.determinant()
             found.below(-self.sigma)
             value -= found.factors.determinant()
         except ConvergenceError:

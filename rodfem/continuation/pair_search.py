@@ -60,7 +60,7 @@ class PairSearch:
     def around(self, rows: Sequence[Point]) -> list[Point]:
         """A state near the middle one of three rows whose index is not theirs, where that row's determinant is low."""
         p, a, b = rows
-        if p.negative != a.negative or not self._relative(a, min(p, b, key=self.logarithm), 1) < LOWER:
+        if p.negative != a.negative or not self._relative(a, min(p, b, key=self.logarithm), 1) < DEEP:
             return []
         # states nearer and nearer to the low row, until a parabola through them sees the pair
         step = min(a.arclength - p.arclength, b.arclength - a.arclength)
