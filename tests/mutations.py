@@ -294,11 +294,11 @@ FAULTS = {
     "low-modes-by-the-usual-shift-alone": Fault(
         f"{CONTINUATION}determinants.py", "FAR = 0.1", "FAR = 0.0", "tests/diagram/test_functions_between_rows.py"
     ),
-    "a-search-ends-at-a-zero": Fault(
+    "a-search-ends-at-what-counts-as-zero": Fault(
         f"{CONTINUATION}pair_search.py",
-        "                touched = touched or state\n",
-        "                return state\n",
-        "tests/diagram/test_functions_between_rows.py",
+        "return resolve(self.solver.inertia.at(state.x)) != (row.negative, row.negative)",
+        "return True",
+        f"tests/diagram/test_functions_between_rows.py {CHAIN}",
     ),
     "the-first-mesh-that-does-not-help-is-the-last": Fault(
         "rodfem/diagram/frequency_mesh.py",

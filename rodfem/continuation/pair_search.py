@@ -120,7 +120,7 @@ class PairSearch:
         ``p``, for as many coinciding eigenvalues as ``multiplicity`` says.
         """
         known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
-        least, touched = min(value for _, value in known), None
+        least = min(value for _, value in known)
         margin = MARGIN * (q.arclength - p.arclength)
         for tried in range(TRIES):
             s, value = vertex(samples)
@@ -131,13 +131,8 @@ class PairSearch:
             if any(s == other for other, _ in samples):
                 break
             state = point_between(self.solver, p, q, s)
-            if state is None:
-                break
-            low, high = self._index(state, p)
-            if low == high != p.negative:
+            if state is None or self._differs(state, p):
                 return state
-            if low != high:  # beside one of two crossings: a state between them has another index
-                touched = touched or state
             size = self._relative(state, p, multiplicity)
             known = sorted([*known, (s, size)])
             # the next parabola goes through the lowest value and its two neighbours
@@ -145,17 +140,13 @@ class PairSearch:
             if not 0 < middle < len(known) - 1:
                 break
             samples = known[middle - 1 : middle + 2]
-        return touched
-
-    def _index(self, state: Point, row: Point) -> tuple[int, int]:
-        """Least and greatest index of a state, which has more eigenvalues that count as zero than a row, or not."""
-        if state.zero <= row.zero:
-            return state.negative, state.negative
-        return resolve(self.solver.inertia.at(state.x))
+        return None
 
     def _differs(self, state: Point, row: Point) -> bool:
-        """Whether the index of a state is not known to be that of a row."""
-        return self._index(state, row) != (row.negative, row.negative)
+        """Whether the index of a state is not known to be that of a row; small eigenvalues by their quotients."""
+        if state.zero <= row.zero:
+            return state.negative != row.negative
+        return resolve(self.solver.inertia.at(state.x)) != (row.negative, row.negative)
 
     def _relative(self, row: Point, other: Point, multiplicity: int) -> float:
         """Root of the test function at a row over that at another."""
