@@ -279,6 +279,12 @@ FAULTS = {
     "determinants-of-high-modes-too": Fault(
         f"{CONTINUATION}determinants.py", "STEEP = 1.0", "STEEP = 1e9", "tests/diagram/test_functions_between_rows.py"
     ),
+    "low-modes-of-the-other-shift": Fault(
+        f"{CONTINUATION}determinants.py",
+        "found.below(-self.sigma)",
+        "found.below(self.sigma)",
+        "tests/continuation/test_determinants.py",
+    ),
     "missed-points-by-all-modes": Fault(
         "rodfem/adaptivity/missed_points.py",
         "    if steep(rows):\n",
