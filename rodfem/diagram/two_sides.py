@@ -56,7 +56,9 @@ def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
     if indices[0] != indices[1]:
         return False
     first, second = (_nearest(at(point.x), indices[0].zero) for point in (a, b))
-    if (abs(first.values - second.values) > SAME_DETERMINANT * abs(first.values) + first.noise).any():
+    differ = abs(first.values - second.values) > SAME_DETERMINANT * abs(first.values) + first.noise
+    # of a zero the mesh makes a value as it lies to the elements: two of one sign are alike
+    if (differ & ~(first.zero & second.zero & (first.values * second.values > 0))).any():
         return False
     widest = int(np.argmax(np.diff(first.values)))
     shift = float(first.values[widest : widest + 2].mean())
@@ -65,9 +67,10 @@ def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
 
 
 class _Nearest(NamedTuple):
-    """Eigenvalues nearest zero, ascending, and the round-off of those that count as zero; 0 for others."""
+    """Eigenvalues nearest zero, ascending, whether each counts as zero, and the round-off of those; 0 for others."""
 
     values: np.ndarray
+    zero: np.ndarray
     noise: np.ndarray
 
 
@@ -76,8 +79,9 @@ def _nearest(found: Factored, zero: int) -> _Nearest:
     found.count()
     values, vectors = found.nearest(zero + LOOKED_AT, NULL)
     order = np.argsort(values)
-    noise = np.array([found.noise(v) for v in vectors]) * (abs(values) <= found.inertia.tolerance)
-    return _Nearest(values[order], noise[order])
+    near = abs(values) <= found.inertia.tolerance
+    noise = np.array([found.noise(v) for v in vectors]) * near
+    return _Nearest(values[order], near[order], noise[order])
 
 
 def _shifted(found: Factored, shift: float) -> Index:

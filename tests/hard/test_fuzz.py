@@ -108,6 +108,13 @@ def test_a_missing_or_moved_event_is_seen() -> None:
     assert ["zero is" in sentence or "happens 0 times" in sentence for sentence in facts.faults(diagram)] == [True] * 2
 
 
+def test_an_oval_that_lies_otherwise_to_the_elements_is_no_other_branch() -> None:
+    """The index in space has a zero that the mesh makes 1.58e-9 of one oval, and 1.56e-9 of one turned by an eighth."""
+    rod = scene(43, 48)
+    diagram = trace(rod, comparison.meshes(rod, 48)[0], replace(comparison.plans(rod, 1)[0], error_bars=False))
+    assert [branch.name for branch in diagram] == ["ring", "branch 1"] and not diagram.warnings
+
+
 @pytest.mark.parametrize(("seed", "number"), [pytest.param(5, 29, marks=pytest.mark.long), (24, 195)])
 @pytest.mark.usefixtures("few_rows")
 def test_sides_that_differ_across_their_plane_are_both_traced(seed: int, number: int) -> None:
