@@ -109,7 +109,7 @@ def test_a_missing_or_moved_event_is_seen() -> None:
 
 
 def test_an_oval_that_lies_otherwise_to_the_elements_is_no_other_branch() -> None:
-    """The index in space has a zero that the mesh makes 1.58e-9 of one oval, and 1.56e-9 of one turned by an eighth."""
+    """The index in space has a zero that the mesh makes 1.58e-9 of one oval, and 1.56e-9 of one that is turned."""
     rod = scene(43, 48)
     diagram = trace(rod, comparison.meshes(rod, 48)[0], replace(comparison.plans(rod, 1)[0], error_bars=False))
     assert [branch.name for branch in diagram] == ["ring", "branch 1"] and not diagram.warnings
