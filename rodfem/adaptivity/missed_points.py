@@ -117,10 +117,8 @@ def _slope(solver: BranchSolver, x: PETSc.Vec, direction: PETSc.Vec) -> tuple[fl
 
 def _nearest(solver: BranchSolver, x: PETSc.Vec, _: PETSc.Vec) -> tuple[float, float]:
     """Eigenvalue of a state nearest to zero, symmetry modes left out, and what of it may be zero."""
-    inertia = solver.inertia
-    found = inertia.at(x)
+    found = solver.inertia.at(x)
     found.count()
-    kept, inertia.vectors = inertia.vectors, []
-    (value,), (vector,) = found.nearest(1, ORDERED)
-    inertia.vectors = kept
-    return float(value), ZERO_BAND * inertia.scale + quotient_error(found.matrix, vector)
+    with solver.inertia.afresh():
+        (value,), (vector,) = found.nearest(1, ORDERED)
+    return float(value), ZERO_BAND * solver.inertia.scale + quotient_error(found.matrix, vector)

@@ -277,10 +277,9 @@ def _nearest(
     """
     found = solver.inertia.at(point.x)
     found.count()
-    kept, solver.inertia.vectors = solver.inertia.vectors, []
-    nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
+    with solver.inertia.afresh():
+        nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
     vectors = [v for v in nearest if across(solver.system, [v], still)][:number]
-    solver.inertia.vectors = kept
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale
     rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])

@@ -58,16 +58,13 @@ def _nearest(solver: BranchSolver, row: Point) -> float:
     """Distance of the eigenvalue nearest zero from zero at a row, symmetry modes left out; 0 where a count fails."""
     if row.nearest:
         return row.nearest
-    inertia = solver.inertia
-    found, kept = inertia.at(row.x), inertia.vectors
+    found = solver.inertia.at(row.x)
     try:
         found.count()
     except ConvergenceError:
         return 0.0
-    inertia.vectors = []
-    (value,), _ = found.nearest(1, ROUGH)
-    inertia.vectors = kept
-    return abs(float(value))
+    with solver.inertia.afresh():
+        return abs(float(found.nearest(1, ROUGH)[0][0]))
 
 
 class LowModes:

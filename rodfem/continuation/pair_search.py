@@ -60,7 +60,7 @@ class PairSearch:
     def around(self, rows: Sequence[Point]) -> list[Point]:
         """A state near the middle one of three rows whose index is not theirs, where that row's determinant is low."""
         p, a, b = rows
-        if p.negative != a.negative or not self._relative(a, min(p, b, key=self.logarithm), 1) < DEEP:
+        if not _may_have_that_of(a, p) or not self._relative(a, min(p, b, key=self.logarithm), 1) < DEEP:
             return []
         # states nearer and nearer to the low row, until a parabola through them sees the pair
         step = min(a.arclength - p.arclength, b.arclength - a.arclength)
@@ -71,7 +71,7 @@ class PairSearch:
             if before is None or after is None:
                 return []
             for state in (before, after):
-                if self._differs(state, a):
+                if self._differs(state, p):
                     return [state]
             closer = [before, a, after]
             found = self.inside(closer, before, a) or self.inside(closer, a, after)
@@ -85,7 +85,7 @@ class PairSearch:
 
         It is looked for where the determinant at the end is far below the neighbour's.
         """
-        if end.negative != inner.negative:
+        if not _may_have_that_of(end, inner):
             return []
         step = inner.arclength - end.arclength
         size, far = step / NEARER, inner
@@ -94,7 +94,7 @@ class PairSearch:
             near = point_between(self.solver, first, last, end.arclength + size)
             if near is None:
                 return []
-            if self._differs(near, end):
+            if self._differs(near, inner):
                 return [near]
             rows = sorted((end, near, far), key=arclength)
             found = self.inside(rows, *rows[:2]) or self.inside(rows, *rows[1:])
@@ -131,7 +131,7 @@ class PairSearch:
             if any(s == other for other, _ in samples):
                 break
             state = point_between(self.solver, p, q, s)
-            if state is None or self._differs(state, p):
+            if state is None or self._differs(state, min(p, q, key=zeros)):
                 return state
             size = self._relative(state, p, multiplicity)
             known = sorted([*known, (s, size)])
@@ -156,6 +156,16 @@ class PairSearch:
 def arclength(row: Point) -> float:
     """Arclength of a row along its branch."""
     return row.arclength
+
+
+def zeros(row: Point) -> int:
+    """Number of eigenvalues at a row that are zero within the tolerance of the count."""
+    return row.zero
+
+
+def _may_have_that_of(row: Point, other: Point) -> bool:
+    """Whether the index of a row, which may have eigenvalues near zero, may be that of an ``other`` one."""
+    return row.negative <= other.negative <= row.negative + max(row.zero - other.zero, 0)
 
 
 def vertex(samples: Sequence[Sample]) -> Sample:

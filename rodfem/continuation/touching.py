@@ -98,3 +98,19 @@ class Touching:
             if found:
                 return [a, *found, b]
         return []
+
+
+def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point) -> list[Point]:
+    """A state beside a ``row`` with an eigenvalue near zero whose index is not that of the neighbours of this row.
+
+    It is one of two or three neighbouring ``rows``.
+    """
+    for function in functions(solver, rows):
+        search = PairSearch(solver, function)
+        if row is rows[0] or row is rows[-1]:
+            found = search.beside(row, rows[1] if row is rows[0] else rows[-2])
+        else:
+            found = search.around(rows)
+        if found:
+            return found
+    return []

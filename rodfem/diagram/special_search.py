@@ -15,9 +15,10 @@ from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.jumping import halvings, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
+from rodfem.continuation.pair_search import arclength
 from rodfem.continuation.special_points import COUPLED, Taut, find_special, same_point
 from rodfem.continuation.states_between import midpoint
-from rodfem.continuation.touching import Touching
+from rodfem.continuation.touching import Touching, beside_zero
 from rodfem.continuation.work import EnergyBalance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import clear_of_zero, resolve
@@ -114,10 +115,12 @@ class SpecialSearch:
         changed |= settled and self.row(a).low != self.row(b).low
         self._open = [b]
         between = [] if changed else self._touching.between(self.solver, a, b)
-        self._touching.add(b, told=changed or any(row.arclength > a.arclength for row in between))
         if between and between[0].arclength < a.arclength:  # the step before is the one that may be too long
-            self._early = between[0]
-        return self._examined(self._among([*rows, *between, b]))
+            self._early, rows = between[0], []
+        found = self._among([*rows, *between, b])
+        after = [point for point in (*between, *(s.point for s in found)) if point.arclength > a.arclength]
+        self._touching.add(b, told=changed or bool(after))
+        return self._examined(found)
 
     def _check_step(self, rows: Sequence[Point]) -> None:
         """Raise :class:`Unresolved` if the step to the last of the ``rows`` has jumped to another branch.
@@ -236,8 +239,12 @@ class SpecialSearch:
             if same_point(self.solver, special, found[:i]) is not None:
                 load = special.point.load
                 why.append(f"Near load {load:.8g} one special point was found twice, and another may be missing.")
-        near = [p for p in points[1:-1] if p.zero > self.level]
-        if near and not found and points[-1].zero <= self.level:
+        near = [p for p in points if p.zero > self.level]
+        if len(near) == 1 and not found and len(points) <= 3:  # a pair may begin or end there
+            other = beside_zero(self.solver, points, near[0])
+            if other:
+                return self._among(sorted([*points, *other], key=arclength), ended)
+        if near and not found and near[0] is not points[0] and points[-1].zero <= self.level:
             why.append(
                 f"Near load {near[0].load:.8g} an eigenvalue is nearly zero, and "
                 f"the index is {rows[0].low} on either side: whether it passes zero and comes back is not known."

@@ -12,6 +12,8 @@ disturb: the phase condition counts as one more constraint, and takes the zero m
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -191,6 +193,15 @@ class Inertia:
         """Settle the band of round-off, and that of symmetries, at the next state."""
         self.resolution, self.tolerance = 0.0, ZERO_BAND * self.scale
         self.system.verification.norm = 0.0
+
+    @contextmanager
+    def afresh(self) -> Iterator[None]:
+        """Let :meth:`Factored.nearest` begin without the ``vectors`` found before, and leave these as they were."""
+        kept, self.vectors = self.vectors, []
+        try:
+            yield
+        finally:
+            self.vectors = kept
 
     def modes_near_zero(self, x: PETSc.Vec, number: int, accuracy: float = NULL) -> list[PETSc.Vec]:
         """Vectors of the ``number`` eigenvalues nearest zero at ``x``: see :meth:`Factored.nearest`."""

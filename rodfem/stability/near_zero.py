@@ -68,22 +68,21 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     soft whatever their size.  Raises :class:`ConvergenceError` where there are too many of them.
     """
     inertia = found.inertia
-    index, kept, limit = index or found.count(), inertia.vectors, soft_limit(inertia)
-    inside, inertia.vectors = index.zero - found.drifts, []  # whatever was computed before, the same result
+    index, limit = index or found.count(), soft_limit(inertia)
+    inside = index.zero - found.drifts
     number = max(inside, least) + SPARE
-    if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
-        inertia.vectors = kept
-        return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
-    values, vectors = found.nearest(number, FIRM)
-    while (abs(values) < limit).all() and number < MANY:
-        number *= 2
+    with inertia.afresh():  # whatever was computed before, the same result
+        if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
+            return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
         values, vectors = found.nearest(number, FIRM)
-    # what is far from zero need not be as sharp: the values there lie dense on coarse meshes, and converge slowly
-    close = int((abs(values) < CLEAR * SOFT * inertia.scale).sum())
-    if close:
-        sharp = found.nearest(close, NULL, spare=number - close)
-        values, vectors = np.append(sharp[0], values[close:]), [*sharp[1], *vectors[close:]]
-    inertia.vectors = kept
+        while (abs(values) < limit).all() and number < MANY:
+            number *= 2
+            values, vectors = found.nearest(number, FIRM)
+        # what is far from zero need not be as sharp: the values there lie dense on coarse meshes, and converge slowly
+        close = int((abs(values) < CLEAR * SOFT * inertia.scale).sum())
+        if close:
+            sharp = found.nearest(close, NULL, spare=number - close)
+            values, vectors = np.append(sharp[0], values[close:]), [*sharp[1], *vectors[close:]]
     chosen = np.flatnonzero((abs(values) < limit) | (np.arange(number) < least))
     if len(chosen) < inside or len(chosen) == number:
         raise ConvergenceError(
