@@ -344,8 +344,8 @@ FAULTS = {
     ),
     "bumps-on-what-grows": Fault(
         "rodfem/problem/fast_load.py",
-        "fine, _ = _parted(function, seen, edges, (FINE,",
-        "fine, _ = _parted(function, seen, edges, (CLOSE,",
+        "off > np.maximum(FINE * size, least)",
+        "off > np.maximum(CLOSE * size, least)",
         "tests/diagram/test_functions_between_rows.py",
     ),
     "one-step-a-range": Fault(
@@ -440,8 +440,9 @@ FAULTS = {
     ),
     "peaks-count-over-the-whole-range": Fault(
         "rodfem/problem/fast_load.py",
-        "np.maximum(close * size, least)",
-        "0.02 * np.ptp(seen[1], axis=0)",
+        "            off, _, size = told(function, low[some], high[some], seen)\n",
+        "            off, size, _ = told(function, low[some], high[some], seen)\n"
+        "            size = 200.0 * np.ptp(seen[1], axis=0)\n",
         "tests/diagram/test_functions_between_rows.py",
     ),
     "energies-are-looked-at-in-their-values": Fault(

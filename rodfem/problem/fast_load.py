@@ -147,8 +147,7 @@ def _halved(function: Function, seen: Seen, ends: set[float], least: np.ndarray)
     size = np.maximum(size[0], np.ptp(function(edges), axis=0))
     kink = STEEP * size / (PIECES * 2**DEEPEST)
     least = np.maximum(POLYNOMIAL * size, least)
-    coarse, doubtful = _parted(function, seen, edges, (CLOSE, least, kink))
-    fine, _ = _parted(function, seen, edges, (FINE, least, kink))
+    coarse, fine, doubtful = _parted(function, seen, edges, least, kink)
     length = np.diff(coarse)[np.clip(np.searchsorted(coarse, fine[:-1], side="right") - 1, 0, len(coarse) - 2)]
     narrow = np.flatnonzero(NARROW * np.diff(fine) <= length)
     ends |= {*coarse.tolist(), *fine[narrow].tolist(), *fine[narrow + 1].tolist()}
@@ -156,27 +155,32 @@ def _halved(function: Function, seen: Seen, ends: set[float], least: np.ndarray)
 
 
 def _parted(
-    function: Function, seen: Seen, edges: np.ndarray, limits: tuple[float, np.ndarray, np.ndarray]
-) -> tuple[np.ndarray, list[float]]:
-    """Ends, in ascending order, of ranges in which cubics tell a ``function``, and loads about which none does.
+    function: Function, seen: Seen, edges: np.ndarray, least: np.ndarray, kink: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, list[float]]:
+    """Ends of ranges in which cubics tell a ``function``, coarse and fine ones, and loads about which none does.
 
-    The first ranges are those between the ``edges``.  The ``limits`` of differences are one relative to the variation
-    over a range, the least that counts (m,), and that of a kink (m,).
+    They ascend; the first ranges are those between the ``edges``, and those of the coarse ranges are among the fine
+    ones.  ``least`` is the least difference that counts, and ``kink`` that of a kink, (m,).
     """
-    close, least, kink = limits
-    low, high, ends = edges[:-1], edges[1:], [edges]
+    low, high, coarse, fine = edges[:-1], edges[1:], [edges], [edges]
+    wide = np.ones(len(low), dtype=bool)  # whether they are coarse ranges, too
     for depth in range(DEEPEST + 1):
-        untold, broken = np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
+        untold, far, broken = (np.zeros(len(low), dtype=bool) for _ in range(3))
         block = max(1, AT_ONCE // (len(least) * (len(KNOWN) + len(ASKED))))
         for some in (slice(i, i + block) for i in range(0, len(low), block)):
             off, _, size = told(function, low[some], high[some], seen)
-            untold[some] = np.any(off > np.maximum(close * size, least), axis=1)
-            broken[some] = untold[some] & np.any(off > kink, axis=1)
-        low, high, middle = low[untold], high[untold], (low + high)[untold] / 2
+            untold[some] = np.any(off > np.maximum(FINE * size, least), axis=1)
+            far[some] = np.any(off > np.maximum(CLOSE * size, least), axis=1)
+            broken[some] = np.any(off > kink, axis=1)
+        far &= wide
+        broken &= far
+        middle = (low + high) / 2
         if depth < DEEPEST:
-            ends.append(middle)
+            fine.append(middle[untold])
+            coarse.append(middle[far])
+            low, middle, high, wide = low[untold], middle[untold], high[untold], np.repeat(far[untold], 2)
             low, high = (np.stack(both, axis=1).ravel() for both in ((low, middle), (middle, high)))
-    return np.unique(np.concatenate(ends)), middle[broken[untold]].tolist()
+    return np.unique(np.concatenate(coarse)), np.unique(np.concatenate(fine)), middle[broken].tolist()
 
 
 def told(

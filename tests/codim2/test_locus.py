@@ -381,6 +381,6 @@ def test_a_locus_that_bends_sharply_is_followed() -> None:
     potential = lambda u, f2, c: (2 + ufl.sin(400 * c.b) - c.P) * u * u / 2 + u**4 / 4 + f2 / 2  # noqa: E731
     diagram = trace(two_freedoms(potential, (0.0, 4.0), b=0.1), Discretization("auto", 4, 3), Plan(error_bars=False))
     special = diagram.special("branch point")[0]
-    found = locus(diagram.solvers[0], special, "b", ((0.0, 4.0), (0.0, 1.0)), replace(STEPS, most=30), error_bars=0)
-    assert found.ended == ("30 points reached", "30 points reached")
+    found = locus(diagram.solvers[0], special, "b", ((0.0, 4.0), (0.0, 1.0)), replace(STEPS, most=16), error_bars=0)
+    assert found.ended == ("16 points reached", "16 points reached")
     np.testing.assert_allclose(found.values[:, 0], 2 + np.sin(400 * found.values[:, 1]), atol=1e-8)

@@ -99,7 +99,6 @@ def test_special_points_do_not_depend_on_the_steps() -> None:
 
 
 @pytest.mark.versions
-@pytest.mark.short
 def test_newton_converges_quadratically() -> None:
     """The size of a correction is the square of the one before: the Jacobian is the derivative of the equations."""
     f = follower()

@@ -23,6 +23,7 @@ def stiff(strains: float) -> Scene:
     return replace(arch, rod="flexible", energy=energy, parameters={**arch.parameters, "GA": strains}, span=(0.0, 9.5))
 
 
+@pytest.mark.alone
 def test_stiff_strains_do_not_hide_the_load() -> None:
     """The fold of an arch of DaDeppo & Schmidt is one however stiff its strains are, and at 8.97.
 

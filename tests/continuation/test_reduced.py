@@ -39,7 +39,10 @@ def angle(r: Any, q: Any) -> float:
     return degrees(float(np.arctan2(r[1], r[0]))) % 180 if np.hypot(*r[:2]) > 1e-9 else 0.0
 
 
-@pytest.mark.parametrize(("form", "period"), FORMS.values(), ids=FORMS)
+@pytest.mark.parametrize(
+    ("form", "period"),
+    [pytest.param(*x, id=name, marks=[pytest.mark.alone] * (name != "square")) for name, x in FORMS.items()],
+)
 def test_every_extremum_has_its_branch(form: tuple[float, ...], period: int) -> None:
     """Of ten random forms four lacked one or two branches, all of them maxima, without a word."""
     energy = lambda x, c: quartic(form, x.r[0], x.r[1])  # noqa: E731

@@ -102,6 +102,7 @@ def lateral(threshold: float) -> Diagram:
     return trace(rod, Discretization(elements=4, degree=4), Plan(depth=0))
 
 
+@pytest.mark.alone
 def test_loci_and_modes_have_no_bar_beyond_a_kink(tmp_path: Path) -> None:
     for threshold, kink in ((10.0, False), (0.2, True)):
         found = lateral(threshold)

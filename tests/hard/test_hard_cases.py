@@ -18,6 +18,7 @@ LONG = {
     ("branches beside each other", 1e-2),
     ("flutter that comes and goes", 1e-6),
     ("a peak of the load between two rows", 1e-3),
+    ("a peak of the load between two rows", 1e-6),  # tests/diagram/test_load_steps.py has it, too
     ("a floating ring under loads that follow", (1e-1, 6)),
     ("critical loads with closed forms", "greenhill"),
     ("strips, clamps turned alike", 0.8),

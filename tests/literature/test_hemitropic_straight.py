@@ -34,7 +34,6 @@ def test_closed_form(constants: Constants) -> None:
 
 
 @pytest.mark.versions
-@pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_loads_of_both_formulations(formulation: str) -> None:
     found = buckling_points(formulation, 12, 6)
