@@ -169,6 +169,12 @@ BIFURCATIONS = (
         "a load asked for at a branch point", "its equations are singular, or nearly", EXACT,
         "Euler, pi^2/4", "distance from it", ranges.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9),
     ),
+    Case(
+        "two branch points, one of them at a row", "that row has no index, and the determinant does not show the other "
+        "point", SAID, "Euler, pi^2/4, times a parabola of the load", "row (0, -1: the first, the last), distance",
+        lambda given: ranges.pair_at_a_row(*given), ((0, 0.0),),
+        tuple((row, off) for row in (0, 3, -1) for off in (0.0, 1e-9, -1e-9, 1e-6, -1e-6)),
+    ),
 )  # fmt: skip
 ABOVE = (1e-2, 1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-13, -1e-9, -1e-4)
 """Greatest thrust of a sweep, less the critical one."""
