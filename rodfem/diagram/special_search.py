@@ -219,7 +219,7 @@ class SpecialSearch:
         return max(self.level - self.solver.system.active_drifts(x), 0)
 
     def _among(self, points: Sequence[Point], ended: bool = False) -> list[SpecialPoint]:
-        """Special points among rows, all but the first and the last of which have an eigenvalue near zero.
+        """Special points among rows: inner ones have an eigenvalue near zero, or another index than their neighbours.
 
         Raises :class:`Unresolved` where they do not explain the indices, and shorter steps have not been tried, unless
         the branch has ``ended``.
