@@ -17,7 +17,7 @@ from petsc4py import PETSc
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.determinants import LARGEST, Logarithm, LowModes, steep, whole
+from rodfem.continuation.determinants import BEYOND, LARGEST, Logarithm, LowModes, steep, whole
 from rodfem.continuation.locate import ORDERED
 from rodfem.continuation.pair_search import vertex
 from rodfem.continuation.states_between import point_between
@@ -67,7 +67,7 @@ def _determinants(rows: list[Point], meshes: Meshes) -> np.ndarray:
     """Determinants at ``rows`` over the largest one, signed; those of the low modes where the others change much."""
     functions: dict[int, Logarithm] = dict.fromkeys({p.mesh for p in rows}, whole)
     if steep(rows):
-        sigma = max(meshes.solvers[0].inertia.scale, *(p.nearest for p in rows))
+        sigma = max(meshes.solvers[0].inertia.scale, *(BEYOND * p.nearest for p in rows))
         functions = {mesh: LowModes(meshes.solvers[mesh], sigma) for mesh in functions}
     logarithms = np.array([functions[p.mesh](p) for p in rows])
     largest = np.max(logarithms, where=np.isfinite(logarithms), initial=-inf)

@@ -8,24 +8,30 @@ and goes.  The ratio
 
 is exact for the constrained pencil (``M`` is zero on multipliers, whose infinite eigenvalues give a factor of one), and
 modes far above ``sigma`` do not count, whatever moves them.  The shift is the larger of the lowest bending eigenvalue
-and of that nearest zero; where this one is far below the other, as of a rod that has softened, it is another shift to
-be tried.  The ratio takes a factorisation a row, and has poles where an eigenvalue is ``-sigma``: it is asked second,
-where the determinant changes so much that it may hide a pair.
+and of twice that nearest zero; where this one is far below the other, as of a rod that has softened, it is another
+shift to be tried.  The ratio takes a factorisation a row, and has poles where an eigenvalue is ``-sigma``: it is asked
+second, where the determinant changes so much that it may hide a pair.
+
+Crossings that are known are taken out, too: a pair in the same step as one, or in the next one, would not show in a
+function that passes zero there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from math import exp
+from math import exp, log
+from typing import NamedTuple
 
-from rodfem.continuation.branch import Point
+from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import ROUGH
 
 STEEP = 1.0
 """Change of the logarithm of a determinant, from row to row, above which it may hide a pair of crossings."""
+BEYOND = 2.0
+"""Shift over the distance from zero of the eigenvalue nearest to it, which may be a negative one: that is no pole."""
 FAR = 0.1
 """Ratio of two shifts below which both are tried."""
 LARGEST = 600.0
@@ -34,21 +40,39 @@ Logarithm = Callable[[Point], float]
 """Logarithm of the size of a test function at a row; nan if not known."""
 
 
+class Crossing(NamedTuple):
+    """A special point that is known: its ``arclength``, and by how much the index ``changes`` there."""
+
+    arclength: float
+    changes: int
+
+    @classmethod
+    def at(cls, special: SpecialPoint) -> Crossing:
+        """Crossing at a special point."""
+        return cls(special.point.arclength, special.negative_after - special.negative_before)
+
+
 def whole(row: Point) -> float:
     """Logarithm of the size of the determinant at a row."""
     return row.determinant
 
 
-def steep(rows: Sequence[Point]) -> bool:
-    """Whether the determinant changes by so much between neighbours among ``rows`` that it may hide a pair."""
-    return any(abs(b.determinant - a.determinant) > STEEP for a, b in pairwise(rows))
+def steep(rows: Sequence[Point], known: Sequence[Crossing] = ()) -> bool:
+    """Whether the determinant changes by so much between neighbours among ``rows`` that it may hide a pair.
+
+    That is without the crossings that are ``known``.
+    """
+    return any(not abs(_difference(whole, b, a, known)) <= STEEP for a, b in pairwise(rows))
 
 
-def functions(solver: BranchSolver, rows: Sequence[Point]) -> Iterator[Logarithm]:
-    """Yield those that may show a pair beside ``rows`` on the mesh of ``solver``, each when the last one has not."""
+def functions(solver: BranchSolver, rows: Sequence[Point], known: Sequence[Crossing] = ()) -> Iterator[Logarithm]:
+    """Yield those that may show a pair beside ``rows`` on the mesh of ``solver``, each when the last one has not.
+
+    Crossings that are ``known`` do not count.
+    """
     yield whole
-    if steep(rows):
-        nearest, usual = max(_nearest(solver, row) for row in rows), solver.inertia.scale
+    if steep(rows, known):
+        nearest, usual = BEYOND * max(_nearest(solver, row) for row in rows), solver.inertia.scale
         yield LowModes(solver, max(nearest, usual))
         if 0.0 < nearest < FAR * usual:
             yield LowModes(solver, nearest)
@@ -94,11 +118,33 @@ class LowModes:
         return value
 
 
-def relative(logarithm: Logarithm, row: Point, other: Point, multiplicity: int) -> float:
+def relative(
+    logarithm: Logarithm, row: Point, other: Point, multiplicity: int, known: Sequence[Crossing] = ()
+) -> float:
     """Root of a test function at a ``row`` over that at an ``other`` one, signed by their indices; nan if not known.
 
-    The function has the ``logarithm``, and as many eigenvalues vanish together as ``multiplicity`` says.
+    The function has the ``logarithm``, and as many eigenvalues vanish together as ``multiplicity`` says.  It is divided
+    by the distances from all crossings that are ``known``.
     """
+    exponent = _difference(logarithm, row, other, known) / multiplicity
     # the sign of a determinant changes with each negative eigenvalue
-    exponent = (logarithm(row) - logarithm(other)) / multiplicity
-    return float((-1) ** (row.negative - other.negative) * exp(min(exponent, LARGEST)))
+    odd = row.negative - other.negative - changes(known, other, row)
+    return float((-1) ** odd * exp(min(exponent, LARGEST)))
+
+
+def changes(known: Sequence[Crossing], a: Point, b: Point) -> int:
+    """Change of the index from the row ``a`` to ``b`` by the crossings that are ``known`` between them."""
+    low, high = sorted((a.arclength, b.arclength))
+    there = sum(crossing.changes for crossing in known if low < crossing.arclength < high)
+    return there if a.arclength < b.arclength else -there
+
+
+def _difference(logarithm: Logarithm, row: Point, other: Point, known: Sequence[Crossing]) -> float:
+    """Logarithm of a function at a ``row`` less that at an ``other`` one, without ``known`` crossings; nan at one."""
+    found = logarithm(row) - logarithm(other)
+    for crossing in known:
+        here, there = abs(row.arclength - crossing.arclength), abs(other.arclength - crossing.arclength)
+        if not here or not there:
+            return float("nan")
+        found -= abs(crossing.changes) * log(here / there)
+    return found

@@ -11,7 +11,8 @@ from math import inf, isfinite
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.determinants import Logarithm, relative
+from rodfem.continuation.determinants import Crossing, Logarithm, changes, relative
+from rodfem.continuation.special_points import APART
 from rodfem.continuation.states_between import midpoint, point_between
 from rodfem.stability.round_off import resolve
 
@@ -35,11 +36,14 @@ Sample = tuple[float, float]
 
 
 class PairSearch:
-    """Search by one test function; ``solver`` has the mesh of the rows, which are neighbours on a branch."""
+    """Search by one test function; ``solver`` has the mesh of the rows, which are neighbours on a branch.
 
-    def __init__(self, solver: BranchSolver, logarithm: Logarithm) -> None:
-        """With the ``logarithm`` of the size of the test function."""
-        self.solver, self.logarithm = solver, logarithm
+    "Another index" is one that the crossings that are ``known`` do not explain.
+    """
+
+    def __init__(self, solver: BranchSolver, logarithm: Logarithm, known: Sequence[Crossing] = ()) -> None:
+        """With the ``logarithm`` of the size of the test function, and crossings that are ``known``."""
+        self.solver, self.logarithm, self.known = solver, logarithm, known
 
     def inside(self, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
         """A state between the neighbours ``p`` and ``q`` among three ``rows`` whose index is not theirs, if found."""
@@ -60,7 +64,7 @@ class PairSearch:
     def around(self, rows: Sequence[Point]) -> list[Point]:
         """A state near the middle one of three rows whose index is not theirs, where that row's determinant is low."""
         p, a, b = rows
-        if not _may_have_that_of(a, p) or not self._relative(a, min(p, b, key=self.logarithm), 1) < DEEP:
+        if not self.follows(a, p) or not self._deep(a, p, b):
             return []
         # states nearer and nearer to the low row, until a parabola through them sees the pair
         step = min(a.arclength - p.arclength, b.arclength - a.arclength)
@@ -75,7 +79,7 @@ class PairSearch:
                     return [state]
             closer = [before, a, after]
             found = self.inside(closer, before, a) or self.inside(closer, a, after)
-            if found or not self._relative(a, min(before, after, key=self.logarithm), 1) < DEEP:
+            if found or not self._deep(a, before, after):
                 return found
             size /= NEARER
         return []
@@ -85,11 +89,11 @@ class PairSearch:
 
         It is looked for where the determinant at the end is far below the neighbour's.
         """
-        if not _may_have_that_of(end, inner):
+        if not self.follows(end, inner):
             return []
         step = inner.arclength - end.arclength
         size, far = step / NEARER, inner
-        while abs(size) > LEAST * abs(step) and self._relative(end, far, 1) < DEEP:
+        while abs(size) > LEAST * abs(step) and self._deep(end, far):
             first, last = sorted((end, far), key=arclength)
             near = point_between(self.solver, first, last, end.arclength + size)
             if near is None:
@@ -106,7 +110,7 @@ class PairSearch:
     def halved(self, a: Point, b: Point) -> list[Point]:
         """A state between two neighbours whose index is not theirs, found from these two and the state half-way."""
         middle = midpoint(self.solver, a, b)
-        if middle is None or a.negative != b.negative:
+        if middle is None or not self.follows(b, a):
             return []
         if self._differs(middle, a):
             return [middle]
@@ -143,14 +147,26 @@ class PairSearch:
         return None
 
     def _differs(self, state: Point, row: Point) -> bool:
-        """Whether the index of a state is not known to be that of a row; small eigenvalues by their quotients."""
+        """Whether a state may have another index than follows from a row; small eigenvalues by their quotients."""
+        if any(abs(state.arclength - crossing.arclength) < APART for crossing in self.known):
+            return False
+        index = row.negative + changes(self.known, row, state)
         if state.zero <= row.zero:
-            return state.negative != row.negative
-        return resolve(self.solver.inertia.at(state.x)) != (row.negative, row.negative)
+            return state.negative != index
+        return resolve(self.solver.inertia.at(state.x)) != (index, index)
+
+    def follows(self, row: Point, other: Point) -> bool:
+        """Whether a row, some eigenvalues of which may be near zero, may have the index that follows from an other."""
+        index = other.negative + changes(self.known, other, row)
+        return row.negative <= index <= row.negative + max(row.zero - other.zero, 0)
+
+    def _deep(self, row: Point, *others: Point) -> bool:
+        """Whether the test function at a row is far below that at all ``others``."""
+        return all(abs(self._relative(row, other, 1)) < DEEP for other in others)
 
     def _relative(self, row: Point, other: Point, multiplicity: int) -> float:
         """Root of the test function at a row over that at another."""
-        return relative(self.logarithm, row, other, multiplicity)
+        return relative(self.logarithm, row, other, multiplicity, self.known)
 
 
 def arclength(row: Point) -> float:
@@ -161,11 +177,6 @@ def arclength(row: Point) -> float:
 def zeros(row: Point) -> int:
     """Number of eigenvalues at a row that are zero within the tolerance of the count."""
     return row.zero
-
-
-def _may_have_that_of(row: Point, other: Point) -> bool:
-    """Whether the index of a row, which may have eigenvalues near zero, may be that of an ``other`` one."""
-    return row.negative <= other.negative <= row.negative + max(row.zero - other.zero, 0)
 
 
 def vertex(samples: Sequence[Sample]) -> Sample:

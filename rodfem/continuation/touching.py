@@ -22,16 +22,21 @@ from collections.abc import Sequence
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.determinants import functions
-from rodfem.continuation.pair_search import PairSearch
+from rodfem.continuation.determinants import Crossing, functions
+from rodfem.continuation.pair_search import PairSearch, arclength
+from rodfem.continuation.states_between import point_between
 
 
 class Touching:
-    """The last rows of a branch, and the test for pairs of crossings in the steps between them, by determinants."""
+    """The last rows of a branch, and the test for pairs of crossings in the steps between them, by determinants.
+
+    Crossings that are known do not hide pairs beside them.
+    """
 
     def __init__(self) -> None:
         """No row yet."""
         self._rows: list[Point] = []
+        self._known: list[Crossing] = []
         self._begun, self._told, self._looked = True, False, False
         self._seen: set[int] = set()
 
@@ -40,37 +45,48 @@ class Touching:
         same = [row for row in rows[-2:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
         self._rows, self._begun, self._told = same, len(rows) < 2, False
         self._seen, self._looked = set(), len(rows) > 1
+        self._known = [crossing for crossing in self._known if crossing.arclength <= rows[-1].arclength]
 
-    def add(self, row: Point, *, told: bool) -> None:
-        """Go on to the next row; ``told`` is whether special points are known in the step to it."""
+    def add(self, row: Point, known: Sequence[Crossing], *, told: bool) -> None:
+        """Go on to the next row; ``known`` are crossings that have been found since.
+
+        ``told`` is whether special points are known in the step to it.
+        """
         self._begun = self._begun and len(self._rows) < 2
         self._rows, self._told = [*self._rows[-1:], row], told
+        self._known = [crossing for crossing in self._known if crossing.arclength > self._rows[0].arclength]
+        self._known += known
 
-    def between(self, solver: BranchSolver, a: Point, b: Point) -> list[Point]:
+    def knows(self, a: Point, b: Point) -> bool:
+        """Whether crossings are known between two rows."""
+        return any(a.arclength < crossing.arclength < b.arclength for crossing in self._known)
+
+    def between(self, solver: BranchSolver, a: Point, b: Point, found: Sequence[Crossing] = ()) -> list[Point]:
         """Rows to insert, in order of arclength, where an eigenvalue passes zero twice in the step from ``a`` to ``b``.
 
-        Of two steps the parabola may have its vertex in the wrong one: where that of the last three rows was not in the
-        step to ``a``, that step is looked at, too, and its row before that step then comes first.
+        That is beside the crossings that have been ``found`` in this step.  Of two steps the parabola may have its
+        vertex in the wrong one: where that of the last three rows was not in the step to ``a``, that step is looked at,
+        too, and its row before that step then comes first.
         """
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
-        rows = [self._rows[-2], a, b]
+        rows, known = [self._rows[-2], a, b], [*self._known, *found]
         # by numbers of the test functions: whether one had its vertex in the step before
         before, self._seen, looked, self._looked = self._seen, set(), self._looked, False
-        for number, function in enumerate(functions(solver, rows)):
-            search = PairSearch(solver, function)
+        for number, function in enumerate(functions(solver, rows, known)):
+            search = PairSearch(solver, function, known)
             if search.dips(rows, a, b):
                 self._seen.add(number)
-            found = self._between(search, rows, looked or number in before)
-            if found:
-                return found
+            new = self._between(search, rows, looked or number in before)
+            if new:
+                return _apart(solver, rows, new, found)
         return []
 
     def _between(self, search: PairSearch, rows: list[Point], seen: bool) -> list[Point]:
         """As :meth:`between`, by one test function, which has ``seen`` what is in the first of two steps."""
         first, a, b = rows
         found: list[Point] = []
-        if not (self._told or seen) and first.negative == a.negative:
+        if not (self._told or seen) and search.follows(a, first):
             early = search.inside(rows, first, a) or (search.beside(first, a) if self._begun else [])
             found += [first, *early, a] if early else []
         if found or self._told:  # what lies on the other side of the row between the steps is known
@@ -87,11 +103,11 @@ class Touching:
 
         A branch of one step has no third row, and its first one has been compared with none.
         """
-        if len(self._rows) < 2 or self._told:
+        if len(self._rows) < 2 or self._told or self.knows(*self._rows):
             return []
         a, b = self._rows
-        for function in functions(solver, self._rows):
-            search = PairSearch(solver, function)
+        for function in functions(solver, self._rows, self._known):
+            search = PairSearch(solver, function, self._known)
             found = search.beside(b, a)
             if not found and self._begun:
                 found = search.beside(a, b) or search.halved(a, b)
@@ -100,13 +116,29 @@ class Touching:
         return []
 
 
-def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point) -> list[Point]:
-    """A state beside a ``row`` with an eigenvalue near zero whose index is not that of the neighbours of this row.
+def _apart(solver: BranchSolver, rows: Sequence[Point], new: Sequence[Point], found: Sequence[Crossing]) -> list[Point]:
+    """Some ``new`` states in order, and more: half-way between each and the nearest crossings that have been ``found``.
 
-    It is one of two or three neighbouring ``rows``.
+    Of two pieces of a step, one of which has a pair, neither may show that one was found before.
     """
-    for function in functions(solver, rows):
-        search = PairSearch(solver, function)
+    out, (_, a, b) = list(new), rows
+    for state in new:
+        if a.arclength < state.arclength < b.arclength:
+            left = max((x.arclength for x in found if x.arclength < state.arclength), default=None)
+            right = min((x.arclength for x in found if x.arclength > state.arclength), default=None)
+            beside = [(state.arclength + s) / 2 for s in (left, right) if s is not None]
+            states = [point_between(solver, a, b, s) for s in beside]
+            out += [each for each in states if each is not None]
+    return sorted(out, key=arclength)
+
+
+def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point, known: Sequence[Crossing] = ()) -> list[Point]:
+    """A state beside a ``row`` with an eigenvalue near zero whose index does not follow from those of its neighbours.
+
+    It is one of two or three neighbouring ``rows``, between which some crossings are ``known``.
+    """
+    for function in functions(solver, rows, known):
+        search = PairSearch(solver, function, known)
         if row is rows[0] or row is rows[-1]:
             found = search.beside(row, rows[1] if row is rows[0] else rows[-2])
         else:

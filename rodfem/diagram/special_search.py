@@ -11,6 +11,7 @@ from petsc4py import PETSc
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.determinants import Crossing
 from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.jumping import halvings, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
@@ -31,6 +32,12 @@ SHORTER = 2
 """How many times steps are made eight times shorter where the indices are not explained."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
+
+
+def crossings(found: Sequence[SpecialPoint]) -> list[Crossing]:
+    """Those of some special points at which the index changes."""
+    known = [Crossing.at(special) for special in found]
+    return [crossing for crossing in known if crossing.changes]
 
 
 class Unresolved(Exception):
@@ -64,6 +71,7 @@ class SpecialSearch:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
         self._short = (until, short or inf, 0)
         self.level = self.undecided = first.zero
+        self._touching = Touching()
 
     def resume(self, history: Sequence[Point]) -> None:
         """Go on from the last row of a branch, up to which everything has been found."""
@@ -114,12 +122,23 @@ class SpecialSearch:
         changed = len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0
         changed |= settled and self.row(a).low != self.row(b).low
         self._open = [b]
-        between = [] if changed else self._touching.between(self.solver, a, b)
-        if between and between[0].arclength < a.arclength:  # the step before is the one that may be too long
-            self._early, rows = between[0], []
-        found = self._among([*rows, *between, b])
-        after = [point for point in (*between, *(s.point for s in found)) if point.arclength > a.arclength]
-        self._touching.add(b, told=changed or bool(after))
+        found = self._among([*rows, b]) if changed else []
+        between = self._touching.between(self.solver, rows[0], b, crossings(found))
+        if between and between[0].arclength < rows[0].arclength:  # the step before is the one that may be too long
+            self._early = between[0]
+            if self._touching.knows(between[0], rows[0]):  # points of it are in the branch already
+                self._shorten(between[0], rows[0])
+                self.observer.warn(
+                    f"Between loads {between[0].load:.8g} and {a.load:.8g} there are more special points than were "
+                    f"found; {SMALLER_STEPS}."
+                )
+                between = []
+            else:
+                rows = []
+        if between or not changed:
+            found = self._among(sorted([*rows, *between, b], key=arclength))
+        inserted = any(row.arclength > a.arclength for row in between)
+        self._touching.add(b, crossings(found), told=inserted or (changed and not crossings(found)))
         return self._examined(found)
 
     def _check_step(self, rows: Sequence[Point]) -> None:
@@ -240,8 +259,8 @@ class SpecialSearch:
                 load = special.point.load
                 why.append(f"Near load {load:.8g} one special point was found twice, and another may be missing.")
         near = [p for p in points if p.zero > self.level]
-        if len(near) == 1 and not found and len(points) <= 3:  # a pair may begin or end there
-            other = beside_zero(self.solver, points, near[0])
+        if len(near) == 1 and len(points) <= 3:  # a pair may begin or end there
+            other = beside_zero(self.solver, points, near[0], crossings(found))
             if other:
                 return self._among(sorted([*points, *other], key=arclength), ended)
         if near and not found and near[0] is not points[0] and points[-1].zero <= self.level:
@@ -317,7 +336,9 @@ class SpecialSearch:
             turned = str(state)
         except ConvergenceError as trouble:
             why = str(trouble)
-        if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
+        known = p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low)
+        # one that takes the index the other way is one of three, at least
+        if known and not (len(found) == 1 and Crossing.at(found[0]).changes * (q.low - p.low) < 0):
             # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
             found[0].negative_before, found[-1].negative_after = p.low, q.low
         if not why and chained(p.low, p.high, found, q.low, q.high):
