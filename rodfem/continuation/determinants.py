@@ -32,6 +32,8 @@ STEEP = 1.0
 """Change of the logarithm of a determinant, from row to row, above which it may hide a pair of crossings."""
 BEYOND = 2.0
 """Shift over the distance from zero of the eigenvalue nearest to it, which may be a negative one: that is no pole."""
+FARTHER, TIMES = 4.0, 8
+"""Ratio of the next shift to one that negative eigenvalues come near, and how many are tried."""
 FAR = 0.1
 """Ratio of two shifts below which both are tried."""
 LARGEST = 600.0
@@ -73,9 +75,9 @@ def functions(solver: BranchSolver, rows: Sequence[Point], known: Sequence[Cross
     yield whole
     if steep(rows, known):
         nearest, usual = BEYOND * max(_nearest(solver, row) for row in rows), solver.inertia.scale
-        yield LowModes(solver, max(nearest, usual))
+        yield LowModes.without_poles(solver, rows, max(nearest, usual))
         if 0.0 < nearest < FAR * usual:
-            yield LowModes(solver, nearest)
+            yield LowModes.without_poles(solver, rows, nearest)
 
 
 def _nearest(solver: BranchSolver, row: Point) -> float:
@@ -91,6 +93,14 @@ def _nearest(solver: BranchSolver, row: Point) -> float:
         return abs(float(found.nearest(1, ROUGH)[0][0]))
 
 
+def _below(solver: BranchSolver, row: Point, shift: float) -> int:
+    """Number of eigenvalues at a row below a ``shift``; 1 where the count fails, at one of them."""
+    try:
+        return solver.inertia.at(row.x).below(shift)
+    except ConvergenceError:
+        return 1
+
+
 class LowModes:
     """Logarithm of the size of the determinant of the low modes at rows of one mesh."""
 
@@ -98,6 +108,15 @@ class LowModes:
         """With a shift ``sigma``, positive, for the rows on the mesh of ``solver``."""
         self.solver, self.sigma = solver, sigma
         self._known: list[tuple[Point, float]] = []
+
+    @classmethod
+    def without_poles(cls, solver: BranchSolver, rows: Sequence[Point], sigma: float) -> LowModes:
+        """With a shift of ``sigma``, or more: twice as far from zero as negative eigenvalues at the ``rows``."""
+        for _ in range(TIMES):
+            if not any(row.negative and _below(solver, row, -sigma / BEYOND) for row in rows):
+                break
+            sigma *= FARTHER
+        return cls(solver, sigma)
 
     def __call__(self, row: Point) -> float:
         """Evaluate it at a row; nan at a pole."""

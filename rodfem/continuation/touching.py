@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.determinants import Crossing, functions
-from rodfem.continuation.pair_search import PairSearch, arclength
+from rodfem.continuation.pair_search import LEAST, PairSearch, arclength
 from rodfem.continuation.states_between import point_between
 
 
@@ -71,8 +71,8 @@ class Touching:
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
         rows, known = [self._rows[-2], a, b], [*self._known, *found]
-        # by numbers of the test functions: whether one had its vertex in the step before
-        before, self._seen, looked, self._looked = self._seen, set(), self._looked, False
+        # by numbers of the test functions: whether one had its vertex in the step before, with the crossings known now
+        before, self._seen, looked, self._looked = set() if found else self._seen, set(), self._looked, False
         for number, function in enumerate(functions(solver, rows, known)):
             search = PairSearch(solver, function, known)
             if search.dips(rows, a, b):
@@ -117,18 +117,16 @@ class Touching:
 
 
 def _apart(solver: BranchSolver, rows: Sequence[Point], new: Sequence[Point], found: Sequence[Crossing]) -> list[Point]:
-    """Some ``new`` states in order, and more: half-way between each and the nearest crossings that have been ``found``.
+    """Some ``new`` states in order, and two more beside each of the crossings that have been ``found`` in their step.
 
-    Of two pieces of a step, one of which has a pair, neither may show that one was found before.
+    These are found again, then, in pieces of their own: of a piece in which two of them make a pair no index tells.
     """
-    out, (_, a, b) = list(new), rows
-    for state in new:
-        if a.arclength < state.arclength < b.arclength:
-            left = max((x.arclength for x in found if x.arclength < state.arclength), default=None)
-            right = min((x.arclength for x in found if x.arclength > state.arclength), default=None)
-            beside = [(state.arclength + s) / 2 for s in (left, right) if s is not None]
-            states = [point_between(solver, a, b, s) for s in beside]
-            out += [each for each in states if each is not None]
+    _, a, b = rows
+    out, size = list(new), LEAST * (b.arclength - a.arclength)
+    for crossing in found if any(state.arclength > a.arclength for state in new) else []:
+        for s in (crossing.arclength - size, crossing.arclength + size):
+            state = point_between(solver, a, b, s) if a.arclength < s < b.arclength else None
+            out += [state] if state is not None else []
     return sorted(out, key=arclength)
 
 

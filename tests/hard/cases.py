@@ -175,6 +175,12 @@ BIFURCATIONS = (
         lambda given: ranges.pair_at_a_row(*given), ((0, 0.0),),
         tuple((row, off) for row in (0, 3, -1) for off in (0.0, 1e-9, -1e-9, 1e-6, -1e-6)),
     ),
+    Case(
+        "two branch points beside a third one", "the index changes in the step, or in the next one: the pair shows "
+        "neither in it nor in a determinant that passes zero", SAID, "Euler, pi^2/4, times a parabola of the load",
+        "middle of the pair, distance of the third", lambda given: ranges.beside_a_pair(*given), ((1.24, 0.002),),
+        tuple((middle, apart) for middle in (0.62, 1.24, 2.05) for apart in (-0.2, -0.05, 0.0, 0.002, 0.02, 0.1)),
+    ),
 )  # fmt: skip
 ABOVE = (1e-2, 1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-13, -1e-9, -1e-4)
 """Greatest thrust of a sweep, less the critical one."""
