@@ -26,6 +26,9 @@ from rodfem.continuation.determinants import Crossing, functions
 from rodfem.continuation.pair_search import LEAST, PairSearch, arclength
 from rodfem.continuation.states_between import point_between
 
+LASTING = 4.0
+"""Steps for which a crossing is known: just before three rows its eigenvalue grows by a factor from row to row."""
+
 
 class Touching:
     """The last rows of a branch, and the test for pairs of crossings in the steps between them, by determinants.
@@ -54,8 +57,8 @@ class Touching:
         """
         self._begun = self._begun and len(self._rows) < 2
         self._rows, self._told = [*self._rows[-1:], row], told
-        self._known = [crossing for crossing in self._known if crossing.arclength > self._rows[0].arclength]
-        self._known += known
+        since = row.arclength - LASTING * (row.arclength - self._rows[0].arclength)
+        self._known = [crossing for crossing in self._known if crossing.arclength > since] + [*known]
 
     def knows(self, a: Point, b: Point) -> bool:
         """Whether crossings are known between two rows."""

@@ -1,9 +1,9 @@
-"""Two branch points, of which one is at a row, the first and the last included, and the other in a step beside it."""
+"""Two branch points, of which one is at a row, the first and the last included, or beside which there is a third one."""
 
 from __future__ import annotations
 
 import pytest
-from hard.ranges import pair_at_a_row
+from hard.ranges import beside_a_pair, pair_at_a_row
 
 pytestmark = pytest.mark.alone
 
@@ -15,4 +15,19 @@ pytestmark = pytest.mark.alone
 def test_one_of_two_branch_points_is_at_a_row(row: int, side: float, sign: float, off: float) -> None:
     """The rod is stable between them, or unstable there alone: the row itself does not tell which of both."""
     found = pair_at_a_row(row, off, side, sign, error_bars=False)
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
+
+
+@pytest.mark.parametrize(
+    ("middle", "apart", "rate", "grow"),
+    [
+        (1.24, 0.002, 0.3, 0.0),  # all three in one step
+        (2.05, -0.05, -0.3, 0.0),  # the last one is found first, by the number of its eigenvalue
+        (1.9, 0.02, -0.3, 0.0),  # the third one just after the row after the pair
+        (1.24, -0.2, 0.3, 3.0),  # an eigenvalue that becomes more negative hides the pair
+        (0.62, 0.0, 0.3, 3.0),
+    ],
+)
+def test_two_branch_points_beside_a_third_one(middle: float, apart: float, rate: float, grow: float) -> None:
+    found = beside_a_pair(middle, apart, rate, grow, error_bars=False)
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
