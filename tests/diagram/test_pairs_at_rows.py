@@ -1,4 +1,4 @@
-"""Two branch points, of which one is at a row, the first and the last included, or beside which there is a third one."""
+"""Two branch points of which one is at a row, also the first or the last one, or which have a third one beside them."""
 
 from __future__ import annotations
 
