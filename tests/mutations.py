@@ -321,6 +321,60 @@ FAULTS = {
         "other.negative <= row.negative",
         "tests/diagram/test_pairs_at_rows.py",
     ),
+    "crossings-that-are-known-hide-pairs": Fault(
+        f"{CONTINUATION}determinants.py",
+        "        found -= abs(crossing.changes) * log(here / there)\n",
+        "        found -= 0.0 * log(here / there)\n",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "known-crossings-explain-no-index": Fault(
+        f"{CONTINUATION}determinants.py",
+        "    return there if a.arclength < b.arclength else -there",
+        "    return 0",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "crossings-are-not-found-again": Fault(
+        f"{CONTINUATION}touching.py",
+        "return _apart(solver, rows, new, found)",
+        "return new",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "pairs-in-steps-without-a-change-alone": Fault(
+        "rodfem/diagram/special_search.py",
+        "between = self._touching.between(self.solver, rows[0], b, crossings(found))",
+        "between = [] if changed else self._touching.between(self.solver, rows[0], b, crossings(found))",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "a-crossing-against-its-rows-is-turned-round": Fault(
+        "rodfem/diagram/special_search.py",
+        "Crossing.at(found[0]).changes * (q.low - p.low) < 0",
+        "False",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "the-nearest-eigenvalue-is-a-pole": Fault(
+        f"{CONTINUATION}determinants.py",
+        "BEYOND = 2.0",
+        "BEYOND = 1.0",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "negative-eigenvalues-are-poles": Fault(
+        f"{CONTINUATION}determinants.py",
+        "if not any(row.negative and",
+        "if True or not any(row.negative and",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "crossings-are-known-between-rows-alone": Fault(
+        f"{CONTINUATION}touching.py",
+        "LASTING = 4.0",
+        "LASTING = 1.0",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "what-was-seen-beside-a-crossing-is-seen": Fault(
+        f"{CONTINUATION}touching.py",
+        "set() if found else self._seen",
+        "self._seen",
+        "tests/diagram/test_pairs_at_rows.py",
+    ),
     "low-modes-by-the-usual-shift-alone": Fault(
         f"{CONTINUATION}determinants.py", "FAR = 0.1", "FAR = 0.0", "tests/diagram/test_functions_between_rows.py"
     ),
