@@ -25,7 +25,7 @@ CLOSER = 4
 """Interpolations after which the vertex is believed."""
 MARGIN = 1e-3
 """Part of a step, at its ends, in which no state is solved."""
-DEEP = 0.05
+DEEP = 0.1
 """A determinant below this share of those of both neighbours is looked at from nearer by."""
 NEARER = 4.0
 """Ratio of successive distances from such a row."""

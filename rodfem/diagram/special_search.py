@@ -336,9 +336,7 @@ class SpecialSearch:
             turned = str(state)
         except ConvergenceError as trouble:
             why = str(trouble)
-        known = p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low)
-        # one that takes the index the other way is one of three, at least
-        if known and not (len(found) == 1 and Crossing.at(found[0]).changes * (q.low - p.low) < 0):
+        if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
             # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
             found[0].negative_before, found[-1].negative_after = p.low, q.low
         if not why and chained(p.low, p.high, found, q.low, q.high):

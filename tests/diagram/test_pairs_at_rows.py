@@ -19,15 +19,17 @@ def test_one_of_two_branch_points_is_at_a_row(row: int, side: float, sign: float
 
 
 @pytest.mark.parametrize(
-    ("middle", "apart", "rate", "grow"),
+    "given",
     [
-        (1.24, 0.002, 0.3, 0.0),  # all three in one step
-        (2.05, -0.05, -0.3, 0.0),  # the last one is found first, by the number of its eigenvalue
-        (1.9, 0.02, -0.3, 0.0),  # the third one just after the row after the pair
+        (1.24, 0.002),  # all three in one step
+        (2.05, -0.05, -0.3),  # the last one is found first, by the number of its eigenvalue
+        (1.9, 0.02, -0.3),  # the third one just after the row after the pair
         (1.24, -0.2, 0.3, 3.0),  # an eigenvalue that becomes more negative hides the pair
-        (0.62, 0.0, 0.3, 3.0),
+        (1.9, 0.002, 0.3, 3.0),
+        (1.194, -0.124, 0.3, 3.0),  # the nearest eigenvalue is a negative one
+        (1.193937, -0.123893, 0.3, 3.0, 0.011294364, 3.63),  # the third one just before the three rows
     ],
 )
-def test_two_branch_points_beside_a_third_one(middle: float, apart: float, rate: float, grow: float) -> None:
-    found = beside_a_pair(middle, apart, rate, grow, error_bars=False)
+def test_two_branch_points_beside_a_third_one(given: tuple[float, ...]) -> None:
+    found = beside_a_pair(*given, error_bars=False)
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"

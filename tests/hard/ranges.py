@@ -111,15 +111,21 @@ def pair_at_a_row(row: int, off: float, side: float = 1.0, sign: float = 1.0, er
 
 
 def beside_a_pair(
-    middle: float, apart: float, rate: float = OTHER, grow: float = 0.0, half: float = HALF, error_bars: bool = True
+    middle: float,
+    apart: float,
+    rate: float = OTHER,
+    grow: float = 0.0,
+    half: float = HALF,
+    deep: float = 1.0,
+    error_bars: bool = True,
 ) -> Measured:
     """A pair of branch points in one plane, and one in the other plane ``apart`` from the middle of the pair.
 
     Thrust and stiffnesses grow as ``exp(grow P)``.  The thrust over Euler's of the first plane is one at
-    ``middle +- half``, and over that of the second one at ``middle + apart``, where it changes at a ``rate``.
+    ``middle +- half``, by a parabola that is ``deep`` there, and over that of the second one at ``middle + apart``, where it changes at a ``rate``.
     """
     cross = middle + apart
-    over = lambda P: 1 + (half**2 - (P - middle) ** 2) / (1 + 4 * (P - middle) ** 2)  # noqa: E731
+    over = lambda P: 1 + deep * (half**2 - (P - middle) ** 2) / (1 + 4 * deep * (P - middle) ** 2)  # noqa: E731
     grows = lambda P: ufl.exp(grow * (P - 1.2))  # noqa: E731
     rod = column(
         "two planes", (clamped(), free(lambda c: (0.0, 0.0, -EULER * grows(c.P) * over(c.P)))), RANGE,
