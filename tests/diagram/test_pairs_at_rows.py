@@ -26,7 +26,7 @@ def test_one_of_two_branch_points_is_at_a_row(row: int, side: float, sign: float
         (1.9, 0.02, -0.3),  # the third one just after the row after the pair
         (1.24, -0.2, 0.3, 3.0),  # an eigenvalue that becomes more negative hides the pair
         (1.9, 0.002, 0.3, 3.0),
-        (1.194, -0.124, 0.3, 3.0),  # the nearest eigenvalue is a negative one
+        (1.86881199, 0.1025835, -0.3, 3.0, 0.0088552963, 2.026),  # the nearest eigenvalue is a negative one
         (1.193937, -0.123893, 0.3, 3.0, 0.011294364, 3.63),  # the third one just before the three rows
     ],
 )

@@ -122,7 +122,8 @@ def beside_a_pair(
     """A pair of branch points in one plane, and one in the other plane ``apart`` from the middle of the pair.
 
     Thrust and stiffnesses grow as ``exp(grow P)``.  The thrust over Euler's of the first plane is one at
-    ``middle +- half``, by a parabola that is ``deep`` there, and over that of the second one at ``middle + apart``, where it changes at a ``rate``.
+    ``middle +- half``, by a parabola that is ``deep`` there, and over that of the second one at ``middle + apart``,
+    where it changes at a ``rate``.
     """
     cross = middle + apart
     over = lambda P: 1 + deep * (half**2 - (P - middle) ** 2) / (1 + 4 * deep * (P - middle) ** 2)  # noqa: E731
