@@ -12,13 +12,14 @@ from math import inf, isfinite
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.determinants import Crossing, Logarithm, changes, relative
-from rodfem.continuation.special_points import APART
 from rodfem.continuation.states_between import midpoint, point_between
 from rodfem.stability.round_off import resolve
 
 LOWER = 0.5
 """A vertex above this share of the lowest value known is no pair's, once the vertex is believed."""
 MULTIPLICITIES = (1, 2)
+APART = 1e-7
+"""Distance from a known crossing within which indices are its own."""
 TRIES = 10
 """Interpolations until a lowest value is given up."""
 CLOSER = 4

@@ -67,9 +67,9 @@ class Touching:
     def between(self, solver: BranchSolver, a: Point, b: Point, found: Sequence[Crossing] = ()) -> list[Point]:
         """Rows to insert, in order of arclength, where an eigenvalue passes zero twice in the step from ``a`` to ``b``.
 
-        That is beside the crossings that have been ``found`` in this step.  Of two steps the parabola may have its
-        vertex in the wrong one: where that of the last three rows was not in the step to ``a``, that step is looked at,
-        too, and its row before that step then comes first.
+        That is beside the crossings that have been ``found`` in this step; ``solver`` has the mesh.  Of two steps the
+        parabola may have its vertex in the wrong one: where that of the last three rows was not in the step to ``a``,
+        that step is looked at, too, and its row before that step then comes first.
         """
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
@@ -136,7 +136,7 @@ def _apart(solver: BranchSolver, rows: Sequence[Point], new: Sequence[Point], fo
 def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point, known: Sequence[Crossing] = ()) -> list[Point]:
     """A state beside a ``row`` with an eigenvalue near zero whose index does not follow from those of its neighbours.
 
-    It is one of two or three neighbouring ``rows``, between which some crossings are ``known``.
+    It is one of two or three neighbouring ``rows`` on the mesh of ``solver``, between which crossings may be ``known``.
     """
     for function in functions(solver, rows, known):
         search = PairSearch(solver, function, known)

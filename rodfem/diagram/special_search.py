@@ -123,7 +123,10 @@ class SpecialSearch:
         changed |= settled and self.row(a).low != self.row(b).low
         self._open = [b]
         found = self._among([*rows, b]) if changed else []
-        between = self._touching.between(self.solver, rows[0], b, crossings(found))
+        known = crossings(found)
+        # an eigenvalue that touches zero, as where a side branch ends, leaves the determinant as a pair would
+        blind = changed and not 0 < len(found) == len(known)
+        between = [] if blind else self._touching.between(self.solver, rows[0], b, known)
         if between and between[0].arclength < rows[0].arclength:  # the step before is the one that may be too long
             self._early = between[0]
             if self._touching.knows(between[0], rows[0]):  # points of it are in the branch already
@@ -138,7 +141,7 @@ class SpecialSearch:
         if between or not changed:
             found = self._among(sorted([*rows, *between, b], key=arclength))
         inserted = any(row.arclength > a.arclength for row in between)
-        self._touching.add(b, crossings(found), told=inserted or (changed and not crossings(found)))
+        self._touching.add(b, crossings(found), told=inserted or blind)
         return self._examined(found)
 
     def _check_step(self, rows: Sequence[Point]) -> None:
@@ -259,7 +262,7 @@ class SpecialSearch:
                 load = special.point.load
                 why.append(f"Near load {load:.8g} one special point was found twice, and another may be missing.")
         near = [p for p in points if p.zero > self.level]
-        if len(near) == 1 and len(points) <= 3:  # a pair may begin or end there
+        if len(near) == 1 and not found and len(points) <= 3:  # a pair may begin or end there
             other = beside_zero(self.solver, points, near[0], crossings(found))
             if other:
                 return self._among(sorted([*points, *other], key=arclength), ended)
