@@ -311,14 +311,14 @@ FAULTS = {
     ),
     "a-pair-found-by-a-zero-is-looked-for-again": Fault(
         "rodfem/diagram/special_search.py",
-        "(*between, *(s.point for s in found))",
-        "between",
+        "self._touching.add(b, crossings(found), told",
+        "self._touching.add(b, [], told",
         "tests/diagram/test_pairs_at_rows.py",
     ),
     "a-zero-is-no-negative-eigenvalue": Fault(
         f"{CONTINUATION}pair_search.py",
-        "other.negative <= row.negative + max(row.zero - other.zero, 0)",
-        "other.negative <= row.negative",
+        "index <= row.negative + max(row.zero - other.zero, 0)",
+        "index <= row.negative",
         "tests/diagram/test_pairs_at_rows.py",
     ),
     "crossings-that-are-known-hide-pairs": Fault(

@@ -364,20 +364,20 @@ def check_asked(first: Diagram, second: Diagram, out: Compared) -> None:
         if untold:
             unsure = max(unsure, UNTOLD)
         if high - low > max(STORED * max(size, 1e-6 * units.energy), OF_ENERGIES * unsure * max(size, units.energy)):
-            if untold and finer(first, second, s.point.load) < LESS * (high - low):
+            if untold and finer((first, s.point), (second, t.point)) < LESS * (high - low):
                 out.unresolved += 1
                 continue
             out.differs.append(f"at load {s.point.load:.8g}: stored energies {low:.12g} and {high:.12g}")
 
 
-def finer(first: Diagram, second: Diagram, load: float) -> float:
-    """Difference of the stored energies of two traces at a ``load``, on meshes of four times as many elements."""
+def finer(*given: tuple[Diagram, Point]) -> float:
+    """Difference of the stored energies of states of two traces, on meshes of four times as many elements."""
     energies = []
-    for diagram in (first, second):
+    for diagram, point in given:
         mesh = diagram.solvers[0].system.fields.discretization
         mesh = replace(mesh, elements=4 * mesh.elements)
-        (state,) = _asked(trace(diagram.scene, mesh, Plan(at=(load,), depth=0, error_bars=False))[0])
-        energies.append(state.point.energy)
+        again = trace(diagram.scene, mesh, Plan(at=(point.load,), depth=0, error_bars=False))
+        energies.append(min((s.point.energy for s in _asked(again[0])), key=lambda e, of=point.energy: abs(e - of)))  # type: ignore[misc]
     return abs(energies[1] - energies[0])
 
 
