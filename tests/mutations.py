@@ -374,7 +374,7 @@ FAULTS = {
     ),
     "a-search-ends-at-what-counts-as-zero": Fault(
         f"{CONTINUATION}pair_search.py",
-        "return resolve(self.solver.inertia.at(state.x)) != (row.negative, row.negative)",
+        "return resolve(self.solver.inertia.at(state.x)) != (index, index)",
         "return True",
         f"tests/diagram/test_functions_between_rows.py {CHAIN}",
     ),
