@@ -133,13 +133,13 @@ def _apart(solver: BranchSolver, rows: Sequence[Point], new: Sequence[Point], fo
     return sorted(out, key=arclength)
 
 
-def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point, known: Sequence[Crossing] = ()) -> list[Point]:
+def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point) -> list[Point]:
     """A state beside a ``row`` with an eigenvalue near zero whose index does not follow from those of its neighbours.
 
-    It is one of two or three neighbouring ``rows`` on the mesh of ``solver``, between which crossings may be ``known``.
+    It is one of two or three neighbouring ``rows`` on the mesh of ``solver``, between which no crossing is known.
     """
-    for function in functions(solver, rows, known):
-        search = PairSearch(solver, function, known)
+    for function in functions(solver, rows):
+        search = PairSearch(solver, function)
         if row is rows[0] or row is rows[-1]:
             found = search.beside(row, rows[1] if row is rows[0] else rows[-2])
         else:

@@ -263,12 +263,13 @@ class SpecialSearch:
                 why.append(f"Near load {load:.8g} one special point was found twice, and another may be missing.")
         near = [p for p in points if p.zero > self.level]
         if len(near) == 1 and not found and len(points) <= 3:  # a pair may begin or end there
-            other = beside_zero(self.solver, points, near[0], crossings(found))
+            other = beside_zero(self.solver, points, near[0])
             if other:
                 return self._among(sorted([*points, *other], key=arclength), ended)
-        if near and not found and near[0] is not points[0] and points[-1].zero <= self.level:
+        inner = [p for p in near if p is not points[0]]
+        if inner and not found and points[-1].zero <= self.level:
             why.append(
-                f"Near load {near[0].load:.8g} an eigenvalue is nearly zero, and "
+                f"Near load {inner[0].load:.8g} an eigenvalue is nearly zero, and "
                 f"the index is {rows[0].low} on either side: whether it passes zero and comes back is not known."
             )
         for trouble in why:
