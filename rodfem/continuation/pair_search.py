@@ -15,12 +15,14 @@ from rodfem.continuation.determinants import Crossing, Logarithm, changes, relat
 from rodfem.continuation.states_between import midpoint, point_between
 from rodfem.stability.round_off import resolve
 
-LOWER = 0.5
-"""A vertex above this share of the lowest value known is no pair's, once the vertex is believed."""
+LOWER, ZERO = 0.5, 1e-3
+"""A vertex above this share of the lowest value known is no pair's, once the vertex is believed: unless that value is
+below the other share of those at both ends, as where two eigenvalues pass zero together.
+"""
 MULTIPLICITIES = (1, 2)
 APART = 1e-7
 """Distance from a known crossing within which indices are its own."""
-TRIES = 10
+TRIES = 16
 """Interpolations until a lowest value is given up."""
 CLOSER = 4
 """Interpolations after which the vertex is believed."""
@@ -125,12 +127,13 @@ class PairSearch:
         ``p``, for as many coinciding eigenvalues as ``multiplicity`` says.
         """
         known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
-        least = min(value for _, value in known)
+        least = bound = min(value for _, value in known)
         margin = MARGIN * (q.arclength - p.arclength)
         for tried in range(TRIES):
             s, value = vertex(samples)
             # the first parabolas reach too far to tell how low it is
-            if not p.arclength < s < q.arclength or (value > LOWER * least and tried >= CLOSER):
+            believed = tried >= CLOSER and least > ZERO * bound
+            if not p.arclength < s < q.arclength or (value > LOWER * least and believed):
                 break
             s = min(max(s, p.arclength + margin), q.arclength - margin)
             if any(s == other for other, _ in samples):
@@ -138,7 +141,7 @@ class PairSearch:
             state = point_between(self.solver, p, q, s)
             if state is None or self._differs(state, min(p, q, key=zeros)):
                 return state
-            size = self._relative(state, p, multiplicity)
+            size = abs(self._relative(state, p, multiplicity))  # of the same index, whatever a count calls zero
             known = sorted([*known, (s, size)])
             # the next parabola goes through the lowest value and its two neighbours
             least, middle = min((value, i) for i, (_, value) in enumerate(known))
@@ -154,6 +157,8 @@ class PairSearch:
         index = row.negative + changes(self.known, row, state)
         if state.zero <= row.zero:
             return state.negative != index
+        if state.negative < index < state.negative + state.zero - row.zero:
+            return True  # of those within the tolerance of zero some are negative: they may pass it in either direction
         return resolve(self.solver.inertia.at(state.x)) != (index, index)
 
     def follows(self, row: Point, other: Point) -> bool:

@@ -16,11 +16,13 @@ from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.jumping import halvings, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.pair_search import arclength
+from rodfem.continuation.opposite_crossings import opposite_crossing
+from rodfem.continuation.pair_search import arclength, zeros
 from rodfem.continuation.special_points import COUPLED, Taut, find_special, same_point
 from rodfem.continuation.states_between import midpoint
 from rodfem.continuation.touching import Touching, beside_zero
 from rodfem.continuation.work import EnergyBalance
+from rodfem.diagram.shorter_steps import ShorterSteps, Unresolved
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import clear_of_zero, resolve
 
@@ -28,8 +30,8 @@ BENT, NARROWEST = 2, 6
 """How many times a step that bends may be halved until it is one, and how many times steps are, at most, where not."""
 HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
-SHORTER = 2
-"""How many times steps are made eight times shorter where the indices are not explained."""
+ROUNDS = 4
+"""How many times pairs are looked for beside the special points of one step that are known."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
 
@@ -38,10 +40,6 @@ def crossings(found: Sequence[SpecialPoint]) -> list[Crossing]:
     """Those of some special points at which the index changes."""
     known = [Crossing.at(special) for special in found]
     return [crossing for crossing in known if crossing.changes]
-
-
-class Unresolved(Exception):
-    """The special points found in a step do not explain the indices at its ends."""
 
 
 class SpecialSearch:
@@ -63,13 +61,13 @@ class SpecialSearch:
         self.level = self.undecided = 0
         self._open: list[Point] = []
         self._touching, self._balance = Touching(), EnergyBalance()
-        self._short = (-inf, inf, 0)
+        self._steps = ShorterSteps()
         self._lost: tuple[Row, Row] | None = None
         self._early: Point | None = None
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
-        self._short = (until, short or inf, 0)
+        self._steps = ShorterSteps(short or inf, until)
         self.level = self.undecided = first.zero
         self._touching = Touching()
 
@@ -122,27 +120,40 @@ class SpecialSearch:
         changed = len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0
         changed |= settled and self.row(a).low != self.row(b).low
         self._open = [b]
-        found = self._among([*rows, b]) if changed else []
-        known = crossings(found)
-        # an eigenvalue that touches zero, as where a side branch ends, leaves the determinant as a pair would
-        blind = changed and not 0 < len(found) == len(known)
-        between = [] if blind else self._touching.between(self.solver, rows[0], b, known)
-        if between and between[0].arclength < rows[0].arclength:  # the step before is the one that may be too long
-            self._early = between[0]
-            if self._touching.knows(between[0], rows[0]):  # points of it are in the branch already
-                self._shorten(between[0], rows[0])
-                self.observer.warn(
-                    f"Between loads {between[0].load:.8g} and {a.load:.8g} there are more special points than were "
-                    f"found; {SMALLER_STEPS}."
-                )
-                between = []
-            else:
-                rows = []
-        if between or not changed:
-            found = self._among(sorted([*rows, *between, b], key=arclength))
-        inserted = any(row.arclength > a.arclength for row in between)
-        self._touching.add(b, crossings(found), told=inserted or blind)
-        return self._examined(found)
+        return self._examined(self._in_step([*rows, b], changed))
+
+    def _in_step(self, rows: list[Point], changed: bool) -> list[SpecialPoint]:
+        """Special points between the first and the last of some ``rows``, whose index has ``changed`` or not.
+
+        Those that the index shows come first, and then pairs beside them, which it does not.
+        """
+        a, b, inserted, told = rows[0], rows[-1], False, False
+        found = self._among(rows) if changed else []
+        for _ in range(ROUNDS):
+            known = crossings(found)
+            # an eigenvalue that touches zero, as where a side branch ends, leaves the determinant as a pair would
+            blind = (changed or inserted) and not 0 < len(found) == len(known)
+            new = [] if blind else self._touching.between(self.solver, a, b, known)
+            if new and new[0].arclength < a.arclength:  # the step before is the one that may be too long
+                self._early = new[0]
+                if self._touching.knows(new[0], a):  # points of it are in the branch already
+                    self._steps.ask(new[0], a)
+                    self.observer.warn(
+                        f"Between loads {new[0].load:.8g} and {a.load:.8g} there are more special points than were "
+                        f"found; {SMALLER_STEPS}."
+                    )
+                    new = []
+            if not new:
+                break
+            if known:  # so many in one step show better in shorter ones
+                self._steps.ask(min(a, new[0], key=arclength), b)
+            told |= any(row.arclength > a.arclength for row in new)
+            rows = sorted({id(row): row for row in (*rows, *new)}.values(), key=arclength)
+            found, inserted = self._among(rows), True
+        if not changed and not inserted:
+            found = self._among(rows)
+        self._touching.add(b, crossings(found), told=told or blind)
+        return found
 
     def _check_step(self, rows: Sequence[Point]) -> None:
         """Raise :class:`Unresolved` if the step to the last of the ``rows`` has jumped to another branch.
@@ -156,14 +167,14 @@ class SpecialSearch:
         divided = halvings(self.solver, a, b) if suspected(self.solver, rows) else 0
         if divided is not None:
             if divided > BENT:  # in a bend so narrow there may be pairs of special points
-                self._shorten(a, b, 2 ** min(divided, NARROWEST))
+                self._steps.ask(a, b, 2 ** min(divided, NARROWEST))
                 self.observer.warn(
                     f"Between loads {a.load:.8g} and {b.load:.8g} the branch bends within a small part of a step: "
                     f"special points may be missing there; {SMALLER_STEPS}."
                 )
             self._check_work(rows)
             return
-        self._shorten(a, b)
+        self._steps.ask(a, b)
         self.observer.warn(
             f"Between loads {a.load:.8g} and {b.load:.8g} the branch may have been left for another one beside it: no "
             f"equilibria were found that join them; {SMALLER_STEPS}."
@@ -177,7 +188,7 @@ class SpecialSearch:
         if self._balance(self.solver, rows):
             return
         a, b = rows[-2:]
-        self._shorten(a, b)
+        self._steps.ask(a, b)
         raise ConvergenceError(
             f"Between loads {a.load:.8g} and {b.load:.8g} the potential energy changes by "
             f"{b.potential - a.potential:.3g}, which is not the work of the load: these are no states of one branch, "
@@ -209,9 +220,7 @@ class SpecialSearch:
 
     def reach(self, point: Point) -> float:
         """Largest step from a point: near gaps, and where the indices are not explained, short ones."""
-        until, largest, _ = self._short
-        near = self.gaps.reach(self.meshes.solvers[point.mesh], point)
-        return min(near, largest) if point.arclength < until else near
+        return min(self.gaps.reach(self.meshes.solvers[point.mesh], point), self._steps.reach(point))
 
     def row(self, point: Point) -> Row:
         """Index of a point, small eigenvalues by their Rayleigh quotients."""
@@ -256,7 +265,7 @@ class SpecialSearch:
             found += specials
             if not ended and not chained(p.low, p.high, specials, q.low, q.high):
                 self._jumped(p, q)
-                self._shorten(p.point, q.point)
+                self._steps.ask(points[0], points[-1])
         for i, special in enumerate(found):
             if same_point(self.solver, special, found[:i]) is not None:
                 load = special.point.load
@@ -268,6 +277,8 @@ class SpecialSearch:
                 return self._among(sorted([*points, *other], key=arclength), ended)
         inner = [p for p in near if p is not points[0]]
         if inner and not found and points[-1].zero <= self.level:
+            found = self._opposite(points, inner, rows[0].low)
+        if inner and not found and points[-1].zero <= self.level:
             why.append(
                 f"Near load {inner[0].load:.8g} an eigenvalue is nearly zero, and "
                 f"the index is {rows[0].low} on either side: whether it passes zero and comes back is not known."
@@ -275,6 +286,17 @@ class SpecialSearch:
         for trouble in why:
             self.observer.warn(trouble)
         return found
+
+    def _opposite(self, points: Sequence[Point], near: Sequence[Point], index: int) -> list[SpecialPoint]:
+        """Branch point beside one of the ``near`` ones among points, that leaves the ``index`` as it is; or none."""
+        state = max(near, key=zeros)
+        clear = [p for p in points if p.zero <= self.level]
+        before = [p for p in clear if p.arclength < state.arclength]
+        after = [p for p in clear if p.arclength > state.arclength]
+        if not before or not after:
+            return []
+        special = opposite_crossing(self.solver, [before[-1], state, after[0]], index, self._persistent(state.x))
+        return [special] if special is not None else []
 
     def _jumped(self, p: Row, q: Row) -> None:
         """Raise :class:`Gap` if the step from ``p`` to ``q``, which is not explained, has jumped one.
@@ -297,15 +319,6 @@ class SpecialSearch:
                 if self.gaps.open(gap, self.solver):
                     raise gap
                 return
-
-    def _shorten(self, a: Point, b: Point, parts: int = 8) -> None:
-        """Shorten steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
-        until, _, tries = self._short
-        tries = tries + 1 if a.arclength < until else 1
-        if tries <= SHORTER:
-            length = b.arclength - a.arclength
-            self._short = b.arclength + length, length / parts, tries
-            raise Unresolved
 
     def _examined(self, specials: list[SpecialPoint], ended: bool = False) -> list[SpecialPoint]:
         """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one.

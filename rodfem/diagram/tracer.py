@@ -37,7 +37,8 @@ from rodfem.diagram.journal import Journal
 from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.special_search import SpecialSearch, Unresolved
+from rodfem.diagram.shorter_steps import Unresolved
+from rodfem.diagram.special_search import SpecialSearch
 from rodfem.diagram.step import Step
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without

@@ -10,7 +10,8 @@ import pytest
 from classics import column, push
 
 from rodfem import Discretization, Plan, clamped, free, trace
-from rodfem.diagram.special_search import SpecialSearch, Unresolved
+from rodfem.diagram.shorter_steps import Unresolved
+from rodfem.diagram.special_search import SpecialSearch
 
 OFTEN, DEEP = 400, 300
 
