@@ -22,8 +22,8 @@ below the other share of those at both ends, as where two eigenvalues pass zero 
 MULTIPLICITIES = (1, 2)
 APART = 1e-7
 """Distance from a known crossing within which indices are its own."""
-TRIES = 16
-"""Interpolations until a lowest value is given up."""
+TRIES, MISSES = 16, 2
+"""Interpolations until a lowest value is given up, and how many may lead to no lower one where a zero is sought."""
 CLOSER = 4
 """Interpolations after which the vertex is believed."""
 MARGIN = 1e-3
@@ -148,6 +148,27 @@ class PairSearch:
             if not 0 < middle < len(known) - 1:
                 break
             samples = known[middle - 1 : middle + 2]
+        return self._together(known, p, q) if multiplicity == 2 else None
+
+    def _together(self, known: list[Sample], p: Point, q: Point) -> Point | None:
+        """State between two rows at which two eigenvalues pass zero, if the ``known`` samples lead to one.
+
+        They are those of the square root, in order: a line but for its sign, which changes at that state.
+        """
+        missed = 0
+        while missed < MISSES:
+            least, i = min((value, i) for i, (_, value) in enumerate(known))
+            if not 0 < i < len(known) - 1:
+                break
+            s = root_of_line(known[i - 1 : i + 2])
+            if any(s == other for other, _ in known):
+                break
+            state = point_between(self.solver, p, q, s)
+            if state is None or self._differs(state, min(p, q, key=zeros)):
+                return state
+            size = abs(self._relative(state, p, 2))
+            missed += not size < LOWER * least
+            known = sorted([*known, (s, size)])
         return None
 
     def _differs(self, state: Point, row: Point) -> bool:
@@ -194,3 +215,10 @@ def vertex(samples: Sequence[Sample]) -> Sample:
         return inf, 0.0
     s = (a + b) / 2 - first / (2 * curvature)
     return s, g + (s - b) * (first + curvature * (s - a))
+
+
+def root_of_line(samples: Sequence[Sample]) -> float:
+    """Zero of a function of which three samples are the sizes: between the two that make it most nearly a line."""
+    (a, f), (b, g), (c, h) = samples
+    bends = abs((-h - g) / (c - b) - (g - f) / (b - a)), abs((-h + g) / (c - b) - (-g - f) / (b - a))
+    return (b * h + c * g) / (g + h) if bends[0] < bends[1] else (a * g + b * f) / (f + g)

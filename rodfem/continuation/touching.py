@@ -23,8 +23,7 @@ from collections.abc import Sequence
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.determinants import Crossing, functions
-from rodfem.continuation.pair_search import LEAST, PairSearch, arclength
-from rodfem.continuation.states_between import point_between
+from rodfem.continuation.pair_search import PairSearch
 
 LASTING = 4.0
 """Steps for which a crossing is known: just before three rows its eigenvalue grows by a factor from row to row."""
@@ -82,7 +81,7 @@ class Touching:
                 self._seen.add(number)
             new = self._between(search, rows, looked or number in before)
             if new:
-                return _apart(solver, rows, new, found)
+                return new
         return []
 
     def _between(self, search: PairSearch, rows: list[Point], seen: bool) -> list[Point]:
@@ -117,20 +116,6 @@ class Touching:
             if found:
                 return [a, *found, b]
         return []
-
-
-def _apart(solver: BranchSolver, rows: Sequence[Point], new: Sequence[Point], found: Sequence[Crossing]) -> list[Point]:
-    """Some ``new`` states in order, and two more beside each of the crossings that have been ``found`` in their step.
-
-    These are found again, then, in pieces of their own: of a piece in which two of them make a pair no index tells.
-    """
-    _, a, b = rows
-    out, size = list(new), LEAST * (b.arclength - a.arclength)
-    for crossing in found if any(state.arclength > a.arclength for state in new) else []:
-        for s in (crossing.arclength - size, crossing.arclength + size):
-            state = point_between(solver, a, b, s) if a.arclength < s < b.arclength else None
-            out += [state] if state is not None else []
-    return sorted(out, key=arclength)
 
 
 def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point) -> list[Point]:

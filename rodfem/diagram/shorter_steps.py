@@ -23,11 +23,6 @@ class ShorterSteps:
         """Steps of at most ``largest`` up to the arclength ``until``."""
         self._since, self._until, self._largest, self._tries = -inf, until, largest, 0
 
-    @property
-    def tried(self) -> int:
-        """How many times steps have been made shorter about the last piece."""
-        return self._tries
-
     def ask(self, a: Point, b: Point, parts: int = PARTS) -> None:
         """Make steps shorter from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are already.
 

@@ -13,6 +13,7 @@ from hard import (
     loci,
     loci_codim2,
     paths,
+    planes,
     published,
     ranges,
     snapping,
@@ -113,11 +114,11 @@ BIFURCATIONS = (
     ),
     Case(
         "two eigenvalues that cross in opposite directions", "the index is 1 on either side, 0 between", SAID,
-        "d - P and d + P", "distance in load", bifurcations.opposite, (1e-4, 1e-6, 1e-8), POWERS[:8],
+        "d - P and d + P", "distance in load", bifurcations.opposite, (1e-4, 1e-6, 1e-8), (*POWERS, 0.0),
     ),
     Case(
         "the same, the index 2 between", "neither end of the step shows them", SAID,
-        "-d - P and P - d", "distance in load", bifurcations.opposite_other, (1e-4, 1e-8), POWERS[:8],
+        "-d - P and P - d", "distance in load", bifurcations.opposite_other, (1e-4, 1e-8), (*POWERS, 0.0),
     ),
     Case(
         "a transcritical point", "the load changes along the null vector", EXACT,
@@ -180,6 +181,11 @@ BIFURCATIONS = (
         "neither in it nor in a determinant that passes zero", SAID, "Euler, pi^2/4, times a parabola of the load",
         "middle of the pair, distance of the third", lambda given: ranges.beside_a_pair(*given), ((1.24, 0.002),),
         tuple((middle, apart) for middle in (0.62, 1.24, 2.05) for apart in (-0.2, -0.05, 0.0, 0.002, 0.02, 0.1)),
+    ),
+    Case(
+        "two to four branch points in two planes, at random", "several in a step, in either direction, at a row, or "
+        "two at one load", SAID, "Euler, pi^2/4, times functions with given zeros", "number of a random draw",
+        planes.crossings, (3,), tuple(range(60)),
     ),
 )  # fmt: skip
 ABOVE = (1e-2, 1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-13, -1e-9, -1e-4)

@@ -1,0 +1,69 @@
+"""Eigenvalues that pass zero together, in the same direction or in opposite ones, alone and beside others."""
+
+from __future__ import annotations
+
+import pytest
+from hard.bifurcations import opposite, opposite_other
+from hard.planes import MESH, Draw, Plane, drawn
+
+from rodfem import Plan, trace
+from rodfem.continuation.kinds import BRANCH_POINT
+
+pytestmark = pytest.mark.alone
+
+
+def pair(first: Plane, second: Plane, grow: float = 0.0) -> Draw:
+    return Draw((first, second), grow)
+
+
+TOGETHER = {
+    "between rows": pair(Plane((0.5532544,), (1.65,), 0.139), Plane((0.5532544,), (0.147,), -0.336), 1.0),
+    "at a row": pair(Plane((1.1766,), (0.6,), 0.3), Plane((1.1766,), (0.4,), -0.1)),
+    "three rows that lead to no zero": pair(
+        Plane((1.1258044772763802,), (0.8015230860565039,), -0.31104558436229185),
+        Plane(
+            (1.1258044772763802, 1.1859791655482117), (0.14865154979544007, 0.15713402116987757), -0.3347341710682127
+        ),
+        1.0,
+    ),
+    "beside a third one, found in the next step": pair(
+        Plane(
+            (0.9587714508160521, 0.8551573462753422, 1.0030679581667403),
+            (1.3117374737572292, 0.1037192627888499, 0.1121925474786899),
+            -0.06084707354511355,
+        ),
+        Plane((0.9587714508160521,), (0.34869963697471124,), -0.2480026448071125),
+        -2.0,
+    ),
+}
+"""Draws in which both planes have a zero in common, the first one of each."""
+
+
+@pytest.mark.parametrize("name", TOGETHER)
+def test_opposite_crossings_at_one_load(name: str) -> None:
+    """A branch point at which two eigenvalues vanish and the index stays, located as others are."""
+    found = TOGETHER[name].measured()
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
+
+
+def test_both_modes_leave_a_branch_point_of_opposite_crossings() -> None:
+    """The null vectors bend the rod in one plane each, and branches of both planes leave there."""
+    draw = TOGETHER["between rows"]
+    diagram = trace(draw.scene(), MESH, Plan(depth=1, error_bars=False))
+    (special,) = [s for s in diagram[0].special if s.kind == BRANCH_POINT]
+    assert special.multiplicity == 2 and special.negative_before == special.negative_after == 1
+    assert special.point.load == pytest.approx(draw.planes[0].zeros[0], abs=1e-9)
+    assert len([branch for branch in diagram if branch.parent]) == 2
+
+
+@pytest.mark.parametrize("apart", [1e-12, 0.0])
+def test_opposite_crossings_of_a_rod_that_stretches(apart: float) -> None:
+    """``d - P`` and ``d + P``, whichever passes zero first."""
+    assert opposite(apart).right and opposite_other(apart).right
+
+
+@pytest.mark.parametrize("number", [3, 7, 18])
+def test_crossings_in_two_planes(number: int) -> None:
+    """Two to four of them, drawn at random: all are found, and the index of each row is that of the closed form."""
+    found = drawn(number).measured()
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
