@@ -35,8 +35,13 @@ TOGETHER = {
         Plane((0.9587714508160521,), (0.34869963697471124,), -0.2480026448071125),
         -2.0,
     ),
+    "nearly, 7e-5 apart": pair(
+        Plane((2.1335149277434473,), (0.5447525477934998,), 0.06958719077859915),
+        Plane((2.1334486667406964,), (0.5755870839754178,), -0.061324083185334576),
+        -2.0,
+    ),
 }
-"""Draws in which both planes have a zero in common, the first one of each."""
+"""Draws in which the first zero of either plane is one, or nearly so."""
 
 
 @pytest.mark.parametrize("name", TOGETHER)
