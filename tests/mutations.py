@@ -357,12 +357,6 @@ FAULTS = {
         "modes = across(solver.system, solver.inertia.modes_near_zero(aside.x, number)[:1], still)",
         "tests/diagram/test_opposite_crossings.py",
     ),
-    "a-search-that-is-deep-is-given-up": Fault(
-        f"{CONTINUATION}pair_search.py",
-        "LOWER, ZERO = 0.5, 1e-3",
-        "LOWER, ZERO = 0.5, 0.0",
-        "tests/diagram/test_opposite_crossings.py",
-    ),
     "no-zero-beyond-three-rows": Fault(
         f"{CONTINUATION}pair_search.py",
         "return self._together(known, p, q) if multiplicity == 2 else None",

@@ -88,8 +88,8 @@ class Gaps:
 def sharpen(solver: BranchSolver, special: SpecialPoint, found: Unfolded) -> None:
     """Give a branch point the state and the load that solve its equations, where they are those that were located.
 
-    Of several eigenvalues that vanish near each other, and not at one load, the equations have no solution of their own:
-    what they lead to is not nearer to any of them.
+    Of several eigenvalues that vanish near each other, and not at one load, the equations have no solution of their
+    own: what they lead to is not nearer to any of them.
     """
     within = 10 * special.located_to if special.multiplicity == 1 else 0.1 * special.located_to
     if abs(found.load - special.point.load) > within:

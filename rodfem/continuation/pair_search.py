@@ -15,14 +15,12 @@ from rodfem.continuation.determinants import Crossing, Logarithm, changes, relat
 from rodfem.continuation.states_between import midpoint, point_between
 from rodfem.stability.round_off import resolve
 
-LOWER, ZERO = 0.5, 1e-3
-"""A vertex above this share of the lowest value known is no pair's, once the vertex is believed: unless that value is
-below the other share of those at both ends, as where two eigenvalues pass zero together.
-"""
+LOWER = 0.5
+"""A vertex above this share of the lowest value known is no pair's, once the vertex is believed."""
 MULTIPLICITIES = (1, 2)
 APART = 1e-7
 """Distance from a known crossing within which indices are its own."""
-TRIES, MISSES = 16, 2
+TRIES, MISSES = 10, 2
 """Interpolations until a lowest value is given up, and how many may lead to no lower one where a zero is sought."""
 CLOSER = 4
 """Interpolations after which the vertex is believed."""
@@ -127,13 +125,12 @@ class PairSearch:
         ``p``, for as many coinciding eigenvalues as ``multiplicity`` says.
         """
         known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
-        least = bound = min(value for _, value in known)
+        least = min(value for _, value in known)
         margin = MARGIN * (q.arclength - p.arclength)
         for tried in range(TRIES):
             s, value = vertex(samples)
             # the first parabolas reach too far to tell how low it is
-            believed = tried >= CLOSER and least > ZERO * bound
-            if not p.arclength < s < q.arclength or (value > LOWER * least and believed):
+            if not p.arclength < s < q.arclength or (value > LOWER * least and tried >= CLOSER):
                 break
             s = min(max(s, p.arclength + margin), q.arclength - margin)
             if any(s == other for other, _ in samples):
