@@ -357,12 +357,6 @@ FAULTS = {
         "beside = False",
         "tests/diagram/test_opposite_crossings.py",
     ),
-    "steps-stay-long-beside-two-crossings": Fault(
-        "rodfem/diagram/special_search.py",
-        "if found and any(ALIKE * step < q - p < step for p, q in pairwise(places)):",
-        "if False:",
-        "tests/diagram/test_opposite_crossings.py",
-    ),
     "opposite-crossings-are-one": Fault(
         f"{CONTINUATION}opposite_crossings.py",
         "modes = across(solver.system, solver.inertia.modes_near_zero(aside.x, number), still)",
