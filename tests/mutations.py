@@ -351,12 +351,6 @@ FAULTS = {
         "else 10 * special.located_to",
         "tests/diagram/test_opposite_crossings.py",
     ),
-    "an-index-may-change-by-more-than-vanishes": Fault(
-        "rodfem/diagram/special_search.py",
-        "beside = any(abs(s.negative_after - s.negative_before) > s.multiplicity for s in found)",
-        "beside = False",
-        "tests/diagram/test_opposite_crossings.py",
-    ),
     "opposite-crossings-are-one": Fault(
         f"{CONTINUATION}opposite_crossings.py",
         "modes = across(solver.system, solver.inertia.modes_near_zero(aside.x, number), still)",
