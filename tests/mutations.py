@@ -347,8 +347,8 @@ FAULTS = {
     ),
     "several-branch-points-have-one-in-common": Fault(
         "rodfem/adaptivity/gaps.py",
-        "else 0.1 * special.located_to",
-        "else 10 * special.located_to",
+        "if together else 0.1 * special.located_to",
+        "if True else 0.1 * special.located_to",
         "tests/diagram/test_opposite_crossings.py",
     ),
     "opposite-crossings-are-one": Fault(

@@ -89,9 +89,11 @@ def sharpen(solver: BranchSolver, special: SpecialPoint, found: Unfolded) -> Non
     """Give a branch point the state and the load that solve its equations, where they are those that were located.
 
     Of several eigenvalues that vanish near each other, and not at one load, the equations have no solution of their
-    own: what they lead to is not nearer to any of them.
+    own: what they lead to is not nearer to any of them.  They do not all pass zero there in one direction.
     """
-    within = 10 * special.located_to if special.multiplicity == 1 else 0.1 * special.located_to
+    change = abs(special.negative_after - special.negative_before)
+    together = special.multiplicity in (1, change)
+    within = 10 * special.located_to if together else 0.1 * special.located_to
     if abs(found.load - special.point.load) > within:
         return
     special.point = replace(
