@@ -231,9 +231,23 @@ class Sweep:
         return point
 
     def _point(self, x: PETSc.Vec) -> Point:
-        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check its invariants."""
+        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check its invariants.
+
+        Beside a state whose matrix is singular Newton's method ends early by its own measure: where the invariants are
+        violated the equations are solved once more.
+        """
+        point = self._evaluated(x)
+        try:
+            self.invariants(point)
+        except ConvergenceError:
+            point = self._evaluated(at_load(self.solver, x, point.load))
+            self.invariants(point)
+        return point
+
+    def _evaluated(self, x: PETSc.Vec) -> Point:
+        """Evaluate the records of a state ``x`` that do not depend on its frequencies."""
         solver, load = self.solver, self.solver.system.scalar(x)
-        point = Point(
+        return Point(
             x=x,
             tangent=None,
             arclength=abs(load - self.span[0]),
@@ -247,8 +261,6 @@ class Sweep:
             drift=0.0,
             error=0.0,
         )
-        self.invariants(point)
-        return point
 
     def _record(self, point: Point, found: Frequencies, *, on_the_way: bool) -> None:
         """Record the frequencies ``found`` at a point; a special point is not ``on_the_way`` of the curves."""
