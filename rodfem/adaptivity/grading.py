@@ -147,6 +147,10 @@ def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
     amplitude, decay = np.full(elements, floor), np.full(elements, MOST_DECAY)
     for e, row in enumerate(envelope):
         last = int(np.count_nonzero(row > floor))
+        # every other coefficient of a function that is even or odd on its element is nearly zero: a last one that falls
+        # by more than the two before it says nothing
+        if last >= 4 and row[last - 1] * row[last - 4] < row[last - 2] ** 2:
+            last -= 1
         first = max(min(degree // 2 - 1, last - 3), 0)
         if last - first < 2:
             continue

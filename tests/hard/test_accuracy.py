@@ -16,14 +16,9 @@ def test_an_accuracy_is_kept(name: str, accuracy: float) -> None:
 
 
 def test_an_accuracy_of_a_ring_is_kept() -> None:
-    """Where a state breaks a ring's motion along itself by less than 1e-3 that is one zero less: meshes refine on.
-
-    The last of four double points is parted by the round-off of some processors (without AVX-512) by 7e-6, and no mesh
-    is found that helps: then that is said of it, and of it alone.
-    """
+    """Where a state breaks a ring's motion along itself by less than 1e-3 that is one zero less: meshes refine on."""
     found = at(1e-6, "dead ring")
-    assert not found.wrong and len(found.ratios) == 4 and max(found.ratios[:3]) <= 1.0, f"{found.wrong} {found.ratios}"
-    assert found.right or any("not reached near load 25" in sentence for sentence in found.said), found.said
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
 @pytest.mark.parametrize("name", ["dead ring", "cord of 2 turns"])
