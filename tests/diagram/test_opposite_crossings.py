@@ -44,6 +44,17 @@ TOGETHER = {
 """Draws in which the first zero of either plane is one, or nearly so."""
 
 
+FIVE = pair(
+    Plane((1.2644989344916502, 1.6408298970092186), (0.5666053454301889, 1.7219611650241802), -0.31928321008903465),
+    Plane(
+        (1.2549883952918601, 1.2737121623047323, 1.262022465126938),
+        (0.12412799304162456, 0.2629079403592447, 1.4228534276537783),
+        0.47857146260768074,
+    ),
+)
+"""Four zeros within 0.02, and one apart: a count between the first and the last of them is not that beside either."""
+
+
 @pytest.mark.parametrize("name", TOGETHER)
 def test_opposite_crossings_at_one_load(name: str) -> None:
     """A branch point at which two eigenvalues vanish and the index stays, located as others are."""
@@ -65,6 +76,11 @@ def test_both_modes_leave_a_branch_point_of_opposite_crossings() -> None:
 def test_opposite_crossings_of_a_rod_that_stretches(apart: float) -> None:
     """``d - P`` and ``d + P``, whichever passes zero first."""
     assert opposite(apart).right and opposite_other(apart).right
+
+
+def test_an_index_that_changes_by_more_than_vanishes_shows_others() -> None:
+    found = FIVE.measured()
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
 @pytest.mark.parametrize("number", [3, 7, 18])
