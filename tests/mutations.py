@@ -356,10 +356,17 @@ FAULTS = {
         "if last >= 4 and row[last - 1] * row[last - 4] < row[last - 2] ** 2:",
         "if False:",
         "tests/adaptivity/test_grading.py",
+    ),
     "an-index-may-change-by-more-than-vanishes": Fault(
         "rodfem/diagram/special_search.py",
-        "beside = any(abs(s.negative_after - s.negative_before) > s.multiplicity for s in found)",
-        "beside = False",
+        "if not why and not beside and chained",
+        "if not why and chained",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "steps-stay-long-beside-two-crossings": Fault(
+        "rodfem/diagram/special_search.py",
+        "if found and any(ALIKE * step < q - p < step for p, q in pairwise(places)):",
+        "if False:",
         "tests/diagram/test_opposite_crossings.py",
     ),
     "opposite-crossings-are-one": Fault(

@@ -32,13 +32,13 @@ LASTING = 4.0
 class Touching:
     """The last rows of a branch, and the test for pairs of crossings in the steps between them, by determinants.
 
-    Crossings that are known do not hide pairs beside them.
+    Crossings that are ``known`` do not hide pairs beside them.
     """
 
     def __init__(self) -> None:
         """No row yet."""
         self._rows: list[Point] = []
-        self._known: list[Crossing] = []
+        self.known: list[Crossing] = []
         self._begun, self._told, self._looked = True, False, False
         self._seen: set[int] = set()
 
@@ -47,7 +47,7 @@ class Touching:
         same = [row for row in rows[-2:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
         self._rows, self._begun, self._told = same, len(rows) < 2, False
         self._seen, self._looked = set(), len(rows) > 1
-        self._known = [crossing for crossing in self._known if crossing.arclength <= rows[-1].arclength]
+        self.known = [crossing for crossing in self.known if crossing.arclength <= rows[-1].arclength]
 
     def add(self, row: Point, known: Sequence[Crossing], *, told: bool) -> None:
         """Go on to the next row; ``known`` are crossings that have been found since.
@@ -57,11 +57,15 @@ class Touching:
         self._begun = self._begun and len(self._rows) < 2
         self._rows, self._told = [*self._rows[-1:], row], told
         since = row.arclength - LASTING * (row.arclength - self._rows[0].arclength)
-        self._known = [crossing for crossing in self._known if crossing.arclength > since] + [*known]
+        self.known = [crossing for crossing in self.known if crossing.arclength > since] + [*known]
+
+    def before(self, row: Point) -> Point:
+        """Return the row before the last one, ``row``; that one itself if there is none."""
+        return self._rows[-2] if len(self._rows) > 1 and self._rows[-1] is row else row
 
     def knows(self, a: Point, b: Point) -> bool:
         """Whether crossings are known between two rows."""
-        return any(a.arclength < crossing.arclength < b.arclength for crossing in self._known)
+        return any(a.arclength < crossing.arclength < b.arclength for crossing in self.known)
 
     def between(self, solver: BranchSolver, a: Point, b: Point, found: Sequence[Crossing] = ()) -> list[Point]:
         """Rows to insert, in order of arclength, where an eigenvalue passes zero twice in the step from ``a`` to ``b``.
@@ -72,7 +76,7 @@ class Touching:
         """
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
-        rows, known = [self._rows[-2], a, b], [*self._known, *found]
+        rows, known = [self._rows[-2], a, b], [*self.known, *found]
         # by numbers of the test functions: whether one had its vertex in the step before, with the crossings known now
         before, self._seen, looked, self._looked = set() if found else self._seen, set(), self._looked, False
         for number, function in enumerate(functions(solver, rows, known)):
@@ -108,8 +112,8 @@ class Touching:
         if len(self._rows) < 2 or self._told or self.knows(*self._rows):
             return []
         a, b = self._rows
-        for function in functions(solver, self._rows, self._known):
-            search = PairSearch(solver, function, self._known)
+        for function in functions(solver, self._rows, self.known):
+            search = PairSearch(solver, function, self.known)
             found = search.beside(b, a)
             if not found and self._begun:
                 found = search.beside(a, b) or search.halved(a, b)

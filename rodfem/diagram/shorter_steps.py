@@ -23,11 +23,13 @@ class ShorterSteps:
         """Steps of at most ``largest`` up to the arclength ``until``."""
         self._since, self._until, self._largest, self._tries = -inf, until, largest, 0
 
-    def ask(self, a: Point, b: Point, parts: int = PARTS) -> None:
+    def ask(self, a: Point, b: Point, parts: int = PARTS, *, once: bool = False) -> None:
         """Make steps shorter from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are already.
 
-        The piece is divided into so many ``parts``.
+        The piece is divided into so many ``parts``; ``once``: steps that are short already do.
         """
+        if once and self._since <= a.arclength < self._until:
+            return
         self._tries = self._tries + 1 if a.arclength < self._until else 1
         if self._tries <= SHORTER:
             length = b.arclength - a.arclength

@@ -22,7 +22,7 @@ from rodfem.continuation.special_points import COUPLED, Taut, find_special, same
 from rodfem.continuation.states_between import midpoint
 from rodfem.continuation.touching import Touching, beside_zero
 from rodfem.continuation.work import EnergyBalance
-from rodfem.diagram.shorter_steps import ShorterSteps, Unresolved
+from rodfem.diagram.shorter_steps import PARTS, ShorterSteps, Unresolved
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import clear_of_zero, resolve
 
@@ -32,6 +32,8 @@ HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
 ROUNDS = 4
 """How many times pairs are looked for beside the special points of one step that are known."""
+ALIKE = 1e-3
+"""Distance of two special points, relative to their step, below which a mesh may have parted one."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
 
@@ -152,8 +154,24 @@ class SpecialSearch:
             found, inserted = self._among(rows), True
         if not changed and not inserted:
             found = self._among(rows)
+        self._shorten_about(a, b, found)
         self._touching.add(b, crossings(found), told=told or blind)
         return found
+
+    def _shorten_about(self, a: Point, b: Point, found: Sequence[SpecialPoint]) -> None:
+        """Raise :class:`Unresolved` where two special points are nearer to each other than the rows ``a`` and ``b``.
+
+        Those ``found`` last are between these.  Others beside the two would leave no trace in rows so far apart: from
+        the row before ``a`` steps are shortened, once.
+        """
+        first = self._touching.before(a)
+        near = [crossing.arclength for crossing in self._touching.known if crossing.arclength > first.arclength]
+        places = sorted([*near, *(special.point.arclength for special in found)])
+        step = b.arclength - a.arclength
+        if found and any(ALIKE * step < q - p < step for p, q in pairwise(places)):
+            early, self._early = self._early, first
+            self._steps.ask(first, b, 2 * PARTS, once=True)
+            self._early = early
 
     def _check_step(self, rows: Sequence[Point]) -> None:
         """Raise :class:`Unresolved` if the step to the last of the ``rows`` has jumped to another branch.
@@ -356,8 +374,8 @@ class SpecialSearch:
         if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
             # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
             found[0].negative_before, found[-1].negative_after = p.low, q.low
-        # more eigenvalues than vanish at one of them have passed zero: there are others beside it
-        beside = any(abs(s.negative_after - s.negative_before) > s.multiplicity for s in found)
+        # counts half-way between two of them: more eigenvalues than vanish at one have passed zero, others are beside it
+        beside = len(found) > 1 and any(abs(s.negative_after - s.negative_before) > s.multiplicity for s in found)
         if not why and not beside and chained(p.low, p.high, found, q.low, q.high):
             troubles += [turned] if turned else []
             return found

@@ -44,15 +44,28 @@ TOGETHER = {
 """Draws in which the first zero of either plane is one, or nearly so."""
 
 
-FIVE = pair(
-    Plane((1.2644989344916502, 1.6408298970092186), (0.5666053454301889, 1.7219611650241802), -0.31928321008903465),
-    Plane(
-        (1.2549883952918601, 1.2737121623047323, 1.262022465126938),
-        (0.12412799304162456, 0.2629079403592447, 1.4228534276537783),
-        0.47857146260768074,
+SEVERAL = {
+    "an index that changes by more than vanishes": pair(
+        Plane((1.2644989344916502, 1.6408298970092186), (0.5666053454301889, 1.7219611650241802), -0.31928321008903465),
+        Plane(
+            (1.2549883952918601, 1.2737121623047323, 1.262022465126938),
+            (0.12412799304162456, 0.2629079403592447, 1.4228534276537783),
+            0.47857146260768074,
+        ),
     ),
-)
-"""Four zeros within 0.02, and one apart: a count between the first and the last of them is not that beside either."""
+    "two at one load beside one in each of two steps": pair(
+        Plane(
+            (0.6926350287483546, 0.7797876173375289), (0.40079451767680613, 1.8759828104452128), -0.16706830915916765
+        ),
+        Plane(
+            (0.6926350287483546, 0.6833693626493129, 1.0251674485027018),
+            (0.16330374677523235, 0.22023860400231957, 0.15779269438343024),
+            0.06911017183491122,
+        ),
+        -2.0,
+    ),
+}
+"""Draws with more zeros in two neighbouring steps than a parabola through three rows shows."""
 
 
 @pytest.mark.parametrize("name", TOGETHER)
@@ -78,8 +91,9 @@ def test_opposite_crossings_of_a_rod_that_stretches(apart: float) -> None:
     assert opposite(apart).right and opposite_other(apart).right
 
 
-def test_an_index_that_changes_by_more_than_vanishes_shows_others() -> None:
-    found = FIVE.measured()
+@pytest.mark.parametrize("name", SEVERAL)
+def test_several_crossings_beside_each_other(name: str) -> None:
+    found = SEVERAL[name].measured()
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
