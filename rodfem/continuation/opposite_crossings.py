@@ -32,9 +32,10 @@ def opposite_crossing(
     a, state, b = rows
     size = ASIDE * min(state.arclength - a.arclength, b.arclength - state.arclength)
     aside = point_between(solver, a, b, state.arclength - size)
-    number = state.zero - solver.system.active_drifts(state.x)  # with those that persist
-    if aside is None or number - persistent < 2:
+    if aside is None:
         return None
+    # with those that persist; one that changes fast may be beyond the tolerance of zero yet
+    number = max(state.zero - solver.system.active_drifts(state.x), persistent + 2)
     still = solver.inertia.modes_near_zero(a.x, persistent) if persistent else []
     modes = across(solver.system, solver.inertia.modes_near_zero(aside.x, number), still)
     try:

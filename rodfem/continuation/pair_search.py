@@ -18,10 +18,12 @@ from rodfem.stability.round_off import resolve
 LOWER = 0.5
 """A vertex above this share of the lowest value known is no pair's, once the vertex is believed."""
 MULTIPLICITIES = (1, 2)
+FALLING = 0.9
+"""A value below this share of the lowest one known is on the way to a zero of a function that is no line."""
 APART = 1e-7
 """Distance from a known crossing within which indices are its own."""
 TRIES, MISSES = 10, 2
-"""Interpolations until a lowest value is given up, and how many may lead to no lower one where a zero is sought."""
+"""Interpolations until a lowest value is given up, and how many in a row may lead to no lower one on the way to a zero."""
 CLOSER = 4
 """Interpolations after which the vertex is believed."""
 MARGIN = 1e-3
@@ -152,19 +154,21 @@ class PairSearch:
 
         They are those of the square root, in order: a line but for its sign, which changes at that state.
         """
-        missed = 0
-        while missed < MISSES:
+        missed = tried = 0
+        while missed < MISSES and tried < TRIES:
+            tried += 1
             least, i = min((value, i) for i, (_, value) in enumerate(known))
             if not 0 < i < len(known) - 1:
                 break
             s = root_of_line(known[i - 1 : i + 2])
             if any(s == other for other, _ in known):
                 break
-            state = point_between(self.solver, p, q, s)
-            if state is None or self._differs(state, min(p, q, key=zeros)):
+            state, row = point_between(self.solver, p, q, s), min(p, q, key=zeros)
+            # one that changes slowly is within the tolerance before the other one is, and its shift moves the zero
+            if state is None or state.zero > row.zero or self._differs(state, row):
                 return state
             size = abs(self._relative(state, p, 2))
-            missed += not size < LOWER * least
+            missed = 0 if size < FALLING * least else missed + 1
             known = sorted([*known, (s, size)])
         return None
 

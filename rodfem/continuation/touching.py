@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.determinants import Crossing, functions
-from rodfem.continuation.pair_search import PairSearch
+from rodfem.continuation.pair_search import PairSearch, arclength
 
 LASTING = 4.0
 """Steps for which a crossing is known: just before three rows its eigenvalue grows by a factor from row to row."""
@@ -38,6 +38,7 @@ class Touching:
     def __init__(self) -> None:
         """No row yet."""
         self._rows: list[Point] = []
+        self._earlier: Point | None = None
         self.known: list[Crossing] = []
         self._begun, self._told, self._looked = True, False, False
         self._seen: set[int] = set()
@@ -45,6 +46,7 @@ class Touching:
     def restart(self, rows: Sequence[Point]) -> None:
         """Begin at the last of some rows of one branch; the step before it counts as looked at."""
         same = [row for row in rows[-2:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
+        self._earlier = None
         self._rows, self._begun, self._told = same, len(rows) < 2, False
         self._seen, self._looked = set(), len(rows) > 1
         self.known = [crossing for crossing in self.known if crossing.arclength <= rows[-1].arclength]
@@ -55,6 +57,7 @@ class Touching:
         ``told`` is whether special points are known in the step to it.
         """
         self._begun = self._begun and len(self._rows) < 2
+        self._earlier = self._rows[0] if len(self._rows) > 1 else None
         self._rows, self._told = [*self._rows[-1:], row], told
         since = row.arclength - LASTING * (row.arclength - self._rows[0].arclength)
         self.known = [crossing for crossing in self.known if crossing.arclength > since] + [*known]
@@ -83,10 +86,20 @@ class Touching:
             search = PairSearch(solver, function, known)
             if search.dips(rows, a, b):
                 self._seen.add(number)
-            new = self._between(search, rows, looked or number in before)
+            new = self._between(search, rows, looked or number in before) or (self._again(search) if found else [])
             if new:
                 return new
         return []
+
+    def _again(self, search: PairSearch) -> list[Point]:
+        """Rows to insert beside the row before the last one, which a crossing just after the last one may have hidden."""
+        if self._earlier is None:
+            return []
+        rows = [self._earlier, *self._rows]
+        near = search.around(rows)
+        if not near:
+            return []
+        return sorted([*(rows if near[0].arclength < rows[1].arclength else rows[1:]), *near], key=arclength)
 
     def _between(self, search: PairSearch, rows: list[Point], seen: bool) -> list[Point]:
         """As :meth:`between`, by one test function, which has ``seen`` what is in the first of two steps."""
