@@ -82,7 +82,10 @@ class PairSearch:
                     return [state]
             closer = [before, a, after]
             found = self.inside(closer, before, a) or self.inside(closer, a, after)
-            if found or not self._deep(a, before, after):
+            if not found and not self._deep(a, before, after):  # one of them is lower: that is looked about instead
+                lower = [p, before, a] if abs(self._relative(before, after, 1)) < 1 else [a, after, b]
+                return self.inside(lower, *lower[:2]) or self.inside(lower, *lower[1:])
+            if found:
                 return found
             size /= NEARER
         return []
@@ -127,7 +130,7 @@ class PairSearch:
         ``p``, for as many coinciding eigenvalues as ``multiplicity`` says.
         """
         known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
-        least = min(value for _, value in known)
+        least = least_of_ends = min(value for _, value in known)
         margin = MARGIN * (q.arclength - p.arclength)
         for tried in range(TRIES):
             s, value = vertex(samples)
@@ -147,7 +150,9 @@ class PairSearch:
             if not 0 < middle < len(known) - 1:
                 break
             samples = known[middle - 1 : middle + 2]
-        return self._together(known, p, q) if multiplicity == 2 else None
+        if multiplicity == 1 and not min(value for _, value in known) < DEEP * least_of_ends:
+            return None
+        return self._together([(s, value ** (multiplicity / 2)) for s, value in known], p, q)
 
     def _together(self, known: list[Sample], p: Point, q: Point) -> Point | None:
         """State between two rows at which two eigenvalues pass zero, if the ``known`` samples lead to one.

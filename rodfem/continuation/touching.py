@@ -25,6 +25,8 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.determinants import Crossing, functions
 from rodfem.continuation.pair_search import PairSearch, arclength
 
+MOST = 8
+"""Rows that are kept, for a crossing that is found later and had hidden a pair between them."""
 LASTING = 4.0
 """Steps for which a crossing is known: just before three rows its eigenvalue grows by a factor from row to row."""
 
@@ -38,16 +40,16 @@ class Touching:
     def __init__(self) -> None:
         """No row yet."""
         self._rows: list[Point] = []
-        self._earlier: Point | None = None
+        self._earlier: list[Point] = []
         self.known: list[Crossing] = []
         self._begun, self._told, self._looked = True, False, False
         self._seen: set[int] = set()
 
     def restart(self, rows: Sequence[Point]) -> None:
         """Begin at the last of some rows of one branch; the step before it counts as looked at."""
-        same = [row for row in rows[-2:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
-        self._earlier = None
-        self._rows, self._begun, self._told = same, len(rows) < 2, False
+        same = [row for row in rows[-MOST:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
+        self._earlier = same[:-2]
+        self._rows, self._begun, self._told = same[-2:], len(rows) < 2, False
         self._seen, self._looked = set(), len(rows) > 1
         self.known = [crossing for crossing in self.known if crossing.arclength <= rows[-1].arclength]
 
@@ -57,7 +59,7 @@ class Touching:
         ``told`` is whether special points are known in the step to it.
         """
         self._begun = self._begun and len(self._rows) < 2
-        self._earlier = self._rows[0] if len(self._rows) > 1 else None
+        self._earlier = [*self._earlier, *self._rows[:-1]][2 - MOST :]
         self._rows, self._told = [*self._rows[-1:], row], told
         since = row.arclength - LASTING * (row.arclength - self._rows[0].arclength)
         self.known = [crossing for crossing in self.known if crossing.arclength > since] + [*known]
@@ -86,20 +88,31 @@ class Touching:
             search = PairSearch(solver, function, known)
             if search.dips(rows, a, b):
                 self._seen.add(number)
-            new = self._between(search, rows, looked or number in before) or (self._again(search) if found else [])
+            new = self._between(search, rows, looked or number in before) or (
+                self._again(search, found[0]) if found else []
+            )
             if new:
                 return new
         return []
 
-    def _again(self, search: PairSearch) -> list[Point]:
-        """Rows to insert beside the row before the last one, which a crossing just after the last one may have hidden."""
-        if self._earlier is None:
-            return []
-        rows = [self._earlier, *self._rows]
-        near = search.around(rows)
-        if not near:
-            return []
-        return sorted([*(rows if near[0].arclength < rows[1].arclength else rows[1:]), *near], key=arclength)
+    def _again(self, search: PairSearch, crossing: Crossing) -> list[Point]:
+        """Rows to insert before the last one, beside a pair that a ``crossing`` after it had hidden.
+
+        It hides those in steps that are not far shorter than its distance from them.
+        """
+        rows = [*self._earlier, *self._rows]
+        for i in range(len(rows) - 3, -1, -1):
+            first, middle, last = rows[i : i + 3]
+            if crossing.arclength - last.arclength > last.arclength - first.arclength:
+                continue
+            if not (search.follows(middle, first) and search.follows(last, middle)):
+                continue
+            three = [first, middle, last]
+            near = search.around(three) or search.inside(three, middle, last) or search.inside(three, first, middle)
+            if near:
+                beside = [first] if near[0].arclength < middle.arclength else []
+                return sorted([*beside, *rows[i + 1 :], *near], key=arclength)
+        return []
 
     def _between(self, search: PairSearch, rows: list[Point], seen: bool) -> list[Point]:
         """As :meth:`between`, by one test function, which has ``seen`` what is in the first of two steps."""
