@@ -20,6 +20,8 @@ LOWER = 0.5
 MULTIPLICITIES = (1, 2)
 FALLING = 0.9
 """A value below this share of the lowest one known is on the way to a zero of a function that is no line."""
+VANISHING = 1e-4
+"""A value below which a zero is believed, relative to that of the row before it."""
 APART = 1e-7
 """Distance from a known crossing within which indices are its own."""
 TRIES, MISSES = 10, 2
@@ -150,9 +152,9 @@ class PairSearch:
             if not 0 < middle < len(known) - 1:
                 break
             samples = known[middle - 1 : middle + 2]
-        if multiplicity == 1 and not min(value for _, value in known) < DEEP * least_of_ends:
+        if multiplicity == 1 and not min(abs(value) for _, value in known) < DEEP * least_of_ends:
             return None
-        return self._together([(s, value ** (multiplicity / 2)) for s, value in known], p, q)
+        return self._together([(s, abs(value) ** (multiplicity / 2)) for s, value in known], p, q)
 
     def _together(self, known: list[Sample], p: Point, q: Point) -> Point | None:
         """State between two rows at which two eigenvalues pass zero, if the ``known`` samples lead to one.
@@ -169,10 +171,12 @@ class PairSearch:
             if any(s == other for other, _ in known):
                 break
             state, row = point_between(self.solver, p, q, s), min(p, q, key=zeros)
-            # one that changes slowly is within the tolerance before the other one is, and its shift moves the zero
-            if state is None or state.zero > row.zero or self._differs(state, row):
+            if state is None or self._differs(state, row):
                 return state
             size = abs(self._relative(state, p, 2))
+            # one that changes slowly is within the tolerance before the other one is, and its shift moves the zero
+            if state.zero > row.zero and size < VANISHING:
+                return state
             missed = 0 if size < FALLING * least else missed + 1
             known = sorted([*known, (s, size)])
         return None
