@@ -68,6 +68,15 @@ class Touching:
         """Return the row before the last one, ``row``; that one itself if there is none."""
         return self._rows[-2] if len(self._rows) > 1 and self._rows[-1] is row else row
 
+    def clear(self, row: Point, zeros: int) -> Point:
+        """Last row up to ``row`` of which no more than so many eigenvalues are near zero: from there one may go again.
+
+        It is ``row`` itself where no such row is kept.
+        """
+        rows = [*self._earlier, *self._rows]
+        there = (other for other in rows if other.arclength <= row.arclength and other.zero <= zeros)
+        return max(there, key=arclength, default=row)
+
     def knows(self, a: Point, b: Point) -> bool:
         """Whether crossings are known between two rows."""
         return any(a.arclength < crossing.arclength < b.arclength for crossing in self.known)

@@ -137,7 +137,7 @@ class SpecialSearch:
             blind = (changed or inserted) and not 0 < len(found) == len(known)
             new = [] if blind else self._touching.between(self.solver, a, b, known)
             if new and new[0].arclength < a.arclength:  # the step before is the one that may be too long
-                self._early = new[0]
+                self._early = self._touching.clear(new[0], self.level)
                 if self._touching.knows(new[0], a):  # points of it are in the branch already
                     self._steps.ask(new[0], a)
                     self.observer.warn(
@@ -169,7 +169,7 @@ class SpecialSearch:
         places = sorted([*near, *(special.point.arclength for special in found)])
         step = b.arclength - a.arclength
         if found and any(ALIKE * step < q - p < step for p, q in pairwise(places)):
-            early, self._early = self._early, first
+            early, self._early = self._early, self._touching.clear(first, self.level)
             self._steps.ask(first, b, 2 * PARTS, once=True)
             self._early = early
 
