@@ -369,6 +369,36 @@ FAULTS = {
         "if False:",
         "tests/diagram/test_opposite_crossings.py",
     ),
+    "a-search-for-a-zero-misses-twice-in-all": Fault(
+        f"{CONTINUATION}pair_search.py",
+        "missed = 0 if size < FALLING * least else missed + 1",
+        "missed += not size < LOWER * least",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "a-zero-is-where-both-are-within-the-tolerance": Fault(
+        f"{CONTINUATION}pair_search.py",
+        "if state.zero > row.zero and size < VANISHING:",
+        "if False:",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "a-lower-state-beside-a-low-row-is-left": Fault(
+        f"{CONTINUATION}pair_search.py",
+        "return self.inside(lower, *lower[:2]) or self.inside(lower, *lower[1:])",
+        "return []",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "pairs-before-a-crossing-stay-hidden": Fault(
+        f"{CONTINUATION}touching.py",
+        "self._again(search, found[0]) if found else []",
+        "[]",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "steps-are-shortened-from-a-critical-row": Fault(
+        f"{CONTINUATION}touching.py",
+        "return max(there, key=arclength, default=row)",
+        "return row",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
     "opposite-crossings-are-one": Fault(
         f"{CONTINUATION}opposite_crossings.py",
         "modes = across(solver.system, solver.inertia.modes_near_zero(aside.x, number), still)",

@@ -152,6 +152,7 @@ class PairSearch:
             if not 0 < middle < len(known) - 1:
                 break
             samples = known[middle - 1 : middle + 2]
+        # what falls so low as a parabola may be the product of two
         if multiplicity == 1 and not min(abs(value) for _, value in known) < DEEP * least_of_ends:
             return None
         return self._together([(s, abs(value) ** (multiplicity / 2)) for s, value in known], p, q)

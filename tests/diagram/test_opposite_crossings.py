@@ -68,6 +68,17 @@ SEVERAL = {
 """Draws with more zeros in two neighbouring steps than a parabola through three rows shows."""
 
 
+HARDER = {
+    "a zero of a function that is no line": (23, 6, 0.0),
+    "a slow one and a fast one": (118, 5, 0.0),
+    "a state beside a low row that is lower": (119, 7, 1e-6),
+    "a pair hidden by a crossing beside the next row": (53, 6, 0.0),
+    "a pair hidden by one two steps later": (85, 7, 1e-6),
+    "steps are shortened from a critical row": (56, 10, 1e-6),
+}
+"""Numbers and seeds of random draws of up to five zeros, and what is no shallower."""
+
+
 @pytest.mark.parametrize("name", TOGETHER)
 def test_opposite_crossings_at_one_load(name: str) -> None:
     """A branch point at which two eigenvalues vanish and the index stays, located as others are."""
@@ -94,6 +105,13 @@ def test_opposite_crossings_of_a_rod_that_stretches(apart: float) -> None:
 @pytest.mark.parametrize("name", SEVERAL)
 def test_several_crossings_beside_each_other(name: str) -> None:
     found = SEVERAL[name].measured()
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
+
+
+@pytest.mark.parametrize("name", HARDER)
+def test_up_to_five_crossings(name: str) -> None:
+    number, seed, shallow = HARDER[name]
+    found = drawn(number, seed, 5, shallow).measured()
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 

@@ -83,14 +83,14 @@ class Draw:
         return compare(singular(diagram[0]), expected, said(diagram))
 
 
-def drawn(number: int) -> Draw:
-    """Random draw of a ``number``; shallow ones are drawn again."""
-    random = np.random.default_rng([49, number])
+def drawn(number: int, seed: int = 49, most: int = 4, shallow: float = SHALLOW) -> Draw:
+    """Random draw of a ``number``, of two to ``most`` zeros; those not deeper than ``shallow`` are drawn again."""
+    random = np.random.default_rng([seed, number])
     while True:
         middle = random.uniform(0.4, 2.15)
         zeros: tuple[list[float], list[float]] = ([], [])
         widths: tuple[list[float], list[float]] = ([], [])
-        for _ in range(random.integers(2, 5)):
+        for _ in range(random.integers(2, most + 1)):
             away = 0.5 * exp(random.uniform(np.log(1e-3), 0.0)) * random.choice([-1, 1])
             inside = RANGE[0] + 0.01 < middle + away < RANGE[1] - 0.01
             plane = int(random.integers(2))
@@ -104,7 +104,7 @@ def drawn(number: int) -> Draw:
             some = zeros[0] or zeros[1]
             some[0] = min(0.6641, 1.1766, 1.5866, 1.9966, key=lambda row: abs(row - some[0]))
         planes = [Plane(tuple(z), tuple(w), float(c)) for z, w, c in zip(zeros, widths, sizes, strict=True)]
-        if min(plane.depth for plane in planes) > SHALLOW:
+        if min(plane.depth for plane in planes) > shallow:
             return Draw((planes[0], planes[1]), float(grow))
 
 
