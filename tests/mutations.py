@@ -629,7 +629,7 @@ FAULTS = {
         "rodfem/diagram/tracer.py", "        self.hidden.examine(branch)\n", "", "tests/hard/test_hard_cases.py"
     ),
     "bends-within-a-step-are-passed": Fault(
-        "rodfem/diagram/special_search.py", "if divided > BENT:", "if False:", "tests/hard/test_hard_cases.py"
+        "rodfem/diagram/step_check.py", "if divided > BENT:", "if False:", "tests/hard/test_hard_cases.py"
     ),
     "branches-follow-polynomials-beyond-bends": Fault(
         f"{CONTINUATION}follow.py", "FAILURES = 2", "FAILURES = 200", "tests/hard/test_hard_cases.py"

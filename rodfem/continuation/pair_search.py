@@ -25,7 +25,7 @@ VANISHING = 1e-4
 APART = 1e-7
 """Distance from a known crossing within which indices are its own."""
 TRIES, MISSES = 10, 2
-"""Interpolations until a lowest value is given up, and how many in a row may lead to no lower one on the way to a zero."""
+"""Interpolations until a lowest value is given up, and how many in a row may lead to no lower one towards a zero."""
 CLOSER = 4
 """Interpolations after which the vertex is believed."""
 MARGIN = 1e-3

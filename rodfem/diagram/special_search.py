@@ -13,7 +13,6 @@ from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.determinants import Crossing
 from rodfem.continuation.index_chain import Row, chained
-from rodfem.continuation.jumping import halvings, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.opposite_crossings import opposite_crossing
@@ -21,13 +20,11 @@ from rodfem.continuation.pair_search import arclength, zeros
 from rodfem.continuation.special_points import COUPLED, Taut, find_special, same_point
 from rodfem.continuation.states_between import midpoint
 from rodfem.continuation.touching import Touching, beside_zero
-from rodfem.continuation.work import EnergyBalance
 from rodfem.diagram.shorter_steps import PARTS, ShorterSteps, Unresolved
+from rodfem.diagram.step_check import StepCheck
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import clear_of_zero, resolve
 
-BENT, NARROWEST = 2, 6
-"""How many times a step that bends may be halved until it is one, and how many times steps are, at most, where not."""
 HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
 ROUNDS = 4
@@ -62,7 +59,7 @@ class SpecialSearch:
         self.solver = meshes.solvers[0]
         self.level = self.undecided = 0
         self._open: list[Point] = []
-        self._touching, self._balance = Touching(), EnergyBalance()
+        self._touching, self._check = Touching(), StepCheck(observer)
         self._steps = ShorterSteps()
         self._lost: tuple[Row, Row] | None = None
         self._early: Point | None = None
@@ -97,7 +94,7 @@ class SpecialSearch:
         settled, self._early = self._open[0], None
         try:
             found = self._shown_by(a, b)
-            self._check_step([*rows, b])
+            self._check(self.solver, [*rows, b], self._steps)
         except (Gap, Unresolved):
             self._open = [self._early or settled]
             raise
@@ -172,46 +169,6 @@ class SpecialSearch:
             early, self._early = self._early, self._touching.clear(first, self.level)
             self._steps.ask(first, b, 2 * PARTS, once=True)
             self._early = early
-
-    def _check_step(self, rows: Sequence[Point]) -> None:
-        """Raise :class:`Unresolved` if the step to the last of the ``rows`` has jumped to another branch.
-
-        Where shorter steps do not help it is said.  Along a family of equilibria at one load neither the path nor its
-        tangent is determined, and nothing is checked.
-        """
-        if len(rows) < 2 or self.solver.system.damping or any(p.tangent is None for p in rows):
-            return
-        a, b = rows[-2:]
-        divided = halvings(self.solver, a, b) if suspected(self.solver, rows) else 0
-        if divided is not None:
-            if divided > BENT:  # in a bend so narrow there may be pairs of special points
-                self._steps.ask(a, b, 2 ** min(divided, NARROWEST))
-                self.observer.warn(
-                    f"Between loads {a.load:.8g} and {b.load:.8g} the branch bends within a small part of a step: "
-                    f"special points may be missing there; {SMALLER_STEPS}."
-                )
-            self._check_work(rows)
-            return
-        self._steps.ask(a, b)
-        self.observer.warn(
-            f"Between loads {a.load:.8g} and {b.load:.8g} the branch may have been left for another one beside it: no "
-            f"equilibria were found that join them; {SMALLER_STEPS}."
-        )
-
-    def _check_work(self, rows: Sequence[Point]) -> None:
-        """Raise :class:`Unresolved` if over a step the energy does not change by the work of the load.
-
-        Raises :class:`ConvergenceError`, which ends the branch, where shorter steps do not help.
-        """
-        if self._balance(self.solver, rows):
-            return
-        a, b = rows[-2:]
-        self._steps.ask(a, b)
-        raise ConvergenceError(
-            f"Between loads {a.load:.8g} and {b.load:.8g} the potential energy changes by "
-            f"{b.potential - a.potential:.3g}, which is not the work of the load: these are no states of one branch, "
-            f"or what the load does has a kink between them (begin beyond it, then); {SMALLER_STEPS}."
-        )
 
     @property
     def settled(self) -> float:
@@ -374,7 +331,7 @@ class SpecialSearch:
         if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
             # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
             found[0].negative_before, found[-1].negative_after = p.low, q.low
-        # counts half-way between two of them: more eigenvalues than vanish at one have passed zero, others are beside it
+        # counts half-way between two: where more eigenvalues have passed zero than vanish at one, others are beside it
         beside = len(found) > 1 and any(abs(s.negative_after - s.negative_before) > s.multiplicity for s in found)
         if not why and not beside and chained(p.low, p.high, found, q.low, q.high):
             troubles += [turned] if turned else []

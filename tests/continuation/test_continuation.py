@@ -162,7 +162,7 @@ def test_restart_from_what_is_not_there(folder: Path) -> None:
 
 @pytest.mark.alone
 def test_steps_that_bound_the_change_of_the_index() -> None:
-    """Euler's loads of a pinned column of nearly equal stiffnesses, ``pi^2`` and ``1.0001 pi^2``, with a row between."""
+    """Euler's loads of a pinned column of nearly equal stiffnesses, ``pi^2`` and ``1.0001 pi^2``: a row between."""
     rod = classics.column(
         "euler", classics.SUPPORTS["pinned-pinned"], (8.0, 12.0), constants={"B2": 1.0001}
     )  # fmt: skip
