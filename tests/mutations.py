@@ -407,7 +407,7 @@ FAULTS = {
     ),
     "no-zero-beyond-three-rows": Fault(
         f"{CONTINUATION}pair_search.py",
-        "return self._together(known, p, q) if multiplicity == 2 else None",
+        "return self._together([(s, abs(value) ** (multiplicity / 2)) for s, value in known], p, q)",
         "return None",
         "tests/diagram/test_opposite_crossings.py",
     ),
