@@ -339,12 +339,6 @@ FAULTS = {
         "blind = changed or inserted",
         "tests/diagram/test_pairs_at_rows.py",
     ),
-    "opposite-crossings-are-left-alone": Fault(
-        f"{CONTINUATION}pair_search.py",
-        "if state.negative < index < state.negative + state.zero - row.zero:",
-        "if False:",
-        "tests/diagram/test_opposite_crossings.py",
-    ),
     "several-branch-points-have-one-in-common": Fault(
         "rodfem/adaptivity/gaps.py",
         "if together else 0.1 * special.located_to",
@@ -356,12 +350,6 @@ FAULTS = {
         "if last >= 4 and row[last - 1] * row[last - 4] < row[last - 2] ** 2:",
         "if False:",
         "tests/adaptivity/test_grading.py",
-    ),
-    "an-index-may-change-by-more-than-vanishes": Fault(
-        "rodfem/diagram/special_search.py",
-        "if not why and not beside and chained",
-        "if not why and chained",
-        "tests/diagram/test_opposite_crossings.py",
     ),
     "steps-stay-long-beside-two-crossings": Fault(
         "rodfem/diagram/special_search.py",
@@ -379,12 +367,6 @@ FAULTS = {
         f"{CONTINUATION}pair_search.py",
         "if state.zero > row.zero and size < VANISHING:",
         "if False:",
-        "tests/diagram/test_opposite_crossings.py",
-    ),
-    "a-lower-state-beside-a-low-row-is-left": Fault(
-        f"{CONTINUATION}pair_search.py",
-        "return self.inside(lower, *lower[:2]) or self.inside(lower, *lower[1:])",
-        "return []",
         "tests/diagram/test_opposite_crossings.py",
     ),
     "pairs-before-a-crossing-stay-hidden": Fault(
@@ -439,12 +421,6 @@ FAULTS = {
         f"{CONTINUATION}touching.py",
         "LASTING = 4.0",
         "LASTING = 1.0",
-        "tests/diagram/test_pairs_at_rows.py",
-    ),
-    "what-was-seen-beside-a-crossing-is-seen": Fault(
-        f"{CONTINUATION}touching.py",
-        "set() if found else self._seen",
-        "self._seen",
         "tests/diagram/test_pairs_at_rows.py",
     ),
     "low-modes-by-the-usual-shift-alone": Fault(

@@ -84,10 +84,7 @@ class PairSearch:
                     return [state]
             closer = [before, a, after]
             found = self.inside(closer, before, a) or self.inside(closer, a, after)
-            if not found and not self._deep(a, before, after):  # one of them is lower: that is looked about instead
-                lower = [p, before, a] if abs(self._relative(before, after, 1)) < 1 else [a, after, b]
-                return self.inside(lower, *lower[:2]) or self.inside(lower, *lower[1:])
-            if found:
+            if found or not self._deep(a, before, after):
                 return found
             size /= NEARER
         return []
@@ -189,8 +186,6 @@ class PairSearch:
         index = row.negative + changes(self.known, row, state)
         if state.zero <= row.zero:
             return state.negative != index
-        if state.negative < index < state.negative + state.zero - row.zero:
-            return True  # of those within the tolerance of zero some are negative: they may pass it in either direction
         return resolve(self.solver.inertia.at(state.x)) != (index, index)
 
     def follows(self, row: Point, other: Point) -> bool:

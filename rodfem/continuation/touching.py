@@ -91,8 +91,8 @@ class Touching:
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
         rows, known = [self._rows[-2], a, b], [*self.known, *found]
-        # by numbers of the test functions: whether one had its vertex in the step before, with the crossings known now
-        before, self._seen, looked, self._looked = set() if found else self._seen, set(), self._looked, False
+        # by numbers of the test functions: whether one had its vertex in the step before
+        before, self._seen, looked, self._looked = self._seen, set(), self._looked, False
         for number, function in enumerate(functions(solver, rows, known)):
             search = PairSearch(solver, function, known)
             if search.dips(rows, a, b):

@@ -331,17 +331,13 @@ class SpecialSearch:
         if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
             # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
             found[0].negative_before, found[-1].negative_after = p.low, q.low
-        # counts half-way between two: where more eigenvalues have passed zero than vanish at one, others are beside it
-        beside = len(found) > 1 and any(abs(s.negative_after - s.negative_before) > s.multiplicity for s in found)
-        if not why and not beside and chained(p.low, p.high, found, q.low, q.high):
+        if not why and chained(p.low, p.high, found, q.low, q.high):
             troubles += [turned] if turned else []
             return found
         # bisection: on a shorter piece fewer crossings fall together, until each half explains its own ends
         middle = midpoint(self.solver, p.point, q.point) if halvings else None
         if middle is None:
             self._lost = self._lost or (p, q)
-            if beside and not why:
-                why = f"the index changes at one by more than the eigenvalues that vanish there: {SMALLER_STEPS}."
             if why:
                 loads = f"{p.point.load:.8g} and {q.point.load:.8g}"
                 troubles.append(f"A special point between loads {loads} is missing: {why}")

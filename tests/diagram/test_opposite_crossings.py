@@ -45,7 +45,7 @@ TOGETHER = {
 
 
 SEVERAL = {
-    "an index that changes by more than vanishes": pair(
+    "four within 0.02 and one apart": pair(
         Plane((1.2644989344916502, 1.6408298970092186), (0.5666053454301889, 1.7219611650241802), -0.31928321008903465),
         Plane(
             (1.2549883952918601, 1.2737121623047323, 1.262022465126938),
@@ -71,7 +71,8 @@ SEVERAL = {
 HARDER = {
     "a zero of a function that is no line": (23, 6, 0.0),
     "a slow one and a fast one": (118, 5, 0.0),
-    "a state beside a low row that is lower": (119, 7, 1e-6),
+    "a parabola that is two eigenvalues'": (119, 7, 1e-6),
+    "two pairs in two steps": (57, 9, 1e-6),
     "a pair hidden by a crossing beside the next row": (53, 6, 0.0),
     "a pair hidden by one two steps later": (85, 7, 1e-6),
     "steps are shortened from a critical row": (56, 10, 1e-6),
