@@ -430,7 +430,7 @@ FAULTS = {
         f"{CONTINUATION}pair_search.py",
         "return resolve(self.solver.inertia.at(state.x)) != (index, index)",
         "return True",
-        "tests/diagram/test_opposite_crossings.py",
+        "tests/continuation/test_degenerate_pitchforks.py",
     ),
     "the-first-mesh-that-does-not-help-is-the-last": Fault(
         "rodfem/diagram/frequency_mesh.py",
@@ -1078,7 +1078,10 @@ FAULTS = {
     ),
     "first-parabola-is-believed": Fault(f"{CONTINUATION}pair_search.py", "tried >= CLOSER", "tried >= 0", CHAIN),
     "parabola-of-one-side": Fault(
-        f"{CONTINUATION}touching.py", "if not (self._told or seen) and", "if self._begun and not self._told and", CHAIN
+        f"{CONTINUATION}touching.py",
+        "if not (self._told or seen) and",
+        "if self._begun and not self._told and",
+        "tests/diagram/test_pairs_at_rows.py",
     ),
     "pair-beside-a-row": Fault(f"{CONTINUATION}pair_search.py", "DEEP = 0.1", "DEEP = 0.0", f"{CHAIN} {HARD}"),
     "breaks-are-not-recorded": Fault(
