@@ -128,9 +128,9 @@ class PairSearch:
         The rows are ``p`` and ``q``.  ``samples`` are arclengths and values of the test function, relative to that at
         ``p``, for as many coinciding eigenvalues as ``multiplicity`` says.
         """
-        known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
+        every, margin = sorted(samples), MARGIN * (q.arclength - p.arclength)
+        known = [sample for sample in every if p.arclength <= sample[0] <= q.arclength]
         least = least_of_ends = min(value for _, value in known)
-        margin = MARGIN * (q.arclength - p.arclength)
         for tried in range(TRIES):
             s, value = vertex(samples)
             # the first parabolas reach too far to tell how low it is
@@ -143,12 +143,13 @@ class PairSearch:
             if state is None or self._differs(state, min(p, q, key=zeros)):
                 return state
             size = abs(self._relative(state, p, multiplicity))  # of the same index, whatever a count calls zero
-            known = sorted([*known, (s, size)])
-            # the next parabola goes through the lowest value and its two neighbours
-            least, middle = min((value, i) for i, (_, value) in enumerate(known))
-            if not 0 < middle < len(known) - 1:
+            every, known = sorted([*every, (s, size)]), sorted([*known, (s, size)])
+            # the next parabola goes through the lowest value of the step and its two neighbours, one in the next perhaps
+            least, lowest = min((value, s) for s, value in known)
+            middle = every.index((lowest, least))
+            if not 0 < middle < len(every) - 1:
                 break
-            samples = known[middle - 1 : middle + 2]
+            samples = every[middle - 1 : middle + 2]
         # what falls so low as a parabola may be the product of two
         if multiplicity == 1 and not min(abs(value) for _, value in known) < DEEP * least_of_ends:
             return None

@@ -73,6 +73,7 @@ HARDER = {
     "a slow one and a fast one": (118, 5, 0.0),
     "a parabola that is two eigenvalues'": (119, 7, 1e-6),
     "two pairs in two steps": (57, 9, 1e-6),
+    "four in two steps, two of them at one load": (67, 11, 1e-6),
     "a pair hidden by a crossing beside the next row": (53, 6, 0.0),
     "a pair hidden by one two steps later": (85, 7, 1e-6),
     "steps are shortened from a critical row": (56, 10, 1e-6),
