@@ -144,7 +144,7 @@ class PairSearch:
                 return state
             size = abs(self._relative(state, p, multiplicity))  # of the same index, whatever a count calls zero
             every, known = sorted([*every, (s, size)]), sorted([*known, (s, size)])
-            # the next parabola goes through the lowest value of the step and its two neighbours, one in the next perhaps
+            # the next parabola goes through the lowest value of the step and its neighbours, one perhaps beyond it
             least, lowest = min((value, s) for s, value in known)
             middle = every.index((lowest, least))
             if not 0 < middle < len(every) - 1:
