@@ -387,6 +387,9 @@ FAULTS = {
         "every, known = sorted([*known, (s, size)]), sorted([*known, (s, size)])",
         "tests/diagram/test_opposite_crossings.py",
     ),
+    "sides-on-both-sides-of-a-load-are-images": Fault(
+        "rodfem/diagram/two_sides.py", "LOCATED = 10.0", "LOCATED = 1e9", "tests/hard/test_fuzz.py"
+    ),
     "opposite-crossings-are-one": Fault(
         f"{CONTINUATION}opposite_crossings.py",
         "modes = across(solver.system, solver.inertia.modes_near_zero(aside.x, number), still)",

@@ -25,6 +25,8 @@ from rodfem.tolerances import SAME_STATE
 SAME_DETERMINANT = 1e-3
 """Logarithm of the ratio of two determinants, or of two eigenvalues, that are one: of the last iterates of Newton's
 method, and of meshes that are not symmetric."""
+LOCATED = 10.0
+"""Distance from the load of a branch point, over the bound to which it is located, that has a sign."""
 LOOKED_AT = 3
 """Eigenvalues nearest zero, beyond those that count as zero, between which the shift lies."""
 
@@ -38,6 +40,10 @@ def are_images(
     not share the symmetry: points at one distance in it need not be mirror images themselves.
     """
     if not equivalent(a, b, solver.units):
+        # one that turns at a fold just beside the branch point is there as near to the other side as round-off
+        load, width = special.point.load, LOCATED * special.located_to
+        if min(a.load, b.load) < load - width and max(a.load, b.load) > load + width:
+            return False
         a, b = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
         there = between(solver, special, b, a.load)
         if there is None or not alike(a, there, SAME_STATE):

@@ -126,6 +126,14 @@ def test_sides_that_differ_across_their_plane_are_both_traced(seed: int, number:
     assert (found.wrong, found.differs, found.said) == ([], [], [])
 
 
+def test_a_side_that_turns_beside_the_branch_point_is_no_image() -> None:
+    """One side turns at a fold 1.4e-9 in load below the branch point, the other has none: both are traced."""
+    rod = scene(45, 63)
+    for mesh, plan in zip(comparison.meshes(rod, 63), comparison.plans(rod, 1), strict=True):
+        diagram = trace(rod, mesh, replace(plan, error_bars=False))
+        assert len(diagram) == 5
+
+
 @pytest.mark.parametrize(("seed", "number", "factors"), [(1, 98, "petsc"), (13, 14, "chain")])
 def test_dependent_constraints_have_no_index(seed: int, number: int, factors: str) -> None:
     """Both ends are held about d1, about which nothing bends: by MUMPS there was an index of -1.
