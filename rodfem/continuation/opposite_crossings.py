@@ -1,8 +1,8 @@
 """Branch points at which eigenvalues pass zero together in opposite directions: the index is the same on either side.
 
 Neither the index shows them nor the sign of the determinant, which only touches zero.  The search for pairs ends at a
-state beside one (:mod:`rodfem.continuation.pair_search`), at which some of the eigenvalues within the tolerance of zero
-are negative and others are not.  There each eigenvalue is followed by its own mode, taken where they are still apart.
+state beside one (:mod:`rodfem.continuation.pair_search`), at which one of the eigenvalues at least is within the
+tolerance of zero.  There each eigenvalue is followed by its own mode, taken where they are still apart.
 """
 
 from __future__ import annotations

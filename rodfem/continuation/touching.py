@@ -14,6 +14,9 @@ cost nothing.  Where they change so much that the others may hide the one, that 
 A row may happen to lie beside such a pair.  Its determinant is then lower than those of its neighbours by orders of
 magnitude, and three rows do not show the pair: states nearer and nearer to that row replace its neighbours, on both
 sides of it, or on the one side on which the first and the last row of a branch have any.
+
+A crossing that is found later may have hidden a pair before it: the last rows are compared once more, with it divided
+out.
 """
 
 from __future__ import annotations
