@@ -1622,12 +1622,6 @@ FAULTS = {
         "STEPS = {2: 1e-4, 3: 1e-3}",
         "tests/diagram/test_sharp_in_state.py",
     ),
-    "opposite-crossings-at-one-load-hide-a-pair": Fault(
-        "rodfem/diagram/special_search.py",
-        "        if opposite or (found",
-        "        if (found",
-        "tests/diagram/test_opposite_crossings.py",
-    ),
     "gaps-that-are-jumped-are-forgotten": Fault(
         "rodfem/diagram/special_search.py",
         "                self._jumped(p, q)\n",
