@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 from petsc4py import PETSc
+from scipy.linalg import eigvals
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
@@ -77,7 +79,7 @@ def special_at(
     coupling = max(coupling_of(solver, x, v) for v in vectors)
     turning = abs(system.scalar(tangent)) < LEVEL * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT
-    apart = _apart(found, vectors, located)
+    apart = _apart(solver, found, vectors, located)
     left = located.uncertainty + missed
     special = SpecialPoint(
         kind, point, located.before, located.after, left + apart, [v.copy() for v in vectors], coupling
@@ -116,16 +118,28 @@ def _index_of(decision: Decision, found: Factored, located: Located) -> tuple[In
     return index, 2 * float(abs(decision.inside[near]).max() * abs(located.slope / located.rate))
 
 
-def _apart(found: Factored, vectors: Sequence[PETSc.Vec], located: Located) -> float:
+def _apart(solver: BranchSolver, found: Factored, vectors: Sequence[PETSc.Vec], located: Located) -> float:
     """How far apart in load the eigenvalues of several null ``vectors`` vanish that count as zero at a located point.
 
-    By their Rayleigh quotients beyond round-off, and the rate at which one of them changes, which is that of all up to
-    a number about one: twice the distance that follows.
+    On the span of these vectors the pencil changes linearly along the branch, ``A + s B``: it is singular at one ``s``
+    for each of them, slow ones far from where fast ones are.  Twice the largest distance; none within round-off.
     """
-    if len(vectors) < 2 or not located.rate:
+    if len(vectors) < 2:
         return 0.0
-    quotients = [abs(v.dot(found.matrix * v) + found.shift) - quotient_error(found.matrix, v) for v in vectors]
-    return 2 * max(*quotients, 0.0) * abs(located.slope / located.rate)
+    small = _on_span(found, vectors)
+    if abs(small).max() <= max(quotient_error(found.matrix, v) for v in vectors):
+        return 0.0
+    first, last = located.nodes[0], located.nodes[-1]
+    rates = _on_span(solver.inertia.at(last.x), vectors) - _on_span(solver.inertia.at(first.x), vectors)
+    places = eigvals(small, -rates / (last.s - first.s), homogeneous_eigvals=True)
+    distances = [abs(p / q) for p, q in places.T if abs(q) > EPS * abs(p)]  # one that does not change is zero nowhere
+    return 2 * float(max(distances, default=0.0)) * abs(located.slope)
+
+
+def _on_span(found: Factored, vectors: Sequence[PETSc.Vec]) -> np.ndarray:
+    """Second variation at a state between orthonormal ``vectors``."""
+    images = [found.matrix * v for v in vectors]
+    return np.array([[v.dot(w) for w in images] for v in vectors]) + found.shift * np.eye(len(vectors))
 
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
