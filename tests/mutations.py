@@ -1628,6 +1628,18 @@ FAULTS = {
         "min(distances, default=0.0)",
         "tests/diagram/test_opposite_crossings.py",
     ),
+    "opposite-crossings-at-one-load-hide-a-pair": Fault(
+        "rodfem/diagram/special_search.py",
+        "        if opposite or (found",
+        "        if (found",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "what-comes-back-is-known-by-its-last-rows": Fault(
+        "rodfem/diagram/explorer.py",
+        "max(min(rows, len(parent.points) - TAIL), 0)",
+        "len(parent.points) - TAIL",
+        "tests/continuation/test_index_chain.py",
+    ),
     "gaps-that-are-jumped-are-forgotten": Fault(
         "rodfem/diagram/special_search.py",
         "                self._jumped(p, q)\n",

@@ -33,7 +33,9 @@ from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 TAIL = 8
-"""Rows before the end of a side branch among which its mirror image is recognised."""
+"""Rows before the end of a side branch, at least, among which its mirror image is recognised."""
+REACH = 4.0
+"""Length of that part of it, at least, over the distance of the state that may be its own."""
 COLLAPSED = 1e-6
 """A first state whose smallest stretch is below this is no rod."""
 
@@ -322,7 +324,9 @@ class Explorer(Tracer):
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""
         if special.test_function != "slope":
             return False
-        tail = replace(parent, points=parent.points[-TAIL:])
+        since = parent.points[-1].arclength - REACH * point.arclength  # its steps may be short there
+        rows = next((i for i, row in enumerate(parent.points) if row.arclength >= since), 0)
+        tail = replace(parent, points=parent.points[max(min(rows, len(parent.points) - TAIL), 0) :])
         known = equilibria_at(self.solver, [tail], point.load, self.here)
         return any(equivalent(point, other, self.solver.units, SAME_STATE) for other in known)
 

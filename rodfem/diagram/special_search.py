@@ -158,14 +158,15 @@ class SpecialSearch:
     def _shorten_about(self, a: Point, b: Point, found: Sequence[SpecialPoint]) -> None:
         """Raise :class:`Unresolved` where two special points are nearer to each other than the rows ``a`` and ``b``.
 
-        Those ``found`` last are between these.  Others beside the two would leave no trace in rows so far apart: from
-        the row before ``a`` steps are shortened, once.
+        Those ``found`` last are between these; two opposite crossings at one load are such.  Others beside the two
+        would leave no trace in rows so far apart: from the row before ``a`` steps are shortened, once.
         """
         first = self._touching.before(a)
         near = [crossing.arclength for crossing in self._touching.known if crossing.arclength > first.arclength]
         places = sorted([*near, *(special.point.arclength for special in found)])
         step = b.arclength - a.arclength
-        if found and any(ALIKE * step < q - p < step for p, q in pairwise(places)):
+        opposite = any(special.negative_before == special.negative_after for special in found)
+        if opposite or (found and any(ALIKE * step < q - p < step for p, q in pairwise(places))):
             early, self._early = self._early, self._touching.clear(first, self.level)
             self._steps.ask(first, b, 2 * PARTS, once=True)
             self._early = early

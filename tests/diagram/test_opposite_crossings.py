@@ -78,6 +78,7 @@ HARDER = {
     "a pair hidden by one two steps later": (85, 7, 1e-6),
     "steps are shortened from a critical row": (56, 10, 1e-6),
     "a slow one within the band of a fast one's zero": (48, 13, 1e-6),
+    "two at one load hide a pair": (101, 11, 1e-6),
 }
 """Numbers and seeds of random draws of up to five zeros, and what is no shallower."""
 
