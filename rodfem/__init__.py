@@ -5,7 +5,7 @@ finds and classifies the points where it is lost, follows what branches off, and
 
     from math import hypot
     from forms.energy import bending_and_twist
-    from rodfem import Ordinate, Parameter, Scene, clamped, free, run
+    from rodfem import Ordinate, Parameter, Scene, clamped, free, run, trace
 
     column = Scene(
         name="column",
@@ -18,8 +18,8 @@ finds and classifies the points where it is lost, follows what branches off, and
         ordinate=Ordinate("tip displacement", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
         span=(0.0, 10.0),
     )
-    run(column)                          # with files and pictures
-    diagram = rodfem.trace(column)       # without
+    run(column)                   # with files and pictures
+    diagram = trace(column)       # without
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
   expression of the strains, the constants and the arclength ``c.s`` (:mod:`forms.energy` has a few).

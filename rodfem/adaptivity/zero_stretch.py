@@ -81,7 +81,7 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
     left = 1.0 if d.degree == 1 else 0.25
     special.error_estimate = max(left * abs(load - load2), special.located_to)
     special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)
-    special.note = f"computed with {4 * d.elements} elements of degree {d.degree + 1}"
+    special.note = f"its load was computed with {4 * d.elements} elements of degree {d.degree + 1}"
     return special
 
 

@@ -64,6 +64,6 @@ def unread(words: Sequence[str]) -> list[str]:
     found = []
     for word in words:
         if word.startswith((f"-{OURS}", "-mat_", "-vec_")):
-            library.PetscOptionsUsed(ffi.NULL, word.encode(), used)
+            library.PetscOptionsUsed(ffi.NULL, word[1:].encode(), used)
             found += [] if used[0] else [word]
     return found

@@ -16,6 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from forms.kinematics import RODS
+from rodfem import code_cache
 from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH, Branch, NormalForm, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
@@ -155,7 +156,8 @@ class Report(Observer):
 
     def compiling(self) -> None:
         """Say why the first run takes longer."""
-        self.say("Compiling the forms for the first time (some seconds; kept in ~/.cache/fenics for later runs) ...")
+        kept = code_cache.folder()
+        self.say(f"Compiling the forms for the first time (some seconds; kept in {kept} for later runs) ...")
 
     def system(self, system: System, accuracy: float | None = None) -> None:
         """Say what is solved, with how many unknowns, what was left out, and the accuracy asked for."""

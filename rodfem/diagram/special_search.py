@@ -165,7 +165,9 @@ class SpecialSearch:
         near = [crossing.arclength for crossing in self._touching.known if crossing.arclength > first.arclength]
         places = sorted([*near, *(special.point.arclength for special in found)])
         step = b.arclength - a.arclength
-        opposite = any(special.negative_before == special.negative_after for special in found)
+        # a branch that ends, and turns back, has one side: there the index is the same, too
+        crossing = [special for special in found if special.test_function == "mu"]
+        opposite = any(special.negative_before == special.negative_after for special in crossing)
         if opposite or (found and any(ALIKE * step < q - p < step for p, q in pairwise(places))):
             early, self._early = self._early, self._touching.clear(first, self.level)
             self._steps.ask(first, b, 2 * PARTS, once=True)
@@ -306,8 +308,9 @@ class SpecialSearch:
         """
         for special in specials:
             # phi.F_lam is nearly zero: fold or branch point is decided by the unfolding parameters
-            weak = special.kind == FOLD and special.coupling <= COUPLED
-            if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
+            unchanged = special.negative_before == special.negative_after
+            weak = special.kind == FOLD and (special.coupling <= COUPLED or (unchanged and special.multiplicity == 1))
+            if weak or unchanged or special.kind == BRANCH_POINT:
                 gap = self.gaps.examine(self.solver, special)
                 if gap is not None and not ended and self.gaps.open(gap, self.solver):
                     raise gap

@@ -9,6 +9,8 @@ COMPLETE = ("", "end of range", "closed loop", "not traced")
 """Ends that need no mark."""
 MEETS = "meets"
 """Beginning of an end that is on another branch, whose points say so."""
+SQUEEZED = "stretch reaches zero"
+"""Reason of an end at a load that is solved for."""
 BEGINS = "begins here: "
 """Beginning of the note at the first row of a branch that was traced to both sides."""
 
@@ -21,3 +23,8 @@ def endings(branch: Mapping[str, Any]) -> Iterator[tuple[int, str]]:
         reason = sentence.split(" at ")[0].split(":")[0].split(" any more")[0]
         if reason not in COMPLETE and not reason.startswith(MEETS):
             yield row, reason
+
+
+def is_solved(branch: Mapping[str, Any], special: Mapping[str, Any]) -> bool:
+    """Whether the load of the end ``special`` of a branch is solved for: it is not the range that ends there."""
+    return (special["row"], SQUEEZED) in list(endings(branch))

@@ -18,7 +18,7 @@ ENTRIES = {
     ),
     "fold": (
         "A limit point: the load turns back along the branch, and one eigenvalue changes its sign. Beyond its "
-        "load no state of this branch is near, so that a loaded rod jumps."
+        "load no state of this branch is near, so that a rod that was stable jumps."
     ),
     "imperfect bifurcation": (
         "A branch point that an imperfection takes apart, by less than steps along the branch resolve; its "
@@ -168,12 +168,21 @@ ENTRIES = {
     ),
     "eta": "Multiplier of the unit norm of the quaternions, a field of unknowns.",
     # branches
-    "branch": "A curve of equilibria, row by row along its arclength.",
+    "branch": (
+        "A curve of equilibria, row by row along its arclength. What leaves the first branch, or one that a search "
+        "found, is branch 1, branch 2, ...; what leaves branch 1 is branch 1.1, branch 1.2, ...."
+    ),
     "first branch | straight | ring": (
         "The branch of the state from which a run starts. It is called straight where its states are, ring if the rod "
         "is closed, or as the scene says (states=...), and first branch otherwise."
     ),
     "detached": "A branch on the other side of a gap that an imperfection leaves: no step from the others reaches it.",
+    "directors": (
+        "Unit vectors of the cross-section: d1 and d2 in its plane, d3 across it. Pictures have a stripe along d1, and "
+        "arrows along d1 and d2."
+    ),
+    "twist": "Turns of the directors about the centreline: the integral of the twist rate k3 over 2 pi.",
+    "writhe": "Turns of the centreline about itself: Gauss's integral; of a closed rod, its link less its twist.",
     "found": "A branch through an equilibrium that a search by deflation found.",
     "depth | branch_points_not_followed": (
         "Number of switches from the first branch; the plan says how many are followed."

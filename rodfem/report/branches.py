@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from rodfem.report.packing import plain
 from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
 from rodfem.report.words import words_of
+from rodfem.tolerances import NEGLIGIBLE
 from rodfem.writhe import writhe
 
 UNLISTED = ("load", "negative", "zero", "mesh", "unstable", "negative_in_space", "drift", "error")
@@ -43,7 +45,7 @@ def branch_data(
     columns = branch["columns"]
     words = words_of(branch, planar=planar)
     told = list(dict.fromkeys(words))
-    ordinates = {name: plain(np.array(columns[name], dtype=float)) for name in _listed(columns)} | _derived(shapes)
+    ordinates = {name: _clear(columns[name], natural.get(name, 0.0)) for name in _listed(columns)} | _derived(shapes)
     return {
         "name": branch["name"],
         "colour": colour,
@@ -64,6 +66,13 @@ def branch_data(
         "frequencies": frequencies_of(branch),
         "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
     }
+
+
+def _clear(values: Iterable[Any], size: float) -> list[float | None]:
+    """Values of an ordinate; zero where they are the round-off of numbers of its natural ``size``."""
+    found = np.array([nan if value is None else value for value in values], dtype=float)
+    found[abs(found) < NEGLIGIBLE * size] = 0.0
+    return plain(found)
 
 
 def _spectrum(branch: Mapping[str, Any]) -> list[list[float]] | None:

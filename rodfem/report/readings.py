@@ -8,13 +8,11 @@ from typing import Any
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.digits import number
-from rodfem.output.endings import endings
+from rodfem.output.endings import is_solved
 from rodfem.tolerances import unit
 
 READ = ("load", "ordinate")
 """Numbers of a row whose errors files have; those of energies and of left-most eigenvalues are not estimated."""
-SQUEEZED = "stretch reaches zero"
-"""Reason of an end at a load that is solved for."""
 GIVEN = "(given)"
 """What stands in place of a bound at a load that was asked for."""
 
@@ -33,7 +31,7 @@ def readings_of(branch: Mapping[str, Any], natural: Mapping[str, float]) -> list
         values = {name: columns[name][row] for name in READ if name in sizes}
         found.append({name: number(x, error * unit(x, one=sizes[name])) for name, x in values.items() if x is not None})
     for special in branch["special"]:
-        solved = not KINDS[special["kind"]].given or (special["row"], SQUEEZED) in list(endings(branch))
+        solved = not KINDS[special["kind"]].given or is_solved(branch, special)
         found[special["row"]] = _of_special(special, solved)
     return found
 

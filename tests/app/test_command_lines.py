@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from hemitropic_cases import run_demo
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from rodfem.app import petsc_options
 from rodfem.diagram import solver
@@ -117,6 +118,11 @@ def test_options_of_petsc_that_are_read() -> None:
         with pytest.raises(InputError):
             petsc_options.check(words)
     assert petsc_options.unread(["-rodfem_nothing", "3", "-log_view"]) == ["-rodfem_nothing"]
+    PETSc.Options()["rodfem_number"] = 3
+    assert petsc_options.unread(["-rodfem_number", "3"]) == ["-rodfem_number"]
+    assert PETSc.Options().getInt("rodfem_number") == 3
+    assert petsc_options.unread(["-rodfem_number", "3"]) == []
+    PETSc.Options().delValue("rodfem_number")
 
 
 @pytest.mark.alone

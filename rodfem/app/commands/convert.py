@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rodfem.app.cli import Parser, folder, run_folder
 from rodfem.output.convert import FORMATS
+from rodfem.output.files import load_json
 from rodfem.whole_files import writing
 
 
@@ -18,6 +19,7 @@ def main(words: Sequence[str]) -> None:
     parser.add_argument("--output", type=folder, metavar="DIR", help="folder for the files (default FOLDER/FORMAT)")
     options = parser.parse_args(words)
     target: Path = options.output or options.folder / options.format
+    load_json(options.folder / "diagram.json")  # no folder is made for a run that there is not
     with writing(target):
         target.mkdir(parents=True, exist_ok=True)
     for path in FORMATS[options.format](options.folder, target):

@@ -10,6 +10,7 @@ from rodfem.app.cli import Parser, run_folder
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.contents import read_diagram
 from rodfem.output.digits import number
+from rodfem.output.endings import is_solved
 from rodfem.output.summary import in_sentences
 
 NEEDED = ("parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
@@ -34,19 +35,20 @@ def lines(data: Mapping[str, Any]) -> Iterator[str]:
     scale = max((abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"]), default=0.0)
     for branch in data["branches"]:
         for special in branch["special"]:
-            yield f"  {branch['name']:<12} {special['kind']:<13} {_values(special, scale)}"
+            given = KINDS[special["kind"]].given and not is_solved(branch, special)
+            yield f"  {branch['name']:<12} {special['kind']:<13} {_values(special, scale, given)}"
         yield f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}"
     yield from (f"  {sentence}" for sentence in in_sentences(data))
 
 
-def _values(special: Mapping[str, Any], scale: float) -> str:
-    """Load, ordinate and index of a special point; a load that was given is exact; ``scale`` is that of ordinates."""
+def _values(special: Mapping[str, Any], scale: float, given: bool) -> str:
+    """Load, ordinate and index of a special point; a load that was ``given`` is exact; ``scale`` is of ordinates."""
     bars = [special.get(name) for name in ("error_estimate", "ordinate_error_estimate")]
     load, ordinate = (
         number(special[name], inf if bar is None else bar, special.get("resolved"), scale * (name == "ordinate"))
         for name, bar in zip(("load", "ordinate"), bars, strict=True)
     )
-    if KINDS[special["kind"]].given:
+    if given:
         load = f"{special['load']:.10g}"
     before, after = special["negative_before"], special["negative_after"]
     index = f"{before}" if before == after else f"{before}->{after}"

@@ -1,6 +1,6 @@
 // All states at one load, side by side: between two rows a state is interpolated for its picture.
 
-import { data, digits, unit } from "report/data";
+import { counted, data, digits, unit } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { between, pointsOf } from "report/curve";
 import { listeners, makeRod, makeStripe, ROD, shapeOf, stage as main } from "report/rod";
@@ -33,14 +33,14 @@ const verdict = (kind) => (kind === STABLE ? "stable" : kind === PLANAR ? "plana
 function card(found) {
   const b = data.branches[found.number], button = document.createElement("button"), name = document.createElement("span");
   button.type = "button";
-  button.title = `${b.name}, ${found.piece.kind}, index ${found.piece.index}, between rows ${found.row} and ${found.row + 1}`;
+  button.title = `${b.name}, ${[found.piece.kind, counted(b, found.piece.index)].filter(Boolean).join(", ")}, between rows ${found.row} and ${found.row + 1}`;
   button.setAttribute("aria-pressed", found.number === state.branch && Math.abs(nearest(found) - state.row) <= 1);
   name.className = "name";
   const swatch = document.createElement("i"), index = document.createElement("b"), title = document.createElement("span");
   swatch.className = "swatch";
   swatch.style.background = b.colour;
   index.className = verdict(found.piece.kind);
-  index.textContent = `${found.piece.kind === STABLE ? "●" : "◌"} index ${found.piece.index}`;
+  index.textContent = `${found.piece.kind === STABLE ? "●" : "◌"} ${counted(b, found.piece.index) || "stable"}`;
   title.textContent = b.name;
   name.append(swatch, index, title);
   const canvas = document.createElement("canvas");

@@ -46,6 +46,9 @@ export function reading(branch, row, name) {
 // The unit of a number of a row, with the space before it; nothing where it has none.
 export const unit = (name) => (data.units[name] ? ` ${data.units[name]}` : "");
 
+// What is counted at a state: its index, or under loads without potential its squared frequencies, of which none is no news.
+export const counted = (b, index) => (b.omega2 ? (index === "0" ? "" : `${index} of ω²`) : `index ${index}`);
+
 // A number whose error is not estimated.
 export function rough(x, count = 6) {
   return x === null || x === undefined ? "unknown" : `~${digits(x, count)}`;

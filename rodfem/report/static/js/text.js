@@ -1,6 +1,6 @@
 // The state in words: titles, verdict, and where the report comes from.
 
-import { data, digits, reading, rough, unit } from "report/data";
+import { counted, data, digits, reading, rough, unit } from "report/data";
 import { branch, state, subscribe, words } from "report/store";
 
 const at = (id) => document.getElementById(id);
@@ -12,7 +12,7 @@ const NAMES = { stable: "STABLE", unstable: "UNSTABLE", planar: "STABLE IN PLANE
 function redraw() {
   const b = branch(), { verdict, index, sentence } = words(b, state.row), special = b.special.find((x) => x.row === state.row);
   at("badge").className = `badge ${verdict}`;
-  at("badge").textContent = `${NAMES[verdict]} · index ${index}`;
+  at("badge").textContent = [NAMES[verdict], counted(b, index)].filter(Boolean).join(" · ");
   at("state-load").textContent = `${data.symbol} = ${reading(b, state.row, "load")}${unit("load")}`;
   at("state").textContent = `${b.name}, row ${state.row} of ${b.load.length}`;
   const numbers = READ.map(({ key, name }, i) => `${name} = ${reading(b, state.row, key)}${unit(key)}${i < READ.length - 1 ? "; " : ""}`);
