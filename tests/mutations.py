@@ -1652,6 +1652,18 @@ FAULTS = {
         "word.encode()",
         "tests/app/test_command_lines.py",
     ),
+    "infinite-eigenvalues-are-their-rayleigh-quotients": Fault(
+        "rodfem/stability/finite_pairs.py",
+        "or off > NONE * abs(value)):",
+        "or False):",
+        "tests/diagram/test_light_rods.py",
+    ),
+    "a-pole-is-a-divergence": Fault(
+        "rodfem/diagram/critical_loads.py",
+        "            if beyond:",
+        "            if False:",
+        "tests/diagram/test_light_rods.py",
+    ),
     "gaps-that-are-jumped-are-forgotten": Fault(
         "rodfem/diagram/special_search.py",
         "                self._jumped(p, q)\n",

@@ -223,8 +223,15 @@ class CriticalLoads:
 
             try:
                 found.append(self._zero(mu, loads[0], loads[1], self._near(guess, loads[0]).noise))
+                beyond = abs(mu(found[-1])) > min(abs(mu(loads[0])), abs(mu(loads[1])))
             except (ConvergenceError, IndexError, ValueError):
                 words = f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
+                return Told(doubts=[words])
+            if beyond:  # a pole: of a rod whose mass is all at a few points, where these do not move
+                words = (
+                    f"At {self._load} = {found[-1]:.8g} an eigenvalue changes its sign through infinity, not zero: the "
+                    "motion there has no inertia; give the rod a mass along it."
+                )
                 return Told(doubts=[words])
         together: list[list[float]] = []
         for load in sorted(found):

@@ -67,6 +67,11 @@ DRAWN = 3.0
 That is, beside a body of 1e6 times the rod's mass, what another shift changes it by: 1e-6 of the fourth, 1e-4 of the
 last one of a dozen.
 """
+NONE = 0.3
+"""Distance of an eigenvalue from its Rayleigh quotient, relative, above which it has no digit: an infinite one.
+
+It is 1 of those, which beside a body of 1e6 times the rod's mass lie among the finite ones, and 0.03 and less of these.
+"""
 SPARE = 2
 """Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
 
@@ -161,11 +166,12 @@ class FinitePairs:
             moved = sum((x * heavy).norm() ** 2 for x in (re, im))
             noise = stiffness * (re.norm() ** 2 + im.norm() ** 2)
             beyond = abs(value - target) > far
-            if beyond and inertia * moved > LOST * kinetic:
+            off = self._off(value, re, im) if beyond or value.imag else 0.0
+            if beyond and (inertia * moved > LOST * kinetic or off > NONE * abs(value)):
                 continue
             parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
-            if value.imag and abs(value.imag) <= DRAWN * self._off(value, re, im):
+            if value.imag and abs(value.imag) <= DRAWN * off:
                 value = value.real
             noisy = bool(noise > DOUBT * size * kinetic)
             own = [part[self.own].copy() for part in parts]

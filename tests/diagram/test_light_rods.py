@@ -1,0 +1,61 @@
+"""A light rod with a heavy tip under a follower load: infinite eigenvalues of its pencil lie among the finite ones.
+
+Of a rod without mass the tip moves as the mass on a spring, with ``mu = P^(3/2) / (sin a - a cos a)``, ``a = P^(1/2)``,
+for a mass of one: it is positive up to ``tan a = a``, P = 20.190728556, and passes there through infinity.  No load is
+critical: the statics of a cantilever under a follower load is regular at every load (Beck 1952).
+"""
+
+from __future__ import annotations
+
+from math import cos, hypot, sin, sqrt
+
+import pytest
+
+from forms.energy import bending_and_twist
+from rodfem import Attachment, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free, trace
+from rodfem.continuation.kinds import END
+
+pytestmark = pytest.mark.alone
+POLE = 20.190728556
+
+
+def light(mass: float, span: tuple[float, float]) -> Scene:
+    return Scene(
+        name="light", interval=(0.0, 1.0), rod="unshearable and inextensible", planar="e1",
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 3.0, 1.0)),
+        parameters={"P": Parameter(0.0), "rho": Parameter(mass)}, load="P", span=span,
+        ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))),
+        inertia=Inertia(rho_A=lambda c: c.rho, rho_I=lambda c: (0.0, 0.0, 0.0)),
+        attachments=(Attachment(1.0, mass=lambda c: 1.0),),
+        ordinate=Ordinate("deflection of the tip", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
+    )  # fmt: skip
+
+
+def slowest(P: float) -> float:
+    a = sqrt(P)
+    return P * a / (sin(a) - a * cos(a))
+
+
+@pytest.mark.parametrize(
+    ("mass", "elements", "span"),
+    [(1e-6, 12, (4.0, 6.0)), (1e-6, 6, (0.0, 0.05)), (1e-8, 6, (5.0, 5.1)), (1e-5, 20, (4.0, 6.0))],
+)
+def test_infinite_eigenvalues_make_no_rod_unstable(mass: float, elements: int, span: tuple[float, float]) -> None:
+    """They came as complex pairs of 1e12, whose parts were taken for round-off of negative ones."""
+    diagram = trace(light(mass, span), Discretization(elements=elements), Plan(depth=0, error_bars=False))
+    (branch,) = diagram
+    assert [special.kind for special in branch.special] == [END]
+    assert {point.negative for point in branch.points} == {0}
+    assert not branch.unexplained
+    if span[0] > 0:
+        found = min((real for real, _ in branch.points[0].omega2), key=abs)
+        assert found == pytest.approx(slowest(span[0]), rel=10 * mass + 1e-7)
+
+
+def test_a_sign_that_changes_through_infinity_is_no_divergence() -> None:
+    diagram = trace(light(0.0, (0.0, 30.0)), Discretization(elements=6), Plan(depth=0, error_bars=False))
+    (branch,) = diagram
+    assert [special.kind for special in branch.special] == [END]
+    assert all(point.negative == (point.load > POLE) for point in branch.points)
+    (said,) = [w for w in diagram.warnings if "through infinity" in w]
+    assert float(said.split("P = ")[1].split()[0]) == pytest.approx(POLE, abs=1e-5)
