@@ -223,7 +223,8 @@ class CriticalLoads:
 
             try:
                 found.append(self._zero(mu, loads[0], loads[1], self._near(guess, loads[0]).noise))
-                beyond = abs(mu(found[-1])) > min(abs(mu(loads[0])), abs(mu(loads[1])))
+                ends = min(abs(mu(loads[0])), abs(mu(loads[1])))
+                beyond = abs(mu(found[-1])) > max(ends, self.units.omega2)
             except (ConvergenceError, IndexError, ValueError):
                 words = f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
                 return Told(doubts=[words])
