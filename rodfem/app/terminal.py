@@ -293,7 +293,7 @@ class Report(Observer):
         if coarse := sum(s.resolved is False for b in branches for s in b.special):
             self.warn(
                 f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: the value in parentheses is "
-                "no bound there, and the rod need not have such a point; use more elements or a higher degree."
+                "no bound there, and whether the rod has such a point is open; use more elements or a higher degree."
             )
         missed = not_followed(branches)
         if missed:

@@ -147,8 +147,8 @@ ENTRIES = {
         "richer mesh. The error of the model is not in it."
     ),
     "at least | resolved | not resolved": (
-        "The mesh does not resolve the state: the number in parentheses is no bound, and the rod need not have "
-        "such a state."
+        "The mesh does not resolve the state: the number in parentheses is no bound, and whether the rod has such "
+        "a state is open."
     ),
     "no estimate": "The second computation that bounds the error failed, or was not asked for.",
     "located to | located_to": (

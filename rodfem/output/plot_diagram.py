@@ -225,14 +225,14 @@ def _footer(diagram: Mapping[str, Any]) -> str:
         parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
     special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
     counted = [point for point in special if point["kind"] in COUNTED]
-    coarse = sum(point.get("resolved") is False for point in counted)
+    coarse = sum(point.get("resolved") is False for point in special)
     errors = [None if point.get("resolved") is False else point.get("error_estimate") for point in counted]
     known = [abs(error) for error in errors if error is not None and math.isfinite(error)]
     if known:
         share = f" (of {len(known)} out of {len(errors)})" if len(known) < len(errors) else ""
         parts.append(f"error of the loads of special points at most {at_most(max(known))}{share}")
     if coarse:
-        parts.append(f"{coarse} of {len(counted)} special points not resolved by the mesh")
+        parts.append(f"{coarse} of {len(special)} special points not resolved by the mesh")
     return "; ".join(parts)
 
 

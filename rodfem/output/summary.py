@@ -107,10 +107,13 @@ def _state(interval: Interval, data: Mapping[str, Any]) -> str:
 def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
     """Ranges of the load without a stable state, and with several."""
     load, stable = data["parameter"], stable_ones(data["branches"])
+    undecided = [x for branch in data["branches"] for x in intervals_of(branch) if x.kind == UNDECIDED]
     low, high = sorted(data["range"])
     for a, b in without_stable(stable, low, high):
         first, last = told_apart(a, b, width=_width(data))
-        yield f"From {load} = {first} to {last} no stable state was found."
+        doubt = any(x.covers[0] < b and x.covers[1] > a for x in undecided)
+        but = ", but there are states of undecided stability" if doubt else ""
+        yield f"From {load} = {first} to {last} no stable state was found{but}."
     pairs = list(coexisting(stable))
     for one, other, a, b in pairs[:MOST_NAMES]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))

@@ -169,7 +169,8 @@ def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
     """Basis of the span of complex vectors (n, k), orthonormal in the mass; ``weighed`` are their products with it.
 
-    The ranks of ``comm`` share the rows.
+    Zero for what has no mass, as a light rod where a parameter takes it away.  The ranks of ``comm`` share the rows.
     """
     parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
-    return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))
+    sizes = np.maximum(parts, EPS * parts[-1])
+    return np.asarray(vectors @ (turn / np.sqrt(np.where(sizes > 0.0, sizes, np.inf))))

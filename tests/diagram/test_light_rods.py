@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from math import cos, hypot, sin, sqrt
 
+import numpy as np
 import pytest
+from mpi4py import MPI
 
 from forms.energy import bending_and_twist
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free, trace
 from rodfem.continuation.kinds import END
+from rodfem.stability.frequencies import orthonormal
 
 pytestmark = pytest.mark.alone
 POLE = 20.190728556
@@ -59,3 +62,9 @@ def test_a_sign_that_changes_through_infinity_is_no_divergence() -> None:
     assert all(point.negative == (point.load > POLE) for point in branch.points)
     (said,) = [w for w in diagram.warnings if "through infinity" in w]
     assert float(said.split("P = ")[1].split()[0]) == pytest.approx(POLE, abs=1e-5)
+
+
+def test_what_has_no_mass_is_no_part_of_a_basis() -> None:
+    vectors = np.eye(4, 2, dtype=complex)
+    assert not orthonormal(MPI.COMM_WORLD, vectors, 0.0 * vectors).any()
+    assert np.allclose(abs(orthonormal(MPI.COMM_WORLD, vectors, 4.0 * vectors)[:2]), np.eye(2) / 2)

@@ -239,6 +239,7 @@ def test_undecided_stability_is_no_stability() -> None:
     words = said(branch("straight", loads, [0, 0, 0, 0], columns=columns))
     assert "straight, is stable from P = 0 to some load between 1 and 2" in words
     assert "then of undecided stability" in words and "its whole range" not in words
+    assert "no stable state was found, but there are states of undecided stability" in words
     for index, undecided in (([0, 0, 1, 1], [1, 1, 0, 0]), ([1, 1, 0, 0], [0, 0, 1, 1])):
         words = said(branch("straight", loads, index, columns={"undecided": undecided}))
         assert "to some load between 1 and 2, where it has an eigenvalue that is not told from zero" in words
