@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,18 @@ from mpi4py import MPI
 from rodfem import compat
 
 gc.disable()  # destroying PETSc objects is collective: it must not happen on one rank earlier than on another
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest selects by marks
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of a test marked ``few(number)`` the values beyond so many that are not ``long`` are ``long``, too."""
+    met: Counter[tuple[Path, str]] = Counter()
+    for item in items:
+        few, name = item.get_closest_marker("few"), getattr(item, "originalname", item.name)
+        if few and not item.get_closest_marker("long"):
+            met[item.path, name] += 1
+            if met[item.path, name] > few.args[0]:
+                item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(autouse=True, scope="module")

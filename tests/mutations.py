@@ -1,6 +1,7 @@
 """Faults planted by hand, one at a time, each of which the tests must catch: ``python -m tests.mutations [NAME ...]``.
 
-A fault is a few characters changed in one file.  The tests named with it run on a copy of the tree, and must fail.
+A fault is a few characters changed in one file.  The tests named with it run on a copy of the tree, and must fail:
+those of ``make test``, or, where they pass, those marked ``long``, which is said.
 ``tests/house/test_mutations.py`` checks that every fault still has its place in the code.
 """
 
@@ -1901,17 +1902,20 @@ def caught_by(fault: Fault) -> str:
             (tree / file).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(HOME / file, tree / file)
         place, whole = tree / fault.file, (tree / fault.file).read_text()
-        place.write_text(planted(whole, fault))
-        failed = first_failure(tree, fault.tests.split())
-        place.write_text(whole)
-        if failed and (always := first_failure(tree, [failed])):
-            return f"NOT CAUGHT: without the fault, too, {always} fails"
-        return failed
+        for marks in ("not long", "long"):
+            place.write_text(planted(whole, fault))
+            failed = first_failure(tree, fault.tests.split(), marks)
+            place.write_text(whole)
+            if failed and (always := first_failure(tree, [failed], "")):
+                return f"NOT CAUGHT: without the fault, too, {always} fails"
+            if failed:
+                return failed + " (long)" * (marks == "long")
+        return ""
 
 
-def first_failure(tree: Path, tests: list[str]) -> str:
-    """Name of the first test that fails in a copy of the tree; empty where all pass."""
-    options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "-m", "not long"]
+def first_failure(tree: Path, tests: list[str], marks: str) -> str:
+    """Name of the first test with such ``marks`` that fails in a copy of the tree; empty where all pass."""
+    options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "-m", marks]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *options, *tests],
         cwd=tree,

@@ -4,14 +4,14 @@
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
-# Serially, those marked `long` run with all=yes in the environment only.  Two ranks do without the tests marked `alone`
-# that are not `short`.  With quick=yes there are only the tests marked `versions`: serially, and of them on two ranks what
-# two ranks run.
+# Those marked `long` run with all=yes in the environment only, but on ranks where they are `short`.  Two ranks do without
+# the tests marked `alone` that are not `short`.  With quick=yes there are only the tests marked `versions`: serially, and
+# of them on two ranks what two ranks run.
 set -eu
 cd "$(dirname "$0")/.."
-marks="not alone or short" serial="not long"
-[ "${all-}" != yes ] || serial=
-[ "${quick-}" != yes ] || marks="versions and ($marks)" serial=versions
+marks="short or not (alone or long)" serial="not long"
+[ "${all-}" != yes ] || marks="short or not alone" serial=
+[ "${quick-}" != yes ] || marks="versions and ($marks)" serial="versions and not long"
 python=$1 mpirun=$2 limit=$3
 shift 3
 

@@ -61,6 +61,7 @@ def claimed(branches: list[Branch]) -> float:
     return max(rows)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @ACCURACIES
 def test_cord(accuracy: float) -> None:
@@ -72,6 +73,7 @@ def test_cord(accuracy: float) -> None:
     assert claimed(found.branches) <= accuracy
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @ACCURACIES
 def test_hemitropic(accuracy: float) -> None:
@@ -86,6 +88,7 @@ def test_hemitropic(accuracy: float) -> None:
     assert claimed(found.branches) <= accuracy
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-9])
 def test_every_row_of_an_elastica(accuracy: float) -> None:
@@ -110,6 +113,7 @@ def pulled(accuracy: float) -> Diagram:
     return explored(boundary_layer.scene(), accuracy, at=(4.0, 5.0))
 
 
+@pytest.mark.long
 @ACCURACIES
 @pytest.mark.alone
 def test_every_row_of_a_taut_rod(accuracy: float) -> None:
@@ -141,6 +145,7 @@ def test_graded_mesh_beats_uniform_ones() -> None:
     assert abs(uniform.shape.ordinate(x) - boundary_layer.shortening(6.0)) > error
 
 
+@pytest.mark.long
 def test_what_was_used_where(folder: Path) -> None:
     """Files name the mesh of each row; rows of all meshes are read back, on another mesh too."""
     scene = boundary_layer.scene((3.0, 4.5))
@@ -188,6 +193,7 @@ def test_bad_accuracy(accuracy: float) -> None:
         Plan(scene.span, accuracy=accuracy).check(scene)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_accuracy_of_a_sweep_of_a_soft_notch() -> None:
     """Coarse meshes do not see it: the first refinement changes less than the second.  By 200 Hermite elements."""
@@ -203,6 +209,7 @@ def test_accuracy_of_a_sweep_of_a_soft_notch() -> None:
     assert flutter.point.load == pytest.approx(17.9732, rel=1e-3) and not flutter.note
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(("accuracy", "number"), [(1e-3, 6), (1e-6, 12)])
 def test_accuracy_of_a_sweep(accuracy: float, number: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -232,6 +239,7 @@ def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixtur
         assert "error: --accuracy chooses elements and degree itself: leave out --" in capfd.readouterr().err
 
 
+@pytest.mark.few(2)
 @pytest.mark.alone
 @pytest.mark.parametrize(
     ("vertices", "words"),

@@ -65,6 +65,7 @@ def tip(P: float) -> float:
     return float(2 * sqrt(brentq(lambda m: ellipk(m) - sqrt(P), 0.0, 1 - 1e-12, xtol=1e-16) / P))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "mesh",
     [*(pytest.param(x, marks=pytest.mark.alone) for x in [(8, 1), (3, 2), (4, 3), (2, 4), (4, 5), (2, 6)]), (8, 6)],
@@ -92,6 +93,7 @@ def bent(P: float) -> OdeSolution:
     return from_clamp(brentq(lambda k: from_clamp(k).y[1, -1], P / 2, 2 * P, xtol=1e-15)).sol
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(
     ("mesh", "place"), [pytest.param((1, 4), 0.102, marks=pytest.mark.alone), ((2, 3), 0.078), ((2, 5), 0.622)]
@@ -106,6 +108,7 @@ def test_deflection_inside_of_an_element(mesh: tuple[int, int], place: float) ->
     assert abs(found.point.ordinate - bent(3.0)(place)[2]) <= found.ordinate_error
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mesh", [(6, 4), *(pytest.param(x, marks=pytest.mark.alone) for x in [(8, 5), (12, 4)])])
 def test_ring(mesh: tuple[int, int]) -> None:
     """Michell's ring: ``C t = sqrt(n^2 - 1)``; what one degree more still misses counts."""
@@ -115,6 +118,7 @@ def test_ring(mesh: tuple[int, int]) -> None:
         check(s.point.load, sqrt(n * n - 1) / 1.5, s.error_estimate)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("mesh", [(8, 2), (4, 4), (4, 6), (6, 6)])
 def test_deep_arch(mesh: tuple[int, int]) -> None:
@@ -124,6 +128,7 @@ def test_deep_arch(mesh: tuple[int, int]) -> None:
     check(fold.point.load, DEEP, fold.error_estimate)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])
 def test_deep_arch_to_an_accuracy(accuracy: float) -> None:
@@ -132,6 +137,7 @@ def test_deep_arch_to_an_accuracy(accuracy: float) -> None:
     assert abs(fold.point.load - DEEP) <= fold.error_estimate <= accuracy * DEEP
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_arithmetic_of_many_elements() -> None:
     """Where the discretisation is exact the eigenvalue that vanishes has the round-off of a stiff matrix."""
@@ -171,6 +177,7 @@ def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
         assert "does not resolve" in stream.getvalue()
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_an_accuracy_is_not_reached_by_accident() -> None:
     """Points that agree on two meshes to the accuracy asked for, and are not resolved, are computed on a finer one."""
@@ -211,6 +218,7 @@ LAWS = {
 }
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("mesh", [(4, 3), (4, 5), (8, 6)])
 @pytest.mark.parametrize("name", LAWS)
@@ -259,6 +267,7 @@ def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch)
     assert moved > 1e-6
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_ordinate_of_a_branch_point_beside_a_soft_mode() -> None:
     """A nearly round column (1e-8) buckles; where it is straight its mode may turn by 1e-9, and 3e-10 are measured."""
@@ -284,6 +293,7 @@ def test_round_off_that_two_meshes_have_alike_has_no_bar() -> None:
         trace(scene, plan=Plan(depth=0, accuracy=1e-6))
 
 
+@pytest.mark.long
 def test_a_bar_is_no_less_than_the_location_and_a_law_of_another_kind_has_none() -> None:
     """Of Euler's column, whose mesh leaves no error, with a location that is said to be poor."""
     diagram = trace(classics.euler("pinned-pinned"), Discretization("reduced", 8, 8), Plan(span=(0.0, 12.0), depth=1))

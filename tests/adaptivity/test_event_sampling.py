@@ -122,6 +122,7 @@ def traced(mesh: tuple[int, int]) -> Diagram:
     return rodfem.trace(rod(), Discretization("auto", *mesh), Plan(depth=0, events=events))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", [pytest.param(x, marks=[pytest.mark.alone] * (x != "largest deflection")) for x in EVENTS]
 )
@@ -177,6 +178,7 @@ def test_places_that_do_not_matter_cost_nothing(of: Callable[[Any], float]) -> N
     assert len(where_places_matter(solver.shape, Event("sum", of=lambda st: st.r.sum()), x, 1e-14)) == 2
 
 
+@pytest.mark.long
 def test_a_function_that_takes_no_more_places_has_no_bar() -> None:
     """It is said in the note of the special point."""
 
@@ -192,6 +194,7 @@ def test_a_function_that_takes_no_more_places_has_no_bar() -> None:
     assert "no error estimate: with more places along the rod the event 'short' fails with ValueError" in event.note
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mesh", [pytest.param((8, 6), marks=pytest.mark.alone), (7, 2)])
 def test_a_function_that_jumps_from_node_to_node_has_no_bar(mesh: tuple[int, int]) -> None:
     """The place at half height is a node: by shooting it may be elsewhere by more than samples tell."""

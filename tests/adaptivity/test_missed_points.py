@@ -39,6 +39,7 @@ def lost(diagram: Diagram) -> list[float]:
     return [s.point.load for s in diagram[0].special if s.kind == BRANCH_POINT]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("given", [{}, {"potential": lambda x, c: 1e6 * ufl.exp(6 * c.P) * x.q[3] ** 2}])
 def test_branch_points_that_only_a_finer_mesh_has(given: dict[str, Any]) -> None:
     """Between the critical thrust and that of a coarse mesh, which is larger: two branch points, or none.
@@ -59,6 +60,7 @@ def test_branch_points_that_only_a_finer_mesh_has(given: dict[str, Any]) -> None
     assert said(trace(pushed_to(EULER - 0.1, **given), COARSE, plan), "branch points") == []
 
 
+@pytest.mark.long
 def test_folds_that_only_a_finer_mesh_has() -> None:
     """A soft ring with an element of 1e-4: the third of its branches has one fold on one mesh, three on another."""
     scene = wider.scene(13, 134)[0]
@@ -70,6 +72,7 @@ def test_folds_that_only_a_finer_mesh_has() -> None:
     assert len(said(few, "folds")) == 1 and said(many, "folds") == []
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize(
     ("values", "places"),
     [

@@ -22,6 +22,7 @@ def stretched(v: Any, k: Any, c: Any) -> Any:
     return (v[2] - 1) ** 2 / (1 + c.a * ufl.sin(3 * c.s)) + bending_and_twist(k, (9.0, 9.0, 9.0))
 
 
+@pytest.mark.long
 def test_no_state_is_computed_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     """``v3 = 1 - P (1 + a sin(3 s))/2`` vanishes first at ``s = pi/6``, inside of an element, and ``P = 2/(1 + a)``."""
     asked: Counter[tuple[int, float]] = Counter()
@@ -43,6 +44,7 @@ def test_no_state_is_computed_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(finer) == {1}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("largest", [0.2, 0.11, 0.05])
 def test_a_branch_point_in_the_last_step_before_the_end(largest: float) -> None:
     """A pinned rod on a spring e turns as a rigid body where ``(e v - P) v < 0`` with the stretch ``v = 1 - P/40``."""

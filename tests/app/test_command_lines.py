@@ -152,6 +152,7 @@ def test_programs_that_draw(main, line: str, words: str, capfd: pytest.CaptureFi
     assert words in err
 
 
+@pytest.mark.few(6)
 @pytest.mark.alone
 @pytest.mark.parametrize(
     ("program", "line", "words"),

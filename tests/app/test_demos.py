@@ -60,6 +60,7 @@ def test_a_demo_is_a_lesson(name: str) -> None:
         assert f"demos/{name}.py" in command
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_demo_with_options_is_the_command(folder: Path) -> None:
     words = ["--turns", "3", "--elements", "0"]

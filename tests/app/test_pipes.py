@@ -15,6 +15,7 @@ PROGRAMS = {
 LINES = "    for _ in range(100_000): print('a line')\n"
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("kind", PROGRAMS)
 def test_a_reader_that_leaves_ends_the_program_quietly(tmp_path: Path, kind: str) -> None:

@@ -41,6 +41,7 @@ FUNCTION = FUNCTION.replace("Parameter(1.0)", "Parameter(EI)")
 FUNCTION += "\ndef mesh(EI=1) -> Discretization:\n  return Discretization(elements=5)\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("text", [SCENE, FUNCTION])
 def test_a_file_with_a_rod(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Euler's load is pi^2 EI / 4; the elements are those of the file's mesh where it has one."""
@@ -91,6 +92,7 @@ def test_a_load_is_no_constant(tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert capsys.readouterr().err == "error: P is the load, which a run varies: give its range, --range FROM TO.\n"
 
 
+@pytest.mark.long
 def test_a_file_that_runs_its_rod_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The rod is traced once, over the range of the command line, and nothing is written where the file says."""
     file, there, here = (tmp_path / name for name in ("mine.py", "there", "here"))

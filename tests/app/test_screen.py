@@ -192,6 +192,7 @@ def test_an_error_leaves_the_terminal_as_it_was() -> None:
     assert seen.text.endswith("\x1b[2K") and seen.text.count("\x1b[?25l") == seen.text.count("\x1b[?25h") == 1
 
 
+@pytest.mark.long
 def test_an_interrupt_is_one_sentence(folder: Path) -> None:
     """By the key, as a person does it: the terminal sends the signal.  The line that changes is gone by then."""
     command = ["run", str(HOME / "demos" / "cord.py"), "--elements", "200", "--no-figures", "--output", str(folder)]

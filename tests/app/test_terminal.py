@@ -77,6 +77,7 @@ def test_energy_is_that_of_the_rod_alone(folder: Path, printed: Any) -> None:
     assert not FIRST or re.search(r"ordinate +int W ds +index", out)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("rod", "ignored", "better"),
     [
@@ -115,6 +116,7 @@ def test_strains_that_an_energy_does_not_have() -> None:
 # --- eigenvalues and indices -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_inertia_of_the_spectrum_is_named(folder: Path, printed: Any) -> None:
     rod, plan = replace(compressed(), span=(0.0, 0.1)), Plan(spectrum=1, error_bars=False)
     own = replace(rod, inertia=Inertia(rho_I=lambda c: (2.0, 2.0, 2.0)))
@@ -131,6 +133,7 @@ def test_inertia_of_the_spectrum_is_named(folder: Path, printed: Any) -> None:
     assert first == pytest.approx(2 * second, rel=1e-9)
 
 
+@pytest.mark.long
 def test_what_is_counted_under_loads_without_potential(folder: Path, printed: Any) -> None:
     beck = demo_cases.scene("follower", span=(0.0, 5.0))
     mesh = Discretization("pointwise", 4, 4)
@@ -146,6 +149,7 @@ def test_what_is_counted_under_loads_without_potential(folder: Path, printed: An
 # --- branch points that are not followed -----------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_branch_points_below_the_depth_are_counted(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     common = ("--range", "0", "0.2", "--elements", "6", "--degree", "3", "--no-figures", "--output", str(folder))
     run_demo(*common, "--depth", "0")
@@ -166,6 +170,7 @@ def test_branch_points_below_the_depth_are_counted(folder: Path, capfd: pytest.C
 # --- documentation ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_modules_are_attributes() -> None:
     """In an interpreter that has loaded nothing else, as ``import rodfem; help(rodfem.modes.modes)``."""
     if not FIRST:
@@ -190,6 +195,7 @@ def test_what_is_no_module_is_named() -> None:
     assert "Modes of one state" in pydoc.render_doc(rodfem.modes.modes)
 
 
+@pytest.mark.long
 def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """All its blocks, one after the other, as they stand."""
     monkeypatch.setattr("rodfem.app.run.draw", lambda *_: None)
@@ -217,6 +223,7 @@ def test_an_equilibrium_that_there_is_not() -> None:
         hemitropic.equilibrium(0.5, guess=hemitropic.equilibria.system.new_vector())
 
 
+@pytest.mark.long
 def test_a_saved_state_of_another_scene(folder: Path) -> None:
     """An unshearable rod has a stretch, the one whose state was saved none."""
     run(compressed("unshearable and inextensible"), MESH, Plan(error_bars=False), folder, figures=False, quiet=True)
@@ -225,6 +232,7 @@ def test_a_saved_state_of_another_scene(folder: Path) -> None:
         stretched.restore(folder / "states.h5", "straight", 0)
 
 
+@pytest.mark.long
 def test_mu_is_an_eigenvalue_and_nothing_else(folder: Path, printed: Any) -> None:
     """The multiplier of the unit norm has a symbol of its own, in the terminal and in the file."""
     plan = Plan((0.0, 0.1), at=(0.05,), method="count", spectrum=1, error_bars=False)

@@ -21,6 +21,7 @@ def first_load(stiffness: float) -> float:
     return branch.special[0].point.load
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_three_threads_at_once() -> None:
     stiffnesses = [1.0, 1.1, 1.2]

@@ -83,6 +83,7 @@ def root(f, guess: float) -> float:  # type: ignore[no-untyped-def]
     return float(brentq(f, guess - 1e-3, guess + 1e-3, xtol=1e-15, rtol=1e-14))
 
 
+@pytest.mark.long
 def test_buckling_of_the_straight_rod() -> None:
     """On the closed form all along, with two turning points in the load, and bounds that are met exactly."""
     found = straight()
@@ -120,6 +121,7 @@ def test_straight_cord() -> None:
     assert {tuple(pair) for pair in found.index.tolist()} == {(0, 1)}
 
 
+@pytest.mark.long
 def test_fold_of_the_cord_by_shooting() -> None:
     """The state depends on both parameters; the fold by shooting is where its determinant vanishes, in the moment."""
     cord = demo("cord")
@@ -145,6 +147,7 @@ def test_fold_of_the_cord_by_shooting() -> None:
     assert {tuple(pair) for pair in found.index.tolist()} == {(1, 2)}
 
 
+@pytest.mark.long
 def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
     constants = (-2.0, 1.0, 1.0, 3.0)
     (fold,) = specials(explored(constants=constants)[2], "fold")
@@ -177,6 +180,7 @@ def test_cusp() -> None:
     assert not found.passes(replace(other, point=replace(other.point, load=0.9 * other.point.load)), units)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_each_special_point_has_its_locus_where_loads_are_small(tmp_path: Path) -> None:
     """Of a DNA molecule in metres and newtons: Euler's loads about either axis, pi^2/4 B/L^2, as the thickness grows.
@@ -214,6 +218,7 @@ def test_a_parameter_that_destroys_the_branch_point() -> None:
     assert found.ended == ("e is an imperfection that destroys the branch point, or is one on this mesh alone",) * 2
 
 
+@pytest.mark.long
 def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
     rod = demo_scene("follower", span=(19.0, 21.0))
@@ -229,6 +234,7 @@ def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None
     assert abs(found.values[-1, 0] - double(20.0, 120.0, 0.004)[0]) <= 10 * found.error[-1].max() <= 1e-9
 
 
+@pytest.mark.long
 def test_a_load_that_does_not_change_has_no_turning_points(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beck's load is that of the weak plane, whatever the stiffness of the strong one; where both are one, of both."""
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 8)
@@ -250,6 +256,7 @@ def swept(scene: Scene) -> tuple[StaticSolver, Branch]:
     return diagram.solvers[0], diagram[0]
 
 
+@pytest.mark.long
 def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Two pairs of frequencies meet at once: where each does in its plane, down to where the double one vanishes."""
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
@@ -269,6 +276,7 @@ def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, fold
     assert (found.error[0] < 1e-7).all() and found.index.tolist() == [[0, 4]] * len(found.values)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("strong", "which"), [(10.0, 0), (1.0, 1)])
 def test_divergence(strong: float, which: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """``cos sqrt P = share/(share - 1)``: one curve, through both loads of a share, which turns at one half."""
@@ -358,6 +366,7 @@ def test_no_locus_of_an_end() -> None:
         locus(follower(), end, "A", ((0.01, 0.96), (-3.1, 1.0)))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_what_is_zero_all_along_is_not_counted() -> None:
     """A straight rod spins freely about its axis, whatever a foundation does to it across: ``P = pi^2 + k/pi^2``."""
@@ -375,6 +384,7 @@ def test_what_is_zero_all_along_is_not_counted() -> None:
     assert set(map(tuple, found.index.tolist())) == {(0, 1)}
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_locus_that_bends_sharply_is_followed() -> None:
     """``P = 2 + sin(400 b)``: beyond a bend the polynomial through the last points has another tangent."""

@@ -35,6 +35,7 @@ def column(B1: float, planar: str = "") -> Diagram:
     return trace(scene, MESH, Plan(depth=0))
 
 
+@pytest.mark.long
 def test_a_rod_that_is_kept_in_its_plane_is_stable_in_that() -> None:
     """Out of its plane it buckles at half the load: the region beside its locus is not that of stability in space."""
     diagram = column(0.5, "e2")
@@ -45,6 +46,7 @@ def test_a_rod_that_is_kept_in_its_plane_is_stable_in_that() -> None:
     assert "in its plane" not in in_words(data | {"planar": False})
 
 
+@pytest.mark.long
 def test_special_points_that_are_close_have_loci_of_their_own() -> None:
     """Of two planes whose stiffnesses differ by a millionth: one load is proportional to B2, the other is not."""
     diagram = column(1 + 1e-6)
@@ -56,6 +58,7 @@ def test_special_points_that_are_close_have_loci_of_their_own() -> None:
     assert of_first.values[:, 0] == pytest.approx(pi**2 / 4 * of_first.values[:, 1], abs=1e-9)
 
 
+@pytest.mark.long
 def test_a_locus_leaves_the_symmetries_of_its_diagram() -> None:
     """A ring that bends unlike in its planes does not turn about its tangent freely; one that bends alike does."""
     diagram = trace(classics.ring(), Discretization("auto", 8, 6), Plan(depth=0, error_bars=False))
@@ -73,6 +76,7 @@ def test_a_special_point_of_another_diagram_is_refused() -> None:
         column(1.5).locus(diagram.special("branch point")[0], "B2", (0.5, 1.2))
 
 
+@pytest.mark.long
 def test_rows_have_their_bars_on_the_page() -> None:
     """Without one a row has none; ``at least`` where the mesh does not resolve its state."""
     diagram = column(0.5)
@@ -83,6 +87,7 @@ def test_rows_have_their_bars_on_the_page() -> None:
     assert "at least" in shown[0][1] and "at least" not in shown[-1][1] and shown[-1][1].startswith("1.23370055")
 
 
+@pytest.mark.long
 def test_files_without_these_entries_are_read(tmp_path: Path) -> None:
     diagram = column(0.5, "e2")
     found = diagram.locus(diagram.special("branch point")[0], "B2", (0.4, 1.2))
@@ -93,6 +98,7 @@ def test_files_without_these_entries_are_read(tmp_path: Path) -> None:
     assert not Locus.read(tmp_path / "locus-2.json").planar
 
 
+@pytest.mark.long
 def test_rows_that_the_mesh_does_not_resolve_are_said() -> None:
     """A column on a foundation: the stiffer that is, the shorter the waves by which its free end buckles."""
     rod = classics.column(

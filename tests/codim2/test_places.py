@@ -61,6 +61,7 @@ def check(found: Locus, kind: str, exact: tuple[float, float]) -> None:
     assert np.all(found.error[row] <= 1e-8 * np.diff(found.bounds)[:, 0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "number", "mark", "exact"),
     [
@@ -102,6 +103,7 @@ def test_a_double_zero_counts_as_the_row_before_it(number: int, index: list[int]
     assert found.index[:3].tolist() == [index] * 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_a_coarse_mesh_displaces_turning_points_along_the_curve(number: int) -> None:
     """The bar is the difference from a finer mesh, whose own error is some 1e-5 of that and may be 1/32."""
@@ -111,6 +113,7 @@ def test_a_coarse_mesh_displaces_turning_points_along_the_curve(number: int) -> 
     assert abs(found.values[row] - exact) == pytest.approx((1 - 1 / 32) * found.error[row], rel=1e-3)
 
 
+@pytest.mark.long
 def test_stiffness_with_a_minimum() -> None:
     """``P = (1 + (b - 0.3)^2) pi^2/4``."""
     rod = Scene(
@@ -123,6 +126,7 @@ def test_stiffness_with_a_minimum() -> None:
     check(diagram.locus(diagram.special(BRANCH_POINT)[0], "b", (0.0, 1.0), (0.0, 5.0)), "turns in P", (pi**2 / 4, 0.3))
 
 
+@pytest.mark.long
 def test_fold_that_ends_on_a_branch_point() -> None:
     """The branch ``P = f/sin f - 1 + b f2 + f2^2``, ``f2 = 2 - 2 cos f``, begins with ``(b + 1/6) f^2``."""
     model = scene(

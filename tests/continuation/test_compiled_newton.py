@@ -79,6 +79,7 @@ def test_unknown_factors_are_refused() -> None:
         Discretization(factors="superglue")
 
 
+@pytest.mark.long
 def test_a_guess_without_equations_drops_no_symmetry() -> None:
     """Where nothing was factored the matrix holds another state, and verifies nothing."""
     solver = Solver(cases()["demo hemitropic"](), Discretization("auto", 8, 6)).equilibria

@@ -46,6 +46,7 @@ def test_every_row_of_every_scene(name: str, monkeypatch: pytest.MonkeyPatch) ->
             assert (abs(a - b) < SAME * np.maximum(1.0, abs(b))).all(), (branch.name, key)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["demo hemitropic", "classic foundation", "docs bow"])
 def test_phase_conditions_are_those_of_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same number of conditions, which span the same space, with the same offsets along it, at every step."""
@@ -88,6 +89,7 @@ def test_a_symmetry_that_is_none_is_dropped(monkeypatch: pytest.MonkeyPatch) -> 
     assert not usual.warnings
 
 
+@pytest.mark.long
 def test_checks_are_of_the_state_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a step checks is what the equations and the quaternions of that state give."""
     seen, made = [], CompiledStep._made

@@ -50,6 +50,7 @@ def test_energy_grows_by_the_work_of_the_ends() -> None:
     assert WEIGHTS @ power == pytest.approx(work, abs=5e-9)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_contact_force_is_constant_and_the_same_in_both_formulations() -> None:
     rich = follower("pointwise", 8, 6)
@@ -79,6 +80,7 @@ def test_decreasing_load() -> None:
     assert user_points(first, 0.2)[0].ordinate == pytest.approx(reference_values.FIRST[0.2][0], abs=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("start", [0.0, 0.01, 0.07 / 3, 0.05, 0.1])
 def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
@@ -118,6 +120,7 @@ def test_newton_converges_quadratically() -> None:
     assert np.log(sizes[3] / sizes[2]) / np.log(sizes[2] / sizes[1]) == pytest.approx(2, abs=0.2)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:
@@ -136,6 +139,7 @@ def test_restart_on_another_discretisation(formulation: str, folder: Path) -> No
     assert other.shape.ordinate(y) == pytest.approx(reference_values.FIRST[0.5][0], abs=1e-10)
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_polynomials_survive_a_finer_mesh_and_back(formulation: str) -> None:
@@ -185,6 +189,7 @@ def _rows(branch: Branch) -> list[Point]:
     return [p for p in branch.points if id(p) not in special]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("factors", ["chain", "petsc"])
 @pytest.mark.parametrize(
     "mesh", [(4, 3), *(pytest.param(x, marks=pytest.mark.alone) for x in [(6, 3), (8, 4), (14, 6)])]
@@ -202,6 +207,7 @@ def test_an_equilibrium_is_a_first_state_that_stays(mesh: tuple[int, int], facto
         assert r[len(r) // 2] == pytest.approx((2, 0, 0), abs=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_singular_equations_are_told_in_a_sentence() -> None:
     """Two meshes of degree 1 on which the equations are exactly singular: no division by the size of nothing."""

@@ -40,6 +40,7 @@ def rod(energy: Energy, span: tuple[float, float] = (0.0, 2.0), **given: Any) ->
     return column("rod", given.pop("ends", (clamped(), free())), span, energy=energy, **given)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("energy", "until"),
     [(coupled, 1.0), *(pytest.param(*case, marks=pytest.mark.alone) for case in [(softening, 1.0), (bowl, 0.8)])],
@@ -68,6 +69,7 @@ def narrow(x: Any, width: float) -> Energy:
     return lambda v, k, c: bending_and_twist(k, (x(c) ** 2 - width**2, 2.0, 1.0))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("width", [0.02, pytest.param(0.003, marks=pytest.mark.alone)])
 def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
     (branch,) = trace(rod(narrow(lambda c: 1.0 - c.P, width)), MESH, Plan(depth=0, error_bars=False))
@@ -75,6 +77,7 @@ def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
     assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.15
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
 def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
@@ -92,6 +95,7 @@ def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
     assert found.lost == pytest.approx((1.0 - width - low) / (high - low), abs=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("width", [pytest.param(1e-2, marks=pytest.mark.alone), 1e-3])
 def test_convexity_lost_between_the_places_of_the_quadrature(width: float) -> None:
     """Twisting stiffness ``(s - 0.37)^2 + (P - 1)^2 - width^2``: negative within a width of 0.37, where P is near 1."""
@@ -105,6 +109,7 @@ def test_convexity_lost_between_the_places_of_the_quadrature(width: float) -> No
         Solver(rod(notch), MESH).equilibrium(1.0)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_step_and_a_kink_inside_an_element_are_convex() -> None:
     """A parabola through a step has lower values than the step."""
@@ -117,6 +122,7 @@ def test_a_step_and_a_kink_inside_an_element_are_convex() -> None:
         assert branch.ended == "end of range"
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("width", [0.1, *(pytest.param(x, marks=pytest.mark.alone) for x in (0.01, 0.001))])
 def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) -> None:
     """A rod under tension, whose stretch jumps: ``W'' = 10 - 11/(1 + x^2)^(3/2)`` with ``x = (v - 1.3)/width``."""
@@ -133,6 +139,7 @@ def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) 
     assert branch.points[-1].load < 10 * e - 11 * width * (e - 0.3) / ((e - 0.3) ** 2 + width**2) ** 0.5 + 1e-6
 
 
+@pytest.mark.long
 def test_an_energy_that_is_quadratic_at_the_first_load_alone() -> None:
     """``k^2/2 - P k^4/4`` under the moment m: convex while ``P < 4/(27 m^2)``."""
     scene = rod(
@@ -145,6 +152,7 @@ def test_an_energy_that_is_quadratic_at_the_first_load_alone() -> None:
     assert 0.5 < branch.points[-1].load < 4 / (27 * 0.25)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(
     ("energy", "until"),
@@ -169,6 +177,7 @@ def test_a_sweep(energy: Energy, until: float) -> None:
     assert until - 0.61 < branch.points[-1].load < until
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("energy", "until"),
     [
@@ -189,6 +198,7 @@ def test_a_locus(energy: Energy, until: float) -> None:
     assert {tuple(row) for row in curve.index.tolist()} == {(0, 1)}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("loss", [pytest.param(3.0, marks=pytest.mark.alone), 3.99])
 def test_convexity_lost_in_the_step_to_zero_stretch(loss: float) -> None:
     """A thrust squeezes a rod of ``EA = 4`` to nothing at 4; before that its twisting stiffness vanishes."""

@@ -25,6 +25,7 @@ def stiff(strains: float) -> Scene:
     return replace(arch, rod="flexible", energy=energy, parameters={**arch.parameters, "GA": strains}, span=(0.0, 9.5))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_stiff_strains_do_not_hide_the_load() -> None:
     """The fold of an arch of DaDeppo & Schmidt is one however stiff its strains are, and at 8.97.
@@ -40,6 +41,7 @@ def test_stiff_strains_do_not_hide_the_load() -> None:
     assert hard.coupling == pytest.approx(soft.coupling, rel=1e-2)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_branch_that_meets_its_mirror_image_turns_at_no_fold() -> None:
     """A cord as a figure eight: its ends stay together, so that the load does no work, and another branch crosses it.

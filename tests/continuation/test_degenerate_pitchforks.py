@@ -36,6 +36,7 @@ def on_one_rank(*given: Any) -> list[Any]:
     return [pytest.param(*one if isinstance(one, tuple) else (one,), marks=pytest.mark.alone) for one in given]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("beside", [-1e-3, *on_one_rank(-1e-2, -2e-3, -5e-4, -2e-4)])
 def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     """Beyond the fold the branch is stable, and at loads above: there the pitchfork is none that is supercritical.
@@ -58,6 +59,7 @@ def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     assert {(p.negative, p.slope < 0) for p in rows} == {(1, True), (0, False)} and len(rows) > 20
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("beside", on_one_rank(-1e-4, -5e-5, -1e-5))
 def test_no_row_before_a_fold_is_called_stable(beside: float) -> None:
     """The fold is 2e-9 to 2e-11 away in load: eigenvalues are as small as round-off."""
@@ -67,6 +69,7 @@ def test_no_row_before_a_fold_is_called_stable(beside: float) -> None:
     assert before and all(p.stable is not True for p in before)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("beside", "kind"),
     [(1e-2, "supercritical"), *on_one_rank((-1e-6, "subcritical"), (1e-6, "supercritical"))],
@@ -90,6 +93,7 @@ def test_a_coefficient_that_is_not_told_from_zero() -> None:
     assert "undetermined form" in diagram.in_words()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("slow", "span"), [(1e-4, 0.02), *on_one_rank((1e-5, 0.3))])
 def test_an_eigenvalue_that_passes_zero_slowly(slow: float, span: float) -> None:
     """``u (slow (u - P) + u^2) = 0``: the trunk, u = 0, has the eigenvalue ``-slow P``, the tolerance of a count or so.

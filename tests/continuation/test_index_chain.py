@@ -71,6 +71,7 @@ def localised(turns: int = 27) -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("elements", "told"), [(16, True), (40, False)])
 def test_a_mesh_too_coarse_for_the_turns_of_a_rod_is_told(elements: int, told: bool) -> None:
     """The straight rod is stable under a high tension: m < 2 sqrt(T), whatever a mesh says."""
@@ -81,6 +82,7 @@ def test_a_mesh_too_coarse_for_the_turns_of_a_rod_is_told(elements: int, told: b
     assert (diagram[0].points[0].negative == 0) != told
 
 
+@pytest.mark.long
 def test_a_rod_under_high_tension() -> None:
     """Its eigenvalues are a thousand times as sensitive to its state as those of a rod without load.
 
@@ -96,6 +98,7 @@ def test_a_rod_under_high_tension() -> None:
         assert assess(solver, point.x, "reduction").negative == 1
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("apart", "most"), [(3e-3, 4.0), (1e-4, 4.0), (1e-6, 4.0), (1e-6, 40.0)])
 def test_neighbours_in_one_step(apart: float, most: float) -> None:
     """A column that bends almost alike about both axes: (2n - 1)^2 pi^2 B/4, each with its own index on either side.
@@ -111,6 +114,7 @@ def test_neighbours_in_one_step(apart: float, most: float) -> None:
     assert [(s.negative_before, s.negative_after) for s in found] == [(n, n + 1) for n in range(len(expected))]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("half", [1e-6, 1e-5, 1e-3])
 def test_a_range_about_the_buckling_load(half: float) -> None:
     """The eigenvalue that vanishes is within the tolerance of zero at every row but the ends."""
@@ -157,6 +161,7 @@ def test_a_family_at_the_first_load() -> None:
     assert [s.point.load for s in branch.special if s.kind == BRANCH_POINT] == pytest.approx([4.0], abs=1e-8)
 
 
+@pytest.mark.long
 def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     """At A = -2.31 the second branch of the hemitropic rod turns back 0.04 from where it begins.
 
@@ -173,6 +178,7 @@ def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     assert found.values[row] == pytest.approx([fold.point.load, -2.31], abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("largest", [0.05, 0.15])
 def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) -> None:
     """On a foundation of k = 240 the second branch turns back 0.017 after its index has gone from 3 to 4.
@@ -188,6 +194,7 @@ def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) 
     assert [s.point.load for s in branch.special[1:3]] == pytest.approx([31.28043, 31.27381], abs=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("longer", "apart"), [(1e-3, 0.0265), (1e-4, 8.39e-3), (1e-6, 8.39e-4)])
 def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: float) -> None:
     """Two double branch points of the straight rod, ``apart`` by the closed form: the index is 2 on either side.
@@ -219,6 +226,7 @@ def test_a_row_beside_a_pair_of_crossings() -> None:
     assert [(s.negative_before, s.negative_after) for s in found] == [(0, 2), (2, 4), (4, 2), (2, 0)]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("low", "high", "largest"), [
     (0.2950, 0.4994, 0.2), (0.0550, 0.4991, 0.3), (0.2950, 0.4990121, 0.1),  # beside the last row
     (0.4946, 0.6990, 0.3), (0.4940, 0.5490, 0.05),  # beside the first row
@@ -245,6 +253,7 @@ def test_a_pair_of_crossings_is_listed_once() -> None:
     assert found == pytest.approx([x for x in buckling_loads(*constants) if 0.42077 < x < 0.7111], abs=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("slope", "largest"), [(2.0, 0.15), (2.8, 0.15), (2.8, 0.3), (-2.2, 0.15)])
 def test_a_pair_of_crossings_that_no_parabola_shows(slope: float, largest: float) -> None:
     """The eigenvalue ``(P^2 - d^2)(1 + slope P)``: the parabola through three rows has its vertex too high, or in the
@@ -297,6 +306,7 @@ def test_what_is_not_explained_is_kept() -> None:
     assert not chained(a.low, a.high, singular[::-1], b.low, b.high)
 
 
+@pytest.mark.long
 def test_steps_that_do_not_explain_are_repeated() -> None:
     """A ring whose stiffness varies by 1e-4 along it: the double point at P = 3 is broken, and passed without a jump.
 
@@ -316,6 +326,7 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
     assert abs(branch.points[-1].ordinate - 2.0) > 0.3
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("short", [0.0, 1e-9, 1e-4])
 def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
     """All rows are within the range; a branch of which it has nothing is none."""
@@ -396,6 +407,7 @@ def test_the_last_step_to_a_bound_goes_the_way_of_the_prediction() -> None:
     assert _to_load(solver, [wrong], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is None
 
 
+@pytest.mark.long
 def test_what_is_free_on_the_trunk_alone_leaves_the_index_of_a_branch_open() -> None:
     """A straight rod between planes turns freely about its axis, a bent one does not: no change of index is missing."""
     diagram = golden_cases.trace(golden_cases.cases()["classic turning in a plane"](), error_bars=False)

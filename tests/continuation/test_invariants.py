@@ -47,6 +47,7 @@ def spoilt(system: System, x: PETSc.Vec, field: str) -> PETSc.Vec:
     return system.vector(system.fields.filled(values), [0.0] * len(system.drifts))
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_mutations_are_caught(formulation: str) -> None:
@@ -100,6 +101,7 @@ def test_reactions_balance_the_load(aside: float) -> None:
             assert equations[tested] @ motion[tested] == pytest.approx(-work, abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_balance_that_no_single_equation_misses() -> None:
     """A distributed force that is too large by 1e-6: by 1e-9 in each equation of 1000 elements, and by 1e-6 in all."""
@@ -118,6 +120,7 @@ def test_a_balance_that_no_single_equation_misses() -> None:
         check(point)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("where", [0.0, 5.0])
 def test_a_violation_ends_the_branch_with_a_reason(where: float, monkeypatch: pytest.MonkeyPatch) -> None:

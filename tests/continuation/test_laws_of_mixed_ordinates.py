@@ -37,6 +37,7 @@ def on_one_rank(*given: Any) -> list[Any]:
     return [pytest.param(*one, marks=pytest.mark.alone) for one in given]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("span", [(8.0, 11.0), *on_one_rank(((9.8, 9.9),))])
 @pytest.mark.parametrize("eps", [0.01, *on_one_rank((1.0,), (0.1,), (1e-3,))])
 def test_shortening_and_part_of_a_slope(eps: float, span: tuple[float, float]) -> None:
@@ -46,6 +47,7 @@ def test_shortening_and_part_of_a_slope(eps: float, span: tuple[float, float]) -
     assert holds(law, pi**2 / 8 / eps**2, 1e-6)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(8.0, 11.0), (9.8, 9.9)])
 def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> None:
@@ -59,6 +61,7 @@ def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> N
         assert holds(law, pi**2 / 2, 1e-6 + 120 * eps) and law.uncertainty >= 4 * eps / 0.17 * pi**2 / 2
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_mirror_images_of_a_sensor_that_looks_askew() -> None:
     """A cantilever that a dead force bends buckles out of its plane: across that alone the law goes as 1/sin^2."""
@@ -79,6 +82,7 @@ def test_mirror_images_of_a_sensor_that_looks_askew() -> None:
         assert holds(askew, across.coefficient / sin(1.2) ** 2, 1e-6)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("part", [1.0, 0.1, 1e-3])
 def test_transcritical_point(part: float) -> None:
@@ -88,6 +92,7 @@ def test_transcritical_point(part: float) -> None:
     assert holds(law, 8 * 0.3 / pi**3 / part, 1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_size_of_a_displacement_and_what_is_added_to_it() -> None:
     """``pi^4/8 x^2`` in the size, also beside a shortening; beside a displacement it differs on the two sides."""

@@ -91,6 +91,7 @@ def test_a_fold_that_does_not_feel_the_load_is_found(monkeypatch: pytest.MonkeyP
     assert found.right and not found.said, found
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("apart", [3e-4, 1e-4])
 def test_a_zero_beyond_a_row_is_none_of_the_step_to_it(apart: float) -> None:
     """Two eigenvalues pass zero, one just before a row and one just after it: neither is taken for the other."""

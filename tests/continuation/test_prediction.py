@@ -10,6 +10,7 @@ from hard.writhing import clamped_rod
 from rodfem import Discretization, Plan, trace
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["auto", "pointwise"])
 def test_no_part_along_an_orbit_is_handed_on(formulation: str) -> None:

@@ -39,6 +39,7 @@ def angle(r: Any, q: Any) -> float:
     return degrees(float(np.arctan2(r[1], r[0]))) % 180 if np.hypot(*r[:2]) > 1e-9 else 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("form", "period"),
     [pytest.param(*x, id=name, marks=[pytest.mark.alone] * (name != "square")) for name, x in FORMS.items()],

@@ -88,6 +88,7 @@ def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
         assert system.phase.reference.equal(point.x)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("name", ["hemitropic", "cord"])
 def test_factors_of_an_exact_prediction_are_those_of_the_row(

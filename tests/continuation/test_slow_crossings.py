@@ -47,6 +47,7 @@ ON_RANKS = (downwards,)
 """What several ranks do, too."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("scene", "load", "change"),
     [pytest.param(*x, marks=[pytest.mark.alone] * (x[0] not in ON_RANKS), id=x[0].__name__) for x in CASES],

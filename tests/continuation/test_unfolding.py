@@ -74,6 +74,7 @@ def fold_of(lateral: float) -> float:
     return float(found.fun)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("lateral", [1e-3, pytest.param(1e-9, marks=pytest.mark.long), 1e-12, 1e-6])
 def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     """The first branch is stable all along; the detached one has a fold, and no branch point is left.
@@ -99,6 +100,7 @@ def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     assert {round(p.load, 9) for p in (detached.points[0], detached.points[-1])} == {4.0}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("lateral", [1e-5, 2e-4])
 def test_a_jump_at_which_nothing_can_be_located_is_one_across_a_gap(lateral: float) -> None:
     """Long steps end on the other branch, and shorter ones after them do not: the gap is known from the first."""
@@ -136,6 +138,7 @@ def test_perfect_points_stay_what_they_are() -> None:
     assert special.law.kind == "supercritical pitchfork"
 
 
+@pytest.mark.long
 def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
     """Unequal elements take a pitchfork apart that the reversal of the rod makes: a richer mesh tells."""
     ends = (pinned(), pinned(ON_AXIS, push))
@@ -157,6 +160,7 @@ def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
     assert special.unfolding == pytest.approx(1e-13 * np.sqrt(2) * 2 / pi, rel=1e-3)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("beside", [1e-11, 1e-9, 1e-6])
 def test_a_load_beside_a_branch_point(beside: float) -> None:
     """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P).
@@ -176,6 +180,7 @@ def test_a_load_beside_a_branch_point(beside: float) -> None:
     assert abs(row.ordinate) == pytest.approx(expected, rel=4e-15 / beside + 1e-8)
 
 
+@pytest.mark.long
 def test_a_search_finds_the_detached_branch_once() -> None:
     """Its mirror image is nearly an equilibrium at 1e-9: deflating that would hide it."""
     found = diagram(cantilever(1e-9), 0, at=(3.0,), tries=2)
@@ -183,6 +188,7 @@ def test_a_search_finds_the_detached_branch_once() -> None:
     assert [s.kind for s in found.branches[1].special if s.kind != "user"] == ["end", "fold", "end"]
 
 
+@pytest.mark.long
 def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     """Past a turn of 2 pi the null vector of a clamped rod is nearly orthogonal to the load derivative, also at a fold.
 
@@ -210,6 +216,7 @@ def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     assert below[1] / below[2] == pytest.approx(10 ** (2 / 3), rel=1e-3)
 
 
+@pytest.mark.long
 def test_the_bend_of_a_broken_pitchfork_with_default_steps() -> None:
     """A twisted rod, curved a little, under thrust: its branch bends at 39.2, where a step may end just before.
 

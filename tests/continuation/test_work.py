@@ -41,6 +41,7 @@ def diagram(request: pytest.FixtureRequest) -> Diagram:
     return trace(cases()["demo hemitropic"](), request.param, Plan(depth=1, error_bars=False))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("mesh", MESHES)
 def test_conjugate_of_a_distance_is_the_thrust(mesh: Discretization) -> None:
     """Clamps that come nearer by ``d``: ``V = W``, and ``dV/dd`` is the thrust, Castigliano's theorem."""
@@ -51,6 +52,7 @@ def test_conjugate_of_a_distance_is_the_thrust(mesh: Discretization) -> None:
     assert abs(point.conjugate) == pytest.approx(abs(thrust), rel=1e-10)
 
 
+@pytest.mark.few(1)
 @alone
 @pytest.mark.parametrize("mesh", MESHES)
 def test_dead_load_does_work_on_its_point(mesh: Discretization) -> None:
@@ -64,6 +66,7 @@ def test_dead_load_does_work_on_its_point(mesh: Discretization) -> None:
         assert point.potential == pytest.approx(point.energy + point.load * point.ordinate, abs=1e-11)
 
 
+@pytest.mark.few(1)
 @alone
 @pytest.mark.parametrize("name", WITH_FOLDS)
 def test_stability_is_exchanged_at_folds_as_their_side_says(name: str) -> None:
@@ -85,6 +88,7 @@ def test_stability_is_exchanged_at_folds_as_their_side_says(name: str) -> None:
     assert folds
 
 
+@pytest.mark.few(1)
 @alone
 def test_every_step_is_balanced(diagram: Diagram) -> None:
     """On linear elements, too; and hardly any is divided for it."""
@@ -94,6 +98,7 @@ def test_every_step_is_balanced(diagram: Diagram) -> None:
     assert all(balanced(solver, step) for step in steps)
 
 
+@pytest.mark.long
 @alone
 def test_a_jump_is_not_balanced(diagram: Diagram) -> None:
     """States of another branch at nearly the same load, farther than two steps away, in place of the last row.

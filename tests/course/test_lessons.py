@@ -59,6 +59,7 @@ def test_a_lesson_ends_with_its_number(path: Path, folder: Path, monkeypatch: py
     assert list((folder / "results" / "course").glob("*.png")), "a lesson has a picture"
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
 def test_a_solution_is_right(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,6 +92,7 @@ def test_the_page_lists_all_lessons() -> None:
     assert re.findall(r"\]\((\d\d_\w+\.py)\)", (COURSE / "README.md").read_text()) == [p.name for p in LESSONS]
 
 
+@pytest.mark.few(9)
 @pytest.mark.alone
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_is_a_notebook(path: Path) -> None:

@@ -58,6 +58,7 @@ def force(follower: BranchSolver, x: object) -> float:
     return float(out.norm())
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_cord() -> None:
     """From the straight state alone: all that exploring finds, and whatever else is found is an equilibrium."""
@@ -91,6 +92,7 @@ def test_cord_beyond_what_was_explored() -> None:
         assert (p.load, p.error < 1e-9) == (40.0, True)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_hemitropic() -> None:
     """A circle of states counts as one, and the states are those of the branches."""
@@ -133,6 +135,7 @@ def both_ways(point: Point) -> list[Branch]:
     return out
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_ruler() -> None:
     """Both ways of falling to the side count as one; it is the start of the branch that leaves the plane."""
@@ -176,6 +179,7 @@ def test_nothing_to_find() -> None:
         assert "no proof" in out.getvalue()
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("planar", [None, "e1"])
 def test_a_column_that_hangs(planar: str | None) -> None:
@@ -194,6 +198,7 @@ def test_known_state_at_another_load() -> None:
         Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("units", [(1.0, 1.0), DNA[:2]], ids=["1", "DNA"])
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_mirrors_are_those_of_the_equations(formulation: str, units: tuple[float, float]) -> None:
@@ -210,6 +215,7 @@ def test_mirrors_are_those_of_the_equations(formulation: str, units: tuple[float
                 assert force(follower, image) == pytest.approx(force(follower, x), rel=1e-12)
 
 
+@pytest.mark.long
 def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
     """Twelve tries of a coil, in three systems of units far from its own."""
     counts = []
@@ -266,6 +272,7 @@ def test_guesses_do_not_depend_on_ranks() -> None:
     assert q[24] == pytest.approx([0.80094931574151, -0.54006580455896, 0.24587627411001, -0.07971184], abs=1e-8)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("planar", ["e2", None])
 def test_quaternions_of_opposite_signs_are_one_rotation(planar: str | None) -> None:

@@ -47,6 +47,7 @@ OTHERS: dict[str, tuple[Callable[[], Scene], Callable[[], Scene], Plan]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("name", OTHERS)
 @pytest.mark.usefixtures("few_loads")
@@ -70,6 +71,7 @@ def test_a_fingerprint_of_an_older_file() -> None:
     assert not same([1.01 * x if x is not None else x for x in older], numbers[0.05])
 
 
+@pytest.mark.long
 def test_loads_beyond_the_range_of_the_scene() -> None:
     """Of a plan with a wider range that is seen, too."""
     for high, alike in ((1.0, True), (6.0, False)):
@@ -85,6 +87,7 @@ def reaching(x: float, name: str = "reaches") -> Plan:
     return Plan((0.0, 1.0), depth=0, error_bars=False, events=(Event(name, of=lambda s: s.r[-1, 0] - x),))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_another_event_of_one_name(folder: Path) -> None:
     """A complete run and one that goes on tell it from that of the run; of an older file names are compared."""
@@ -118,6 +121,7 @@ def test_values_of_events() -> None:
         assert same_event(first, second) == same_event(second, first) == alike
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.usefixtures("few_loads")
 def test_a_diagram_that_is_read_keeps_its_plan(folder: Path) -> None:

@@ -68,12 +68,14 @@ def is_undecided(diagram: Diagram, special: SpecialPoint) -> bool:
     return True
 
 
+@pytest.mark.long
 def test_what_vanishes_at_a_special_point_is_zero() -> None:
     found = singular(column())
     assert len(found) == 7 and sum(s.kind == "fold" for s in found) == 3
     assert all(is_undecided(column(), s) for s in found)
 
 
+@pytest.mark.long
 def test_a_file_says_the_same(folder: Path) -> None:
     again = load(column().save(folder / "column"), bedded())
     assert len(singular(again)) == 7 and all(is_undecided(again, s) for s in singular(again))
@@ -88,6 +90,7 @@ def test_a_state_far_away_on_the_richer_mesh_is_not_taken() -> None:
         assert verdict.undecided == 1 and abs(mode.value) < ROUND_OFF and not np.isfinite(mode.uncertainty)
 
 
+@pytest.mark.long
 def test_a_ring_at_its_critical_pressure() -> None:
     """At P = 3 it is neutral in two directions.  At this mesh's load, 2e-5 less, a richer mesh's ring is stable."""
     diagram = trace(pressed_ring(), Discretization("auto", 8, 4), Plan(depth=0))
@@ -114,6 +117,7 @@ def test_equilibria_at_the_load_of_a_special_point() -> None:
             assert abs(below - above) == 2 and len(found) == (below + above) / 2
 
 
+@pytest.mark.long
 def test_a_fold_of_a_coarser_mesh_is_at_no_load_of_the_finest() -> None:
     diagram = trace(scene("cord"), Discretization("auto", 3, 3), Plan(depth=1, accuracy=1e-8))
     (fold,) = diagram.special("fold")
@@ -123,6 +127,7 @@ def test_a_fold_of_a_coarser_mesh_is_at_no_load_of_the_finest() -> None:
     assert diagram.assess(fold).undecided == 1
 
 
+@pytest.mark.long
 def test_a_second_soft_mode_at_a_fold() -> None:
     """Ends that let the sections turn: by an angle a that costs ``(B1 - B2)/2 sin(a)^2`` times the curvature squared.
 

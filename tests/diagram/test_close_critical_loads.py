@@ -90,6 +90,7 @@ columns = cache(swept)
 """The same, once for each set of arguments."""
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0), (19.0, 21.0)])
 @pytest.mark.parametrize(
@@ -119,6 +120,7 @@ def test_numbers_between_two_flutters(strong: float) -> None:
             assert p.negative == growing == 2 * (p.load > BECK) + 2 * (p.load > BECK * strong)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("strong", [1 + 1e-9, pytest.param(1 + 1e-10, marks=pytest.mark.long)])
 def test_flutters_that_are_one_to_round_off(strong: float) -> None:
@@ -138,6 +140,7 @@ def by_values(comm: MPI.Comm, found: Frequencies, others: Frequencies) -> dict[i
     return {mine[i]: there[j] for i, j in zip(rows.tolist(), columns.tolist(), strict=True)}
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0)])
 def test_a_pair_that_is_mistaken_is_put_right(span: tuple[float, float], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,6 +179,7 @@ def humped(strong: float, top: float, curvature: float, span: tuple[float, float
     return classics.column("humped", ends, span, load="p", inertia=classics.BEAM, constants=constants)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(4.0, 6.0), (6.0, 4.0)])
 @pytest.mark.parametrize(
@@ -195,6 +199,7 @@ def test_flutter_and_its_reverse_in_a_step(top: float, curvature: float, span: t
     adds_up(diagram)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("top", [1e-12, -1e-2, -1e-8])
 def test_frequencies_that_nearly_meet(top: float) -> None:
@@ -221,6 +226,7 @@ FLUTTERS = float(
 )
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(4.5, 18.0), (18.0, 4.5)])
 @pytest.mark.parametrize(
@@ -243,6 +249,7 @@ def test_flutter_and_divergence(strong: float, span: tuple[float, float]) -> Non
         assert a[0] < b[0]
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(4.5, 18.0), (18.0, 4.5)])
 def test_one_diverges_where_the_other_comes_back(span: tuple[float, float]) -> None:
@@ -258,6 +265,7 @@ def beck() -> Diagram:
     return in_steps(0.5, classics.beck(span=(15.0, 25.0)), error_bars=False)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("apart", "bar", "before", "words"),
     [(1e-7, 1e-6, 0, "meet"), (1e-7, 1e-6, 2, "part"), (1e-5, 1e-6, 0, ""), (1e-5, float("nan"), 0, "meet")],

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.alone
 EXCESS = 0.04
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("at", [0.0, 0.07])
 def test_a_closed_branch_ends_at_its_start(at: float) -> None:
     """At a load between the folds there are two states of the isola: each is reported once."""
@@ -35,6 +36,7 @@ def test_a_closed_branch_ends_at_its_start(at: float) -> None:
     assert len({round(x, 9) for x in inside}) == 2
 
 
+@pytest.mark.long
 def test_two_states_of_a_twisted_ring_are_joined_at_any_step() -> None:
     """Michell: rings twisted by none and by two turns lose stability where ``C |twist - t0| = sqrt 3``, both found.
 

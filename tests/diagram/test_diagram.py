@@ -89,6 +89,7 @@ def test_a_locus_begins_at_its_special_point(diagram: Diagram) -> None:
     np.testing.assert_allclose(found.values[:, 1] ** 2 - found.values[:, 0], w2, atol=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
     saved = diagram.save(folder / "cord")
@@ -110,6 +111,7 @@ def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
     assert len(wider.at(25.0)) == 1
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
     saved = diagram.save(folder / "cord")
@@ -125,6 +127,7 @@ def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
         rodfem.load(folder, diagram.scene)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_loads_without_a_potential(folder: Path) -> None:
     """Beck's column flutters at 20.05095 (the exact frequency equation): the same kind of object."""
@@ -161,6 +164,7 @@ def test_an_observer_hears_of_all(diagram: Diagram) -> None:
     assert any("is singular" in sentence for sentence in found.warnings)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_pictures(diagram: Diagram, folder: Path) -> None:
     point = diagram.at(40.0)[1]
@@ -202,6 +206,7 @@ def test_an_interrupt_loses_no_branch() -> None:
     assert caught.value.diagram.assess(straight.points[0]).negative == 0
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_diagram_that_is_dropped_leaves_no_memory_behind() -> None:
     """PETSc keeps what Python has collected until all ranks agree: a diagram had left 21 MB each time."""

@@ -24,6 +24,7 @@ def AXIS(c: Any) -> tuple[float, float, None]:
     return (0.0, 0.0, None)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("apart", [0.5, 0.0, -0.1])
 def test_the_distance_of_the_ends_of_an_elastica(apart: float) -> None:
     """That of a pinned column is ``2 E(m)/K(m) - 1`` at ``P = 4 K(m)^2``; where they meet the loop may turn, too."""
@@ -63,6 +64,7 @@ def straight(
     return rodfem.trace(rod, plan=Plan(depth=0, events=(event,), error_bars=error_bars))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("gap", [1.0, 0.02, 1e-3, 1e-5])
 def test_two_zeros_near_each_other(gap: float) -> None:
     """Each is found and resolved, both where one step has the two and where the richer mesh has both within reach."""
@@ -76,6 +78,7 @@ def test_two_zeros_near_each_other(gap: float) -> None:
     assert not found.warnings
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("rate", [400, 4000])
 def test_many_zeros_in_a_step(rate: int) -> None:
     exact = [50 * (1 - n * np.pi / rate) for n in range(rate, 0, -1) if 0.9 < n * np.pi / rate < 1]
@@ -84,12 +87,14 @@ def test_many_zeros_in_a_step(rate: int) -> None:
     assert not found.warnings
 
 
+@pytest.mark.long
 def test_what_varies_too_fast_is_said() -> None:
     (sentence,) = straight(lambda z: np.sin(4e6 * z), error_bars=False).warnings
     assert sentence.startswith("Zeros of the event 'length' may be missing between loads 0 and 5, where it varies too")
     assert "StepControl(largest=...)" in sentence
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("of", "exact"),
     [
@@ -113,6 +118,7 @@ def test_zeros_without_a_change_of_sign(of: Callable[[float], float], exact: lis
     assert not found.warnings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("largest", [0.3, pytest.param(0.11, marks=pytest.mark.long)])
 def test_corners_on_a_curved_branch(largest: float) -> None:
     """Each is found where interpolated states are not equilibria, and beside a row, where no sample is between."""
@@ -148,6 +154,7 @@ def deflection(state: Any) -> float:
     return float(np.hypot(*state.r[len(state.s) // 2, :2]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("below", [1e-2, 1e-5, 1e-8, -1e-6])
 def test_the_height_of_an_elastica_near_its_largest(below: float) -> None:
     """Two zeros beside the load of the largest height, or none: equilibria decide, not states between rows."""

@@ -48,6 +48,7 @@ def rows() -> list[float]:
     return [row.load for row in rodfem.trace(COLUMN, MESH, PLAN)[0].points[1:-1]]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_all_zeros_are_found_once(rows: list[float], shape: str) -> None:
     """Between rows, at rows and beside them, ``d`` from 1e-1 to 1e-8 of a step: each within its bar, and no other."""
@@ -71,6 +72,7 @@ def test_all_zeros_are_found_once(rows: list[float], shape: str) -> None:
     assert not found.warnings
 
 
+@pytest.mark.long
 def test_bars_of_a_touch_beside_a_change_of_sign() -> None:
     """That of one is no distance from the other."""
     events = [
@@ -103,6 +105,7 @@ def test_a_sweep_refuses_events() -> None:
         rodfem.trace(classics.beck(), plan=Plan(events=(Event("tip", of=lambda state: state.r[-1, 0]),)))
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("power", [0.2, 1 / 3, 0.5, 1.0, 1.5, 3.0])
 def test_samples_show_a_root_wherever_it_is(power: float) -> None:
     """Also beside a node, of which each side is a parabola to its error."""
@@ -141,6 +144,7 @@ def test_zeros_beside_a_row_that_is_nearly_zero() -> None:
     assert [zero.s for zero in zeros.found] == pytest.approx([5e-8], rel=0, abs=1e-12)
 
 
+@pytest.mark.long
 def test_states_with_round_off_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Equilibria that are solved for differ by 1e-8, as beside a soft mode: what touches zero is within its bar."""
     chosen, solve = np.random.default_rng(4), states_between.solve_at

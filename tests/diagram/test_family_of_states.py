@@ -27,6 +27,7 @@ def swept(turned: float, second: float) -> Diagram:
     return trace(rod, Discretization(elements=4, degree=5), Plan(depth=0, error_bars=False))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.usefixtures("few_loads")
 def test_loads_of_one_state_of_a_family_are_said_to_be_that() -> None:

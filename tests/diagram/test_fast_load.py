@@ -34,6 +34,7 @@ def column(thrust: rodfem.problem.local_state.OfConstants, span: tuple[float, fl
     )
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("rate", [70.0, 200.0])
 def test_a_thrust_that_is_a_fast_sine(rate: float) -> None:
@@ -58,6 +59,7 @@ def test_ordinary_functions_bound_no_step() -> None:
         assert not len(fast.low)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_notch_of_one_piece() -> None:
     """At ``P = 0.5123`` four fifths of the column soften, ahead of its free end: 80 % of Euler's load is too much.
@@ -78,6 +80,7 @@ def test_a_notch_of_one_piece() -> None:
     np.testing.assert_allclose(loads, [0.5123 - off, 0.5123 + off], rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_sweep_of_a_fast_sine(monkeypatch: pytest.MonkeyPatch) -> None:
     """A follower thrust 25 sin(200 P): it flutters where that passes Beck's load, twice in each of six periods.

@@ -25,6 +25,7 @@ def heavy(share: float) -> Scene:
     return replace(classics.heavy(), distributed=lambda c: (-share * c.P, 0.0, -c.P), span=(0.0, 2.0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("scene", "name"),
     [
@@ -51,6 +52,7 @@ def test_only_what_is_straight_is_called_so(scene: Callable[[], Scene], name: st
     assert sentence.startswith("The first branch is " if name == "first branch" else f"The first branch, {name}, is ")
 
 
+@pytest.mark.long
 def test_a_side_branch_leaves_the_first_branch() -> None:
     diagram = trace(classics.arch(1.0, dead=False), Discretization("auto", 16, 6), Plan(depth=1, error_bars=False))
     assert "Branch 1, which leaves the first branch at " in diagram.in_words()

@@ -19,6 +19,7 @@ def energy(v: Any, k: Any, c: Any) -> Any:
     return 0.5 * quadratic + 20 * (v[2] - 1) ** 2 + 0.707 * sum(ufl.cosh(0.7 * x) - 1 for x in strains)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_all_meshes_find_one_first_state() -> None:
     """The stiffness of a state far away was that of all others, and none was found: constraints were blamed.
@@ -44,6 +45,7 @@ def test_all_meshes_find_one_first_state() -> None:
             assert abs(a.point.load - b.point.load) <= a.error_estimate + b.error_estimate
 
 
+@pytest.mark.long
 def test_of_two_equilibria_the_one_beside_the_start() -> None:
     """A tapered ring under dead loads inwards is 0.17 from the circle, and unstable: turned by pi it is stretched.
 

@@ -37,6 +37,7 @@ def without(share: float, strong: float) -> Found:
     return critical(swept(share, strong, (2.0, 35.0)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("off", "back"),
     [
@@ -62,6 +63,7 @@ def test_a_load_that_is_asked_for_at_a_flutter_load(
     assert not diagram.warnings and not diagram[0].unexplained
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("width", [0.03, -0.1])
 def test_a_row_of_the_grid_at_a_flutter_load(width: float) -> None:
     load = 1.5 * BECK
@@ -70,6 +72,7 @@ def test_a_row_of_the_grid_at_a_flutter_load(width: float) -> None:
     assert flutter[1] == pytest.approx(load, rel=1e-11) and sorted(flutter[2:]) == [2, 4]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("share", "strong", "which", "to"), [(1.0, 1.5, 0, 25.0), (1.0, 1.5, 1, 25.0), (0.4, 10.0, 3, 4.0)]
 )
@@ -84,6 +87,7 @@ def test_a_range_that_begins_at_a_flutter_load(share: float, strong: float, whic
     assert not diagram.warnings and not diagram[0].unexplained
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("span", "at"), [((0.3, 25.0), 0.1 * 3), ((0.0, 20.1), nextafter(20.1, 0.0))])
 def test_loads_that_differ_by_round_off_are_one(span: tuple[float, float], at: float) -> None:
     """A step of one unit in the last place ended the sweep."""

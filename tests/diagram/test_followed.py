@@ -129,6 +129,7 @@ def test_every_row_is_that_of_solving_anew(name: str, monkeypatch: pytest.Monkey
     same(followed, anew, scene.units.omega2)
 
 
+@pytest.mark.long
 def test_a_side_rests_with_the_error_of_a_prediction(monkeypatch: pytest.MonkeyPatch) -> None:
     """With that of later steps at the load before, rows from a tenth of this range on were up to 2.6e-5 off."""
     scene = fuzz.scene(30, 52)
@@ -141,6 +142,7 @@ def test_a_side_rests_with_the_error_of_a_prediction(monkeypatch: pytest.MonkeyP
         assert difference(p, q, scene.units.omega2) < CLAIMED, p.load
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wrong", ["another", "missing"])
 def test_what_is_not_certified_is_solved_anew(wrong: str, solved_anew: Branch, monkeypatch: pytest.MonkeyPatch) -> None:
     """One followed eigenvalue is another, or left out, from some load on: no row has what was followed."""
@@ -174,6 +176,7 @@ def exchanged(followed: FollowedPairs, pencil: NonsymmetricPencil, place: int) -
         )[:, None, :]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("place", "since", "seen_by"), [(2, 7.0, "probes"), (5, 7.0, "probes"), (5, 8.7, "proof")])
 def test_an_eigenvalue_that_is_missing_is_found(
     place: int, since: float, seen_by: str, solved_anew: Branch, monkeypatch: pytest.MonkeyPatch

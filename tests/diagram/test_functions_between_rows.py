@@ -47,6 +47,7 @@ def branch_points(diagram: Diagram) -> list[float]:
     return [s.point.load for s in diagram.special("branch point")]
 
 
+@pytest.mark.long
 def test_a_peak_that_is_small_beside_what_the_load_grows_to() -> None:
     """Thrust ``P + 0.05 exp(-t^2)``: critical on both sides of the peak, and at Euler's load."""
     rod = cantilever(constant, lambda c: c.P + 0.05 * bell(c.P - 2.43))
@@ -55,6 +56,7 @@ def test_a_peak_that_is_small_beside_what_the_load_grows_to() -> None:
     np.testing.assert_allclose(branch_points(trace(rod, MESH, Plan(depth=0))), [*exact, EULER], rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 def test_a_notch_that_other_terms_hide() -> None:
     """Bending softens by half at one load, under 80 % of Euler's; the energy has a term ``100 P``, and twist grows."""
     rod = cantilever(
@@ -67,6 +69,7 @@ def test_a_notch_that_other_terms_hide() -> None:
     np.testing.assert_allclose(found, [0.3712 - off, 0.3712 + off], rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 def test_a_bump_that_is_small_beside_what_the_thrust_grows_by() -> None:
     """Thrust ``2 P + 0.0024 exp(-t^2)`` of Euler's: critical before and after the bump, and at 0.5."""
     thrust = lambda P: 2 * P + 0.0024 * np.exp(-(((P - 0.4992) / 3e-4) ** 2)) - 1.0  # noqa: E731
@@ -79,6 +82,7 @@ def test_a_bump_that_is_small_beside_what_the_thrust_grows_by() -> None:
     np.testing.assert_allclose(branch_points(trace(rod, MESH, Plan(depth=0))), exact, rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 def test_every_wave_of_a_thrust_that_grows_as_the_stiffness_does() -> None:
     """Both grow as ``exp(8 P)``; their ratio is ``0.999 + 0.002 sin(300 P)``: critical twice in each wave."""
     ratio = lambda P: -0.001 + 0.002 * np.sin(300 * P)  # noqa: E731
@@ -94,6 +98,7 @@ def test_every_wave_of_a_thrust_that_grows_as_the_stiffness_does() -> None:
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("above", "other", "power"), [(1e-4, 2.0, 1), (1e-6, 1.0, 3), pytest.param(1e-2, 9.0, 1, marks=pytest.mark.long)]
 )
@@ -114,6 +119,7 @@ def test_a_pair_where_stiffness_and_thrust_both_grow(above: float, other: float,
     assert not diagram.warnings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mesh", [MESH, Discretization("auto", 64, 2)])
 def test_a_pair_of_a_planar_rod_whose_stiffness_and_thrust_both_grow(mesh: Discretization) -> None:
     """As above with ``n = 3``; the stiffness out of the plane grows as well, and is not in the saddle matrix."""
@@ -129,6 +135,7 @@ def test_a_pair_of_a_planar_rod_whose_stiffness_and_thrust_both_grow(mesh: Discr
     np.testing.assert_allclose(found, [growth - half, growth + half], rtol=0, atol=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("foundation", "width"),
     [
@@ -161,6 +168,7 @@ def on_a_parabola(rate: float, middle: float, half: float, width: float, **given
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mesh", "rate", "middle", "half", "width"),
     [
@@ -175,6 +183,7 @@ def test_a_pair_where_all_grows_or_falls_by_orders(
     np.testing.assert_allclose(found, [middle - half, middle + half], rtol=0, atol=1e-6)
 
 
+@pytest.mark.long
 def test_a_pair_of_the_step_before_is_not_lost_where_it_takes_shorter_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Stiffness and thrust grow by ``exp(20)``: the pair is seen a row late, and not located in a step as long."""
     monkeypatch.setattr(PairSearch, "around", lambda *_: [])
@@ -190,6 +199,7 @@ def test_a_kink_is_no_peak() -> None:
         assert not FastLoad(cantilever(constant, thrust), (0.0, 4.0)).doubt
 
 
+@pytest.mark.long
 def test_flutter_that_comes_and_goes_with_a_parabola(monkeypatch: pytest.MonkeyPatch) -> None:
     """The stiffness of the other plane is ``0.83 + 1000 (P - 17.0321)^2``: a pair 0.009 apart, between two rows."""
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 21)  # rows every 0.04, as of a hundred from 15 to 19
@@ -205,6 +215,7 @@ def test_flutter_that_comes_and_goes_with_a_parabola(monkeypatch: pytest.MonkeyP
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-6)
 
 
+@pytest.mark.long
 def test_another_eigenvalue_that_comes_and_goes_along_a_locus() -> None:
     """At ``b = 0.4116`` the other plane buckles first, as a parabola has it: no other row shows that."""
     rod = cantilever(
@@ -219,6 +230,7 @@ def test_another_eigenvalue_that_comes_and_goes_along_a_locus() -> None:
     assert {mark.row for mark in found.marks} >= {row, row + 1}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("energy", "words"),
     [
@@ -239,6 +251,7 @@ def test_a_locus_knows_what_is_sharp_at_its_own_parameters(energy: Any, words: s
     assert np.isnan(found.error[there]).all() and set(np.flatnonzero(there)) <= set(found.unresolved)
 
 
+@pytest.mark.long
 def test_a_potential_that_is_narrow_in_the_position_and_even_in_the_deflection() -> None:
     """On a straight column it has no force, but a stiffness, which no place of the quadrature sees."""
     rod = cantilever(
@@ -251,6 +264,7 @@ def test_a_potential_that_is_narrow_in_the_position_and_even_in_the_deflection()
     assert all(np.isnan(s.error_estimate) for s in diagram.special("branch point"))
 
 
+@pytest.mark.long
 def test_a_dent_of_the_energy_beyond_small_strains() -> None:
     """``W'' = 1 + (4 t^2 - 2) exp(-t^2)``, ``t = (v3 - 1.3712)/0.05``: quadratic near zero."""
     rod = column(

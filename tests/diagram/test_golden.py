@@ -63,6 +63,7 @@ def test_nothing_has_changed(name: str) -> None:
             assert s.get("omega2") == (pytest.approx(t["omega2"], rel=1e-8) if "omega2" in t else None)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(
     "name",

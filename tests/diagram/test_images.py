@@ -30,6 +30,7 @@ def branches(scene: Scene) -> Any:
     return trace(scene, Discretization("auto", 4, 4), Plan((0.0, 40.0), depth=1, error_bars=False))
 
 
+@pytest.mark.long
 def test_the_other_side_of_a_pitchfork(folder: Any) -> None:
     found = branches(PLANAR)
     straight, buckled = found[0], found[1]
@@ -48,6 +49,7 @@ def test_the_other_side_of_a_pitchfork(folder: Any) -> None:
     assert rest.norm() < 1e-9 and solver.shape.ordinate(image) == pytest.approx(-point.ordinate, rel=1e-9)
 
 
+@pytest.mark.long
 def test_no_image_without_a_symmetry() -> None:
     """A lateral force, however small, prefers a side; of an ordinate of one sign the image is the branch itself."""
     push = rodfem.free(lambda c: (1e-3, 0.0, -c.P))

@@ -27,6 +27,7 @@ def slender(mass: Callable[[Any], Any]) -> Inertia:
     return Inertia(rho_A=mass, rho_I=lambda c: (0.0, 0.0, 0.0))
 
 
+@pytest.mark.long
 def test_a_sweep_ends_before_a_negative_mass() -> None:
     """It is from 0.39 on, and the rows are as near to one another there as such an edge asks for."""
     ends = clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))
@@ -35,6 +36,7 @@ def test_a_sweep_ends_before_a_negative_mass() -> None:
     assert 0.38 < branch.points[-1].load < 0.39 + 1e-9
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("mass", "spectrum", "words"),
     [

@@ -31,6 +31,7 @@ def bent(energy: Any, at: tuple[float, ...]) -> Diagram:
     return trace(rod, Discretization(elements=6, degree=4), Plan(depth=0, at=at))
 
 
+@pytest.mark.long
 def test_a_bilinear_material_has_no_bar_where_it_is_beyond_its_kink() -> None:
     """``M = k`` up to 1, ``0.8 + 0.2 k`` beyond: by shooting, bars were up to 2e5 times too small."""
     soft = lambda k: ufl.conditional(ufl.lt(abs(k), 1.0), 0.5 * k**2, 0.1 * k**2 + 0.8 * abs(k) - 0.4)  # noqa: E731
@@ -41,6 +42,7 @@ def test_a_bilinear_material_has_no_bar_where_it_is_beyond_its_kink() -> None:
     assert any("stored energy has a kink in the state inside of the rod" in said for said in found.warnings)
 
 
+@pytest.mark.long
 def test_a_condition_without_a_kink_keeps_its_bars() -> None:
     """Two sides of a comparison that are one function."""
     same = lambda k: ufl.conditional(ufl.lt(k, -0.5), 0.4 * k**2, 0.4 * k * k) + 0.1 * k**2  # noqa: E731
@@ -60,6 +62,7 @@ def one_sided() -> Diagram:
     return trace(rod, Discretization(elements=3, degree=4), Plan(depth=0, at=(6.0,)))
 
 
+@pytest.mark.long
 def test_a_spring_at_the_tip_on_one_side() -> None:
     """The column is on the kink at all loads; to the free side it falls at 2 pi^2/4: it was called stable to 15."""
     found = one_sided()
@@ -68,6 +71,7 @@ def test_a_spring_at_the_tip_on_one_side() -> None:
     assert all(point.stable is None for point in found[0].points)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_the_reason_is_the_kink_wherever_one_reads_it(tmp_path: Path) -> None:
     """No eigenvalue is near zero at P = 6: the least one is that of a load 9 or 1 below a critical one."""
@@ -100,6 +104,7 @@ def test_one_row_on_a_kink_says_nothing_of_those_beside_it() -> None:
     assert [x.verdict for x in words_of(branch)] == ["undecided", "stable", "stable"]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 @pytest.mark.alone
 def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
@@ -113,6 +118,7 @@ def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
     assert any("stored energy has a kink in the state inside of the rod" in said for said in found.warnings)
 
 
+@pytest.mark.long
 @pytest.mark.short
 def test_terms_that_cancel_are_named() -> None:
     """FFCx 0.5 cannot take a form of such terms: its traceback was all that was said.  Later ones can: Euler's load."""

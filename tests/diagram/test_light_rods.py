@@ -39,6 +39,7 @@ def slowest(P: float) -> float:
     return P * a / (sin(a) - a * cos(a))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mass", "elements", "span"),
     [(1e-6, 12, (4.0, 6.0)), (1e-6, 6, (0.0, 0.05)), (1e-8, 6, (5.0, 5.1)), (1e-5, 20, (4.0, 6.0))],
@@ -55,6 +56,7 @@ def test_infinite_eigenvalues_make_no_rod_unstable(mass: float, elements: int, s
         assert found == pytest.approx(slowest(span[0]), rel=10 * mass + 1e-7)
 
 
+@pytest.mark.long
 def test_a_sign_that_changes_through_infinity_is_no_divergence() -> None:
     diagram = trace(light(0.0, (0.0, 30.0)), Discretization(elements=6), Plan(depth=0, error_bars=False))
     (branch,) = diagram

@@ -16,6 +16,7 @@ from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, 
 pytestmark = pytest.mark.alone
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("down", [False, True])
 @pytest.mark.parametrize(("load", "share"), [(3.0, 0.02), pytest.param(4.0, 0.1, marks=pytest.mark.long), (5.0, 0.2)])
 def test_a_path_ends_at_its_fold(load: float, share: float, down: bool) -> None:
@@ -23,6 +24,7 @@ def test_a_path_ends_at_its_fold(load: float, share: float, down: bool) -> None:
     assert snapping(load, share, down).right
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("most", [5.0, 8.0])
 @pytest.mark.parametrize("lateral", [1e-3, *(pytest.param(x, marks=pytest.mark.long) for x in (1e-4, 1e-5)), 1e-7])
 def test_an_imperfect_column_bends_and_does_not_diverge(lateral: float, most: float) -> None:
@@ -30,6 +32,7 @@ def test_an_imperfect_column_bends_and_does_not_diverge(lateral: float, most: fl
     assert found.right and not found.said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "lateral",
     [
@@ -43,6 +46,7 @@ def test_across_a_kink(lateral: Callable[[Any], Any]) -> None:
     assert diagram[0].ended == "end of range" and not diagram.warnings
 
 
+@pytest.mark.long
 def test_not_across_a_jump() -> None:
     """The path ends where the lateral load has two values."""
     jumping = imperfect(lambda c: ufl.conditional(ufl.lt(c.P, 1.003), 0.1, 0.3), 2.5)
@@ -50,6 +54,7 @@ def test_not_across_a_jump() -> None:
     assert diagram[0].points[-1].load < 1.003 and "could not be followed" in diagram[0].ended
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("apart", [0.1, pytest.param(1e-2, marks=pytest.mark.long), 1e-3, 1e-5])
 def test_a_fold_pair_in_one_step(apart: float) -> None:
     """``u^3 - a u = P`` with folds at P = +-apart/2, beside a force that follows and does no work."""
@@ -59,6 +64,7 @@ def test_a_fold_pair_in_one_step(apart: float) -> None:
     assert diagram.warnings and diagram[0].points[-1].load <= apart / 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("given", [pytest.param((1e-1, 6), marks=pytest.mark.long), (1e-3, 8)])
 def test_a_ring_under_loads_that_follow(given: tuple[float, int]) -> None:
     """As under a pressure that has a potential: no end holds its rotation, and Newton's method went round at random."""
@@ -66,6 +72,7 @@ def test_a_ring_under_loads_that_follow(given: tuple[float, int]) -> None:
     assert found.right and not found.said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [1e-2, pytest.param(1e-3, marks=pytest.mark.long), 1e-6])
 def test_a_peak_of_the_load_between_rows(width: float) -> None:
     """The load is critical on either side of its peak; of one that is too narrow to be followed it is said."""
@@ -86,6 +93,7 @@ def following(scene: Scene) -> Scene:
     )
 
 
+@pytest.mark.long
 def test_no_divergence_load_is_said() -> None:
     """Where eigenvalues touch zero a secant method found none, and its exception left the program."""
     scene = following(two_freedoms(lambda u, f2, c: u**3 / 3 - 0.5 * c.P * u**2 + 0.5 * f2, (-0.3, 0.4)))

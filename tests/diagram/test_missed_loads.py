@@ -31,6 +31,7 @@ def near_its_greatest(
         return peaked(kind, top, at, mesh, curvature, (4.0, 6.0), error_bars=error_bars)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
 @pytest.mark.parametrize(
@@ -64,6 +65,7 @@ def test_two_loads_or_none(
     assert said == [True] * hidden
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
 @pytest.mark.parametrize(("kind", "top"), [("late flutter", 5e-12), ("divergence", 1e-9), ("divergence", 1e-13)])
@@ -74,6 +76,7 @@ def test_round_off_hides_two_loads(kind: str, top: float, at: float) -> None:
     assert ["is not known" in said for said in diagram.warnings] == [True]
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_two_loads_beside_a_third_one() -> None:
     """In one step of the sweep flutter comes and goes in one plane, and in the other one the column diverges."""
@@ -98,6 +101,7 @@ def test_two_loads_beside_a_third_one() -> None:
     assert not diagram.warnings
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_prediction_without_an_error() -> None:
     """One that is as good as none could be: its square was below zero, and the sweep ended with an exception."""

@@ -83,6 +83,7 @@ HARDER = {
 """Numbers and seeds of random draws of up to five zeros, and what is no shallower."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TOGETHER)
 def test_opposite_crossings_at_one_load(name: str) -> None:
     """A branch point at which two eigenvalues vanish and the index stays, located as others are."""
@@ -90,6 +91,7 @@ def test_opposite_crossings_at_one_load(name: str) -> None:
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
+@pytest.mark.long
 def test_both_modes_leave_a_branch_point_of_opposite_crossings() -> None:
     """The null vectors bend the rod in one plane each, and branches of both planes leave there."""
     draw = TOGETHER["between rows"]
@@ -100,18 +102,21 @@ def test_both_modes_leave_a_branch_point_of_opposite_crossings() -> None:
     assert len([branch for branch in diagram if branch.parent]) == 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("apart", [1e-12, 0.0])
 def test_opposite_crossings_of_a_rod_that_stretches(apart: float) -> None:
     """``d - P`` and ``d + P``, whichever passes zero first."""
     assert opposite(apart).right and opposite_other(apart).right
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SEVERAL)
 def test_several_crossings_beside_each_other(name: str) -> None:
     found = SEVERAL[name].measured()
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", HARDER)
 def test_up_to_five_crossings(name: str) -> None:
     number, seed, shallow = HARDER[name]
@@ -119,6 +124,7 @@ def test_up_to_five_crossings(name: str) -> None:
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [3, 7, 18])
 def test_crossings_in_two_planes(number: int) -> None:
     """Two to four of them, drawn at random: all are found, and the index of each row is that of the closed form."""

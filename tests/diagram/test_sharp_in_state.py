@@ -74,6 +74,7 @@ def test_bars_hold_or_there_are_none() -> None:
             assert isnan(bar) if width < 1e-2 else abs(ordinate - told[width][load]) <= bar < 1e-4
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("power", [lambda k: ufl.sqrt(k**2), lambda k: (k * k) ** 0.5, lambda k: k * ufl.sign(k)])
 def test_an_absolute_value_by_other_names(power: Any) -> None:
@@ -102,6 +103,7 @@ def lateral(threshold: float) -> Diagram:
     return trace(rod, Discretization(elements=4, degree=4), Plan(depth=0))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_loci_and_modes_have_no_bar_beyond_a_kink(tmp_path: Path) -> None:
     for threshold, kink in ((10.0, False), (0.2, True)):
@@ -127,6 +129,7 @@ def peak(y: Any, exp: Any) -> Any:
     return 1e4 * exp(-(((y + 0.1) / 1e-3) ** 2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("of", "integrand"),
     [
@@ -161,6 +164,7 @@ def _integral(integrand: Any, s: np.ndarray, y: np.ndarray) -> float:
     return float(trapezoid(integrand(CubicSpline(s, y)(fine)), fine))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_foundation_of_constant_force_has_a_kink() -> None:
     """``|y|``: its second derivative is zero on either side, and the first one jumps where the rod is straight."""

@@ -27,6 +27,7 @@ def swept(scene: Scene, **plan: Any) -> Diagram:
     return trace(scene, MESH, Plan(depth=0, **plan))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", [*(pytest.param(k, marks=pytest.mark.long) for k in (1e-3, 1e-6)), 1e-8])
 def test_flutter_of_a_stiff_rod_on_soft_springs(k: float) -> None:
     """Springs k and k/2 across its ends, a thrust that follows: two degrees of freedom, flutter from ``P = k/3`` on.
@@ -46,6 +47,7 @@ def test_flutter_of_a_stiff_rod_on_soft_springs(k: float) -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_springs_that_soften_with_the_parameter() -> None:
     """The first state is not slow: springs ``k = 10^-p``, a thrust of ``0.05 p k`` with ``P = k/3`` at ``p = 20/3``."""
@@ -67,6 +69,7 @@ def test_springs_that_soften_with_the_parameter() -> None:
     assert found.index.tolist() == [[0, 2]] * len(found.values)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kr", "most"), [pytest.param(1e-5, 1.6, marks=pytest.mark.long), (1e-6, 1.28), (1e-7, 1.6)])
 def test_divergence_of_a_stiff_rod_on_a_soft_hinge(kr: float, most: float) -> None:
     """A fifth of the thrust follows: ``theta'' = -3 (kr - 0.8 P) theta``, which is located, or said to lie between."""
@@ -83,6 +86,7 @@ def test_divergence_of_a_stiff_rod_on_a_soft_hinge(kr: float, most: float) -> No
     assert found == pytest.approx([1.25], abs=1e-5) or (diagram[0].unexplained and diagram.warnings)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_a_second_flutter_beyond_the_frequencies_that_are_followed() -> None:
     """Soft in torsion: two dozen slow motions hide the pair that flutters at 8.02, where another one did before."""
@@ -96,6 +100,7 @@ def test_a_second_flutter_beyond_the_frequencies_that_are_followed() -> None:
     assert [s.point.load for s in found.special("flutter")] == pytest.approx([0.4 * BECK], rel=1e-8)
 
 
+@pytest.mark.long
 def test_flutter_that_comes_and_goes_beyond_the_frequencies_that_are_followed() -> None:
     """The greatest thrust is a little above Beck's load, between two looks: it is looked at there."""
     thrust = lambda c: (0.0, 0.0, -(BECK + 0.04 - (c.p - 5.25) ** 2))  # noqa: E731
@@ -109,6 +114,7 @@ def test_flutter_that_comes_and_goes_beyond_the_frequencies_that_are_followed() 
     assert words.startswith("At p = 5.") and "is not among those that are followed" in words
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("above", "said"), [(2e-4, 1), (-2e-4, 0)])
 def test_flutter_between_two_looks_where_no_load_turns(above: float, said: int) -> None:
     """A thrust of ``p`` and a stiffness of ``(1 + p^2)/2`` times: both grow, and their ratio is greatest at ``p = 1``.
@@ -128,6 +134,7 @@ def test_flutter_between_two_looks_where_no_load_turns(above: float, said: int) 
         assert float(words.split()[3]) == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("growth", "ratio", "unstable"),
     [
@@ -154,6 +161,7 @@ def test_flutter_between_looks_where_thrust_and_stiffness_grow(
     assert unstable[0] < float(words.split()[3]) < unstable[1]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_the_index_of_a_locus_counts_all_eigenvalues() -> None:
     """The flutter of the strong plane of a ribbon, 60 times as stiff: five pairs of the weak one have fluttered."""

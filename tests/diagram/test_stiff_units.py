@@ -12,6 +12,7 @@ from rodfem import Ordinate, Plan, Scene, pinned, trace
 pytestmark = pytest.mark.alone
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("stiffness", "push"), [(1.0, 1.0), (1e-20, 1e-15), (1e20, 1e15), (1e20, 1e20)])
 def test_a_column_buckles_in_any_units(stiffness: float, push: float) -> None:
     """At ``pi^2``, with ``P = pi^2 (1 + (pi x)^2 / 8)`` for the amplitude ``x`` in the middle, in lengths.

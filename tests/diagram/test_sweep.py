@@ -45,6 +45,7 @@ def named(kinds: Callable[[str], bool], data: dict) -> bool:
     return all(kinds(name) for row in data["branches"][0]["columns"]["motion"] for name in row)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("span", "loads"),
     [((-1.0, 1.0), 11), *(pytest.param(*x, marks=pytest.mark.alone) for x in [((0.0, 1.0), 11), ((0.0, 36.0), 61)])],
@@ -103,6 +104,7 @@ def test_curves_meet_as_square_roots(monkeypatch: pytest.MonkeyPatch) -> None:
         assert abs(column(mu, load) - mu) < 5e-3 * abs(mu)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the rod bends alike in all planes the vectors of a frequency are any in a plane, its name is not."""
@@ -110,6 +112,7 @@ def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> No
         assert named(lambda name: name == "bending", swept(scene, monkeypatch)[1])
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thrust that follows in part: one plane diverges, holds again and flutters, before the other one diverges."""
@@ -126,6 +129,7 @@ def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> N
     assert [[r.low, r.high] for r in found] == [pytest.approx(loads, rel=1e-6) for _, *loads in expected]
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, data, _ = swept(classics.partly_following(0.4, (0.0, 25.0)), monkeypatch)
@@ -173,6 +177,7 @@ def test_constraints_that_follow_from_others_are_refused() -> None:
         trace(TWICE_HELD, Discretization(elements=5, degree=6))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), pytest.param(5, 7, marks=pytest.mark.long)])
 def test_eigenvalues_that_change_with_the_shift_are_said(
@@ -186,6 +191,7 @@ def test_eigenvalues_that_change_with_the_shift_are_said(
     assert said or diagram[0].points[0].omega2[0] == pytest.approx([TURNING**4, 0.0], rel=1e-6)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize(("length", "stiffness"), [(1.0, 1.0), (1e-3, 7e-13), (1e-3, 3e-5), (1e4, 1e9)])
 def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
@@ -216,6 +222,7 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
     assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("twisting", [1e-3, 1e-4])
 @pytest.mark.usefixtures("few_loads")
@@ -246,6 +253,7 @@ def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
     assert (state.negative, state.stable) == (2, False)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("elements", "degree"), [(4, 8), pytest.param(20, 4, marks=pytest.mark.alone)])
 @pytest.mark.usefixtures("few_loads")
 def test_infinite_eigenvalues_of_a_light_rod_are_left_out(elements: int, degree: int) -> None:
@@ -280,6 +288,7 @@ def pflueger(z: np.ndarray) -> list[float]:
     return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("light", [1e-3, 1e-5])
 @pytest.mark.usefixtures("few_loads")
@@ -342,6 +351,7 @@ def test_memory_does_not_grow_with_the_states_whose_frequencies_are_found(monkey
     assert used[-1] - used[PILE] < 0.25 * (used[PILE - 2] - used[1]) + 512
 
 
+@pytest.mark.long
 def test_long_pencil_on_any_number_of_ranks() -> None:
     """22001 unknowns: cut at the ranks where there are several (exact: the frequency equation)."""
     solver = Solver(classics.partly_following(1.0, (0.0, 25.0)), Discretization("pointwise", 2000, 1)).equilibria

@@ -14,6 +14,7 @@ def place(s: float) -> tuple[float, float, float]:
     return 1 - cos(s), 0.0, sin(s)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_they_are_said_whatever_the_range() -> None:
     """A ring on three springs: dozens of slow motions, and one that grows from p = 0.2 on.

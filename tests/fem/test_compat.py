@@ -113,6 +113,7 @@ def test_a_second_system_compiles_nothing() -> None:
     assert COMM.allreduce(said, op=MPI.SUM) == []
 
 
+@pytest.mark.long
 def test_compilation_is_announced_once(folder: Path) -> None:
     mesh = compat.interval_mesh(COMM, 4, 0.0, 1.0)
     cache: dict[str, Any] = {KEYWORD: {"cache_dir": str(folder)}}
@@ -131,6 +132,7 @@ def test_compilation_is_announced_once(folder: Path) -> None:
     assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_forms_are_compiled_beside_this_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All that the cache lacks, in two modules; begun ahead, they are found there; and what fails says why."""

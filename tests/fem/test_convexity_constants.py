@@ -31,6 +31,7 @@ def rod(energy: Any) -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("energy", [by_number, by_parameter, linear])
 def test_a_number_that_vanishes_shifts_no_other(energy: Any) -> None:
     """diag(1, -0.3, 1.5) was computed for diag(1, 1.3, 1.5)."""
@@ -41,6 +42,7 @@ def test_a_number_that_vanishes_shifts_no_other(energy: Any) -> None:
     np.testing.assert_allclose(matrices, np.broadcast_to(np.diag([1.0, 1.3, 1.5]), matrices.shape), atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "order", [(0, 1, 2), *(pytest.param(x, marks=pytest.mark.alone) for x in [(2, 0, 1), (1, 2, 0)])]
 )

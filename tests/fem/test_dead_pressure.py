@@ -80,6 +80,7 @@ def circle_at(found: StaticSolver, p: float) -> Any:
     return x
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "p", [pytest.param(0.5, marks=pytest.mark.alone), 4.5, pytest.param(9.5, marks=pytest.mark.alone)]
 )
@@ -106,6 +107,7 @@ def test_special_points_of_the_circle() -> None:
     assert {(p.negative, p.zero) for p in branch.points if abs(p.load - 4) > 0.1 and p.load < 8} == {(1, 2), (3, 2)}
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_soft_mode_is_counted_at_special_points_as_beside_them() -> None:
     """Sections that are nearly round turn at a cost of 1e-8: a factorisation has that as zero, the rows as negative."""
@@ -133,6 +135,7 @@ LOADS: list[tuple[Callable[[Any], Any] | None, Any, list[str]]] = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("load", "potential", "motions"), LOADS)
 def test_symmetries_of_a_loaded_ring(load: Any, potential: Any, motions: list[str]) -> None:
     """Loads without resultant: rotations about their axis remain, none along the rod unless the load turns with it."""

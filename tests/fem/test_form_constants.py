@@ -38,6 +38,7 @@ def column(stiffness: float, weight: float) -> Scene:
     )
 
 
+@pytest.mark.long
 def test_another_number_compiles_nothing() -> None:
     """And each column buckles at Euler's load of its own numbers."""
     said: list[str] = []

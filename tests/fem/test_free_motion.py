@@ -41,6 +41,7 @@ def straight(found: StaticSolver, load: float) -> Any:
 KINDS = pytest.mark.parametrize("kind", ["moment", "follower_moment"])
 
 
+@pytest.mark.few(1)
 @KINDS
 def test_symmetries_without_a_potential(kind: str) -> None:
     names = {str(s) for s in solver(kind).system.symmetries}
@@ -59,6 +60,7 @@ def test_frequencies_beside_the_free_motion(kind: str, method: str) -> None:
     np.testing.assert_allclose(values, [pi**4, pi**4, (2 * pi) ** 4, (2 * pi) ** 4], rtol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @KINDS
 def test_greenhill_between_pins(kind: str) -> None:
@@ -70,6 +72,7 @@ def test_greenhill_between_pins(kind: str) -> None:
     assert {p.zero for p in found.branches[0].points if abs(p.load - 2 * pi) > 0.01} == {1}
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @KINDS
 def test_a_motion_that_a_load_drives(kind: str) -> None:
@@ -78,6 +81,7 @@ def test_a_motion_that_a_load_drives(kind: str) -> None:
         classics.sweep(scene(kind, balanced=False))
 
 
+@pytest.mark.long
 @KINDS
 @pytest.mark.alone
 def test_a_double_divergence_is_one(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:

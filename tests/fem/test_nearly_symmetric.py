@@ -12,6 +12,7 @@ CURVATURE, LEAST = 4e-9, 3e-5
 """Own curvature of the rod; eigenvalues below the other are not compared: those below 1e-5 count as zero."""
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
     """A round rod on pins, with a curvature that a stiff twist hides: its lowest eigenvalues are 1 - P/pi^2.
@@ -30,6 +31,7 @@ def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
     assert {(point.negative, point.zero) for point in rows} == {(0, 1)}
 
 
+@pytest.mark.long
 def test_a_pendulum_beside_a_stiff_twist_falls() -> None:
     """A rod on a ball joint, pulled and then pushed at its tip by a small force w: both rotations have mu = w.
 

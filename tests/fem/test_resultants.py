@@ -55,6 +55,7 @@ def at_vertices(scene: Scene, formulation: str = "auto") -> dict[str, np.ndarray
     return {"s": s, "r": r, "n": n, "m": m, "torque": found["moment"][:, [0, -1], 2]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "formulation"), [("bowed", "pointwise"), ("stretching", "reduced"), ("untwistable", "reduced")]
 )
@@ -67,12 +68,14 @@ def test_a_dead_force_is_carried_along_the_rod(name: str, formulation: str) -> N
     assert abs(found["torque"]).max() > 0.2 and abs(found["m"]).max() > 1.0
 
 
+@pytest.mark.long
 def test_a_distributed_force_adds_up_along_the_rod() -> None:
     """``n' = -f``, and ``n = 0`` at the free end."""
     found = at_vertices(scenes()["heavy"])
     assert np.allclose(found["n"], LOAD * (1.0 - found["s"])[..., None] * [0.0, 0.0, -1.0], atol=1e-9)
 
 
+@pytest.mark.long
 def test_the_force_jumps_where_a_force_acts() -> None:
     """``midway`` has its force at s = 0.4."""
     found = at_vertices(scenes()["midway"])

@@ -65,6 +65,7 @@ def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
     np.testing.assert_array_equal(system.at(x).generators, generators)
 
 
+@pytest.mark.long
 @pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
@@ -98,6 +99,7 @@ def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> 
     assert (ours - theirs).norm() < 1e-13 * theirs.norm()
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_only_states_write_where_forms_read() -> None:
     """``fields.u`` is named by the equations, in UFL, and by the state; frozen objects are completed by themselves."""

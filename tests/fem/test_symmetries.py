@@ -88,12 +88,14 @@ CASES = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rod", "reduced", "pointwise"), CASES)
 def test_number_of_symmetries(rod: Scene, reduced: int, pointwise: int) -> None:
     for formulation, expected in (("reduced", reduced), ("pointwise", pointwise)):
         assert len(System(rod, Discretization(formulation, 4, 6)).symmetries) == expected
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize(("rod", "expected"), [(scene("cord"), 0), (hemitropic(DEFAULT), 1), (scene("ruler"), 0)])
 def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
@@ -103,6 +105,7 @@ def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
     assert len(system.symmetries) == expected
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_generators_are_null_vectors(formulation: str) -> None:
     """``S g = 0`` at an equilibrium, for the buckled pinned rod and both its symmetries."""
@@ -122,6 +125,7 @@ def test_generators_are_null_vectors(formulation: str) -> None:
         assert (matrix * g).norm() < 1e-9 * matrix.norm()
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_round_rods_that_shear() -> None:
     """A ring of round sections, stiff in shear, buckles where Michell's does; the number of its zeros is that one's.
@@ -173,6 +177,7 @@ def test_link_of_a_twisted_circle(turns: int) -> None:
     assert (Tw, Wr) == pytest.approx((turns, 0.0), abs=1e-4)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("second", "number"), [(1.2, 0), (1.01, 0), (1.0, 1)])
 @pytest.mark.parametrize("twisting", [pytest.param(1.0, marks=pytest.mark.alone), 1e7])
 def test_bending_alike_is_told_beside_a_stiff_twist(second: float, number: int, twisting: float) -> None:

@@ -20,6 +20,7 @@ def hinge(bending: float, spring: float) -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bending", [*(pytest.param(b, marks=pytest.mark.alone) for b in (1.0, 1e6, 1e12)), 1e9])
 def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
     """Beside 1e9 a spring of 1 was round-off in the functional, and the rod stable on its whole range, to P = 4."""
@@ -27,6 +28,7 @@ def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
     assert system.symmetries == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bending", [1.0, 1e9])
 def test_a_rotation_that_springs_allow_is_one(bending: float) -> None:
     rod = Scene(
@@ -38,6 +40,7 @@ def test_a_rotation_that_springs_allow_is_one(bending: float) -> None:
     assert "rotation about e3" in " ".join(map(str, system.symmetries))
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_it_is_undecided_where_the_spring_is_round_off() -> None:
     (branch,) = trace(hinge(1e10, 0.5), Discretization(elements=3, degree=4), Plan(depth=0))

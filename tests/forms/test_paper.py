@@ -115,6 +115,7 @@ def at_a_point(formulation: str) -> Pointwise:
     return Pointwise(formulation)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("rod", RODS)
 def test_pointwise_it_is_exact_in_any_state(rod: str, formulation: str) -> None:
@@ -206,6 +207,7 @@ def rotated(system: System, blocks: Blocks, x: PETSc.Vec, dq: PETSc.Vec, eps: fl
     return y
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize(("name", "formulation", "load"), STATES)
@@ -333,6 +335,7 @@ def by_hand(system: System, w: fem.Function) -> Any:
     return form
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "formulation", "load"), STATES)
 def test_smooth_perturbations_agree_at_the_order_of_the_elements(name: str, formulation: str, load: float) -> None:
     degree, elements = 2, (16, 64)

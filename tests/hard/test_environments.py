@@ -58,6 +58,7 @@ def rod(folder: Path) -> Path:
 # --- names, locales -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("locale", ["C", "de_DE.UTF-8"])
 def test_names_and_locales(locale: str, rod: Path) -> None:
     out = rod.parent / f"Ergebnisse é {locale}"
@@ -101,6 +102,7 @@ def as_user(number: int) -> tuple[str, ...]:
     return before
 
 
+@pytest.mark.long
 def test_another_user() -> None:
     """One whose home folder does not exist, and without a right to write into that of the output."""
     nobody = as_user(65534)
@@ -151,6 +153,7 @@ def cut(file: Path, part: float) -> None:
     file.write_bytes(data[: int(part * len(data))])
 
 
+@pytest.mark.few(2)
 @pytest.mark.versions
 @pytest.mark.parametrize("part", [0.0, 0.001, 0.5, 0.999])
 def test_own_code_that_is_cut_short_is_compiled_again(
@@ -169,6 +172,7 @@ def test_own_code_that_is_cut_short_is_compiled_again(
     assert code_cache.is_whole(made)
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.parametrize("broken", ["cut", "lost"])
 def test_a_form_that_is_cut_short_is_compiled_again(broken: str, tmp_path: Path) -> None:

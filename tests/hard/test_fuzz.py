@@ -30,6 +30,7 @@ a stretch that vanishes at the very load of a coarser mesh; a curved rod that be
 millimetre that turns freely, with frequencies as of the third; another ring, begun beside a circle."""
 
 
+@pytest.mark.long
 def test_a_side_with_other_ordinates_is_said() -> None:
     """With a small force across only an exchange of the ends carries one side of a pitchfork to the other.
 
@@ -50,6 +51,7 @@ def few_rows(monkeypatch: pytest.MonkeyPatch, few_loads: None) -> None:
     monkeypatch.setattr(comparison, "ROWS", (14, 5))
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("seed", "number"), SCENES)
 @pytest.mark.usefixtures("few_rows")
 def test_a_random_scene(seed: int, number: int) -> None:
@@ -93,6 +95,7 @@ def test_zeros_of_events_are_those_of_arithmetic() -> None:
     assert min(known.above(0.3).of(t) for t in np.linspace(0, 1, 101)) > 0
 
 
+@pytest.mark.long
 def test_a_missing_or_moved_event_is_seen() -> None:
     """An event that is taken away, one that is moved by three bars, and a row beyond the loss of convexity."""
     rod, _ = wider.scene(1, 8)
@@ -108,6 +111,7 @@ def test_a_missing_or_moved_event_is_seen() -> None:
     assert ["zero is" in sentence or "happens 0 times" in sentence for sentence in facts.faults(diagram)] == [True] * 2
 
 
+@pytest.mark.long
 def test_an_oval_that_lies_otherwise_to_the_elements_is_no_other_branch() -> None:
     """The index in space has a zero that the mesh makes 1.58e-9 of one oval, and 1.56e-9 of one that is turned."""
     rod = scene(43, 48)
@@ -115,6 +119,7 @@ def test_an_oval_that_lies_otherwise_to_the_elements_is_no_other_branch() -> Non
     assert [branch.name for branch in diagram] == ["ring", "branch 1"] and not diagram.warnings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "number"), [pytest.param(5, 29, marks=pytest.mark.long), (24, 195)])
 @pytest.mark.usefixtures("few_rows")
 def test_sides_that_differ_across_their_plane_are_both_traced(seed: int, number: int) -> None:
@@ -126,6 +131,7 @@ def test_sides_that_differ_across_their_plane_are_both_traced(seed: int, number:
     assert (found.wrong, found.differs, found.said) == ([], [], [])
 
 
+@pytest.mark.long
 def test_a_side_that_turns_beside_the_branch_point_is_no_image() -> None:
     """One side turns at a fold 1.4e-9 in load below the branch point, the other has none: both are traced."""
     rod = scene(45, 63)
@@ -134,6 +140,7 @@ def test_a_side_that_turns_beside_the_branch_point_is_no_image() -> None:
         assert len(diagram) == 5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "number", "factors"), [(1, 98, "petsc"), (13, 14, "chain")])
 def test_dependent_constraints_have_no_index(seed: int, number: int, factors: str) -> None:
     """Both ends are held about d1, about which nothing bends: by MUMPS there was an index of -1.
@@ -145,6 +152,7 @@ def test_dependent_constraints_have_no_index(seed: int, number: int, factors: st
         solver.equilibrium(0.0)
 
 
+@pytest.mark.long
 def test_the_way_down_leaves_a_saddle() -> None:
     """A ring with nearly round sections: a mode of mu = -2e-4 is passed slowly, and one mesh in two stayed there."""
     found = []
@@ -156,6 +164,7 @@ def test_the_way_down_leaves_a_saddle() -> None:
     assert [point.negative for point in found] == [0, 0]
 
 
+@pytest.mark.long
 def test_the_way_down_from_a_saddle_does_not_turn_back() -> None:
     """Its unstable eigenvalue grows on the way: steps that were uphill led back, round and round on some meshes.
 
@@ -171,6 +180,7 @@ def test_the_way_down_from_a_saddle_does_not_turn_back() -> None:
     assert energies == pytest.approx([energies[-1]] * len(energies), abs=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("seed", "number", "ended"),
     [(15, 177, "stretch reaches zero"), (15, 400, "meets branch 1"), (16, 159, "120 points reached")],
@@ -189,6 +199,7 @@ def test_how_branches_end(seed: int, number: int, ended: str) -> None:
         assert min(point.stretch for point in branch.points) > -1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "number"), [pytest.param(11, 221, marks=pytest.mark.long), (19, 252), (19, 255)])
 def test_forces_of_a_taut_rod_are_not_determined(seed: int, number: int) -> None:
     """Its ends are as far apart as it is long: by round-off some meshes converged, to forces of 1e9 even."""
@@ -200,6 +211,7 @@ def test_forces_of_a_taut_rod_are_not_determined(seed: int, number: int) -> None
     assert not any("forces" in words for words in trace(slack, Discretization("auto", 5, 6), plan).warnings)
 
 
+@pytest.mark.long
 def test_both_factors_refuse_a_rod_that_is_held_twice() -> None:
     """About d1, about which it cannot bend: by MUMPS sigma is 1e-9, whose rows were scaled up, and it was traced."""
     rod, plan = wider.scene(2, 168)[0], Plan(depth=0, steps=StepControl(most=3), error_bars=False)
@@ -229,6 +241,7 @@ def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.silent
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("excess", "differs"), [(0.0, False), (1e-3, True)])
 def test_energies_where_the_ordinate_is_zero(monkeypatch: pytest.MonkeyPatch, excess: float, differs: bool) -> None:
     """By symmetry, on any mesh: its bar is round-off, but the energies of coarse meshes differ by 2.5e-6."""
@@ -247,6 +260,7 @@ def test_energies_where_the_ordinate_is_zero(monkeypatch: pytest.MonkeyPatch, ex
     assert bool(found.differs) == differs
 
 
+@pytest.mark.long
 def test_energies_that_meshes_have_in_error() -> None:
     """By symmetry the ordinate is zero; the energies are 1e-3 in error, apart by a fourth of that, and converge."""
     found = compared(scene(44, 392), 392)
@@ -315,6 +329,7 @@ def test_the_oracle_knows_a_saddle_point() -> None:
     assert (np.linalg.eigvalsh(scaled) < 0).sum() == (np.linalg.eigvalsh(S) < 0).sum()
 
 
+@pytest.mark.long
 def test_the_oracle_knows_a_frequency_that_is_zero() -> None:
     """Nothing holds a rod against a rotation: beside elements of 2e-7 its omega^2 is round-off of up to 2e-4."""
     made, _ = worker.made_by(20, 155, wide=True)
@@ -325,6 +340,7 @@ def test_the_oracle_knows_a_frequency_that_is_zero() -> None:
     assert np.real(others[:3]) == pytest.approx([omega2 for omega2, _ in point.omega2[:3]], rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_oracle_knows_what_it_does_not_know() -> None:
     """A molecule: omega^2 by rodfem are those of three more meshes to 1e-11, dense ones are 3e-5 off."""
     made, _ = worker.made_by(21, 389, wide=True)
@@ -337,6 +353,7 @@ def test_the_oracle_knows_what_it_does_not_know() -> None:
         assert off <= comparison.SQUARE or oracle.noise > comparison.SURE * comparison.SQUARE
 
 
+@pytest.mark.long
 def test_a_dip_before_a_stretch_of_zero() -> None:
     """The last row has no tangent, and an eigenvalue is least at the one before it: an exception left the program."""
     rod = scene(35, 459)

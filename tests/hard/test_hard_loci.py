@@ -24,6 +24,7 @@ def test_a_hard_locus(case: Case, value: Any) -> None:
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["branch point", "fold"])
 @pytest.mark.parametrize("width", [pytest.param(1e-6, marks=pytest.mark.long), 1e-7])
 def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
@@ -32,6 +33,7 @@ def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
     assert any("no convergence" in said or f"within {GAP:g}" in said for said in found.said)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("measure", "width", "words"),
     [
@@ -45,6 +47,7 @@ def test_a_peak_that_is_not_followed_is_said(measure: Callable[[float], Measured
     assert not found.right and any(words in said for said in found.said)
 
 
+@pytest.mark.long
 def test_a_locus_of_a_point_that_the_mesh_does_not_resolve_says_so() -> None:
     """One of two eigenvalues that are one for the rod: its curve has another index, and errors beyond its bars."""
     found = loci_codim2.modulated(0.15)

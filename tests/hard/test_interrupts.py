@@ -54,6 +54,7 @@ def struck(command: tuple[str, ...], ranks: int, line: str, whom: str, number: i
     return Ended(program.returncode, errors, left)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_one_process(folder: Path, number: int) -> None:
     ended = struck((*HEMITROPIC, str(folder)), 1, SECOND_BRANCH, "first", number)
@@ -63,6 +64,7 @@ def test_one_process(folder: Path, number: int) -> None:
     assert not (folder / ".lock").exists()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("whom", "number", "status"),
     [
@@ -81,6 +83,7 @@ def test_two_ranks(folder: Path, whom: str, number: int, status: int) -> None:
     assert branches_in(folder)[0] == "straight"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ranks", "whom"), [pytest.param(1, "first", marks=pytest.mark.long), (2, "last")])
 def test_many_rods(folder: Path, ranks: int, whom: str) -> None:
     ended = struck((*MAP, str(folder)), ranks, ROD, whom, signal.SIGINT)

@@ -22,6 +22,7 @@ def test_killed_and_gone_on(tmp_path: Path) -> None:
     assert [row[1] for row in kills.in_rows(entries)] == ["1", "1", "0", "0"]
 
 
+@pytest.mark.long
 def test_a_lost_branch_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that the run before the kill had, and the one that goes on has not."""
     known = kills.whole(tmp_path / "whole")

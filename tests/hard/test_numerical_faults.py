@@ -64,6 +64,7 @@ def failing(method: Callable[..., Any], when: Callable[[], bool], fault: Callabl
     return instead
 
 
+@pytest.mark.long
 @pytest.mark.versions
 @pytest.mark.parametrize(
     ("fault", "sentence"), [FAULTS[0], *(pytest.param(*x, marks=pytest.mark.alone) for x in FAULTS[1:])]
@@ -128,6 +129,7 @@ def test_no_error_is_estimated_where_memory_is_exhausted(monkeypatch: pytest.Mon
     assert [w for w in diagram.warnings if "Memory is exhausted" in w and w.startswith("No error was estimated at lam")]
 
 
+@pytest.mark.long
 @pytest.mark.versions
 @pytest.mark.parametrize(
     "fault",

@@ -92,6 +92,7 @@ RECALLED = ("family", "crooked")
 """Cases all of whose steps are recalled, and compared, in another test that is not long."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
@@ -134,6 +135,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.parametrize("steps", [1, 2, 3])
 def test_every_step_is_recalled(folder: Path, whole: Path, steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -311,6 +313,7 @@ def test_steps_come_in_their_order() -> None:
     assert journal.next("found 1") is None
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("name", ["hemitropic", "accuracy", "family", "crooked"])
 def test_a_step_that_is_recalled_leaves_what_it_left(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,6 +23,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 pytestmark = pytest.mark.alone
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("scene", "branch"), RODS)
 def test_scipy_solves_the_same_rods(scene: str, branch: str) -> None:
     rod, (target,) = RODS[scene, branch], [t for t in TARGETS[scene][branch] if t.at is not None]
@@ -53,6 +54,7 @@ def test_an_error_that_is_small_by_chance_does_not_count() -> None:
     assert fastest(rows, 1e-10, lambda r: float(r["seconds"])) is None
 
 
+@pytest.mark.long
 def test_figures_are_drawn_from_the_page_alone(tmp_path: Path) -> None:
     page = tmp_path / "speed.md"
     page.write_text((DOCS / "speed.md").read_text())

@@ -52,6 +52,7 @@ def installed(folder: Path) -> Path:
     return folder / "bin" / "python"
 
 
+@pytest.mark.long
 def test_types_of_an_installed_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The README's scripts are accepted by ``mypy --strict`` elsewhere, and no public name is ``Any`` there."""
     api = pytest.importorskip("mypy.api", reason="mypy is not installed: `make lint` does that")
@@ -109,6 +110,7 @@ def test_a_run_without_pictures_loads_nothing_else(tmp_path: Path) -> None:
     assert loaded[-1] == "True"
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("order", ["rodfem.Discretization", "rodfem.trace", "forms", "rodfem.compat"])
 def test_versions_are_known_without_the_package_manager(order: str) -> None:
     """Whatever is loaded first; and any other name of ``pkg_resources`` is that of the real one."""
@@ -122,6 +124,7 @@ def test_versions_are_known_without_the_package_manager(order: str) -> None:
     subprocess.run([sys.executable, "-c", program], check=True, cwd=HOME)
 
 
+@pytest.mark.long
 def test_a_star_brings_all_public_names_and_help_stays_short() -> None:
     names: dict[str, object] = {}
     exec("from rodfem import *", names)

@@ -31,6 +31,7 @@ BACKWARD = 1e-14
 """Backward error of a solution."""
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_random_chains(symmetric: bool) -> None:
@@ -129,6 +130,7 @@ def test_matrices_of_every_scene(name: str) -> None:
             symmetric.agree(matrix)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("name", ["cord", "hemitropic", "ruler"])
@@ -148,6 +150,7 @@ def test_beside_special_points(name: str, formulation: str) -> None:
     assert seen >= 14
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize(("formulation", "elements", "degree"), [("reduced", 3000, 1), ("reduced", 400, 6)])
 def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) -> None:
@@ -161,6 +164,7 @@ def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) ->
     assert factors.elimination.delayed < elements / 4
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
     compiler = shutil.which("gcc")
@@ -178,6 +182,7 @@ def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (0, "0 wrong\n"), done.stdout + done.stderr
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("scene", ["cord", "hemitropic"])
 def test_the_last_resort(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -58,6 +58,7 @@ def check(factors: Pieces | Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
     np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
 
 
+@pytest.mark.few(2)
 @pytest.mark.versions
 @PACKAGES
 @FORMULATIONS

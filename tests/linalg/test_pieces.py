@@ -85,6 +85,7 @@ def parts_of(cells: int, vertex: int, inner: int, pieces: int, rng: np.random.Ge
     return [np.arange(*ends) for ends in zip(begin, end, strict=True)]
 
 
+@pytest.mark.few(4)
 @pytest.mark.alone
 @alone
 @KINDS
@@ -154,6 +155,7 @@ def distributed(right: np.ndarray, matrix: PETSc.Mat) -> PETSc.Vec:
     return out
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.short
 @KINDS

@@ -39,6 +39,7 @@ EULER = {
 }
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("supports", EULER)
 def test_euler(supports: str, formulation: str) -> None:
@@ -130,6 +131,7 @@ def test_values_in_the_literature() -> None:
     assert pytest.approx(7.8373474389, rel=1e-10) == HEAVY
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("name", "formulation"),
     [
@@ -157,6 +159,7 @@ def tip_of_elastica(P: float) -> tuple[float, float]:
     return 2 * float(ellipe(m)) / w - 1, 2 * sqrt(m) / w
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_elastica(formulation: str) -> None:
     assert tip_of_elastica(1.5 * E1) == pytest.approx((0.3635882249, 0.7885758057), rel=1e-9)
@@ -172,6 +175,7 @@ def test_elastica(formulation: str) -> None:
     assert [b.points[-1].negative for b in found.branches] == [2, 0, 1]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_bow(formulation: str) -> None:
     """Pinned ends at a prescribed distance: the multiplier is the thrust of the elastica."""
@@ -185,6 +189,7 @@ def test_bow(formulation: str) -> None:
     assert {p.negative for p in found.branches[0].points} == {0}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_bathe_and_bolourchi(formulation: str) -> None:
     r = explore(classics.bathe(), formulation).sample()["r"][-1]
@@ -197,6 +202,7 @@ def helix(s: np.ndarray, curvature: float, torsion: float) -> np.ndarray:
     return np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_helix_of_any_pitch(formulation: str) -> None:
     """A helix is a solution for any pitch; what holds it is a force and a moment along its axis."""
@@ -211,6 +217,7 @@ def test_helix_of_any_pitch(formulation: str) -> None:
         assert abs(n - force).max() < 1e-7
 
 
+@pytest.mark.long
 def test_helix_as_the_degree_grows() -> None:
     """Its error falls to round-off."""
     errors, t = [], 2.0
@@ -226,6 +233,7 @@ def test_helix_as_the_degree_grows() -> None:
     assert all(b < a / 50 or b < 1e-13 for a, b in pairwise(errors))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_extension_of_a_helical_spring(formulation: str) -> None:
     """A helix under every force along its axis, of curvature and torsion that its two equilibrium equations give."""
@@ -266,6 +274,7 @@ def turned(q: np.ndarray, a: np.ndarray) -> np.ndarray:
     return a + 2 * np.cross(u, w * a + np.cross(u, a))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_clamped_loop(formulation: str) -> None:
     """Twisted by four radian until its ends pass each other: integrals of motion, and an initial value problem."""
@@ -286,6 +295,7 @@ def test_clamped_loop(formulation: str) -> None:
 # --- planar rods ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.short
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_lateral_buckling_of_a_planar_rod(formulation: str) -> None:
@@ -295,6 +305,7 @@ def test_lateral_buckling_of_a_planar_rod(formulation: str) -> None:
         assert (p.negative, p.negative_in_space) == (0, int(p.load > 4.62463226448))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_planar_column(formulation: str) -> None:
     """Bent about its stiff axis, the weak one being across: stable in the plane, unstable in space."""
@@ -309,6 +320,7 @@ def test_planar_column(formulation: str) -> None:
     assert r[1] == 0
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("kind", ["moment", "follower_moment"])
 def test_rolled_up(kind: str, formulation: str) -> None:
@@ -325,6 +337,7 @@ def test_rolled_up(kind: str, formulation: str) -> None:
         assert sample["r"] == pytest.approx(arc, abs=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("planar", ["e2", None])
 def test_hanging_cable(planar: str | None) -> None:
     """Straight and too long at first, it finds down; but for what its stiffness does it is a catenary."""
@@ -341,6 +354,7 @@ def test_hanging_cable(planar: str | None) -> None:
 # --- a material that loses its convexity ----------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.short
 def test_loss_of_convexity() -> None:
     """``W = k^2/2 - k^4/4`` is convex to ``k^2 = 1/3``, which the clamped end reaches first: by quadrature.
@@ -384,6 +398,7 @@ def cantilever(mu: complex, P: float, tip: float, middle: float) -> complex:
     return complex(np.linalg.det(np.array([y[2], y[3] + mu * tip * y[0]])))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("tip", "middle", "span", "about"),
     [
@@ -410,6 +425,7 @@ def test_flutter_with_masses(
     assert (flutter.negative_before, flutter.negative_after) == (0, 2)
 
 
+@pytest.mark.long
 def test_leipholz(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
     scene = classics.leipholz()
@@ -417,6 +433,7 @@ def test_leipholz(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sweep(scene).loads("flutter") == pytest.approx([40.0537365149], rel=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", ["moment", "follower_moment"])
 def test_torque_on_a_cantilever(kind: str) -> None:
     """Nicolai's paradox: where both stiffnesses are equal there is flutter, however small the torque."""

@@ -31,6 +31,7 @@ def default(formulation: str = "reduced") -> Found:
     return explored("cord", formulation, at=AT)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("turns", "span"),
     [(1, (30, -30)), (1.2, (60, -60)), (1.5, (60, 0)), (1.7, (90, 0)), (2, (140, 3)), (2.5, (250, 0))],
@@ -50,6 +51,7 @@ def test_straight_state(turns: float, span: tuple[float, float]) -> None:
         assert (p.ordinate, p.energy) == pytest.approx((0, (2 * pi * turns) ** 2 / 2), rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.long
 def test_range_that_ends_on_a_branch_point() -> None:
     """With whole turns the straight rod is singular at lam = 0, where a family of equal tension and energy leaves."""
     found = explored("cord", turns=1, span=(30, 0), elements=6, depth=1)
@@ -65,6 +67,7 @@ def test_range_that_ends_on_a_branch_point() -> None:
         assert (p.load, p.energy) == pytest.approx((0, 2 * pi**2), abs=1e-8)
 
 
+@pytest.mark.long
 def test_euler_buckling_out_of_the_plane_of_curvature() -> None:
     """At -4 pi^2 the straight rod buckles about d2, which its curvature does not feel; its load enters no equation."""
     found = explored("cord", turns=1, span=(20, -60), elements=6)
@@ -123,6 +126,7 @@ def test_work_of_the_tension(name: str) -> None:
     assert b.energy - a.energy + b.load * b.ordinate - a.load * a.ordinate == pytest.approx(integral, abs=1e-9)
 
 
+@pytest.mark.long
 def test_formulations_agree() -> None:
     assert [b.name for b in default().branches] == ["straight", "branch 1", "branch 2", "branch 1.1", "branch 1.2"]
     for one, other in zip(default().branches, default("pointwise").branches, strict=True):

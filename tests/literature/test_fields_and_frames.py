@@ -37,6 +37,7 @@ pytestmark = pytest.mark.alone
 FIRST = Plan(depth=0)
 
 
+@pytest.mark.long
 def test_rotating_cantilever() -> None:
     """About e1 at the rate 12: across its plane Wright, Smith, Thresher & Wang (1982) have 13.1702 and 37.6031.
 
@@ -62,6 +63,7 @@ def test_rotating_cantilever() -> None:
     assert verdict.values[:4] == pytest.approx(expected, rel=1e-8)
 
 
+@pytest.mark.long
 def test_current_along_a_magnetic_field() -> None:
     """A wire with a current along a field: ``y'''' = i p y'`` for ``y = r1 + i r2`` (Wolfe, Trans. AMS 278, 1983).
 
@@ -81,6 +83,7 @@ def test_current_along_a_magnetic_field() -> None:
     assert abs(found.point.load - brentq(clamps, 300, 450, xtol=1e-12)) < found.error_estimate < 1e-8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("side", [1, -1])
 def test_arc_in_pure_bending(side: int) -> None:
     """A strip bent to an arc of angle a, its ends on forks: ``M = (B + C)/2 -+ sqrt((B - C)^2/4 + B C pi^2/a^2)``.
@@ -110,6 +113,7 @@ def test_arc_in_pure_bending(side: int) -> None:
     assert abs(found.point.load - expected) < found.error_estimate < 1e-9
 
 
+@pytest.mark.long
 def test_frame_of_lee() -> None:
     """Two legs of length one, pinned at their ends, and a load at a fifth of the second one: Lee, Manuel & Rossow 1968.
 

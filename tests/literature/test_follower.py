@@ -53,6 +53,7 @@ def test_where_eigenvalues_meet() -> None:
     assert double(20.0, 120.0, J=1e-3)[0] == pytest.approx(19.8391305740585, rel=1e-9)
 
 
+@pytest.mark.long
 def test_two_flutters_in_a_coarse_sweep() -> None:
     """A step of two in the load, within which an eigenvalue of the strong plane passes by the pair that meets."""
     found = specials(swept((0.0, 200.0)), "flutter")
@@ -62,6 +63,7 @@ def test_two_flutters_in_a_coarse_sweep() -> None:
     assert found[0].error_estimate < 1e-9
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("span", "J"), [((0.0, 25.0), 0.0), ((25.0, 15.0), 1e-3)])
 def test_flutter(span: tuple[float, float], J: float) -> None:
     branch = swept(span, (J, 0.0, 0.0))
@@ -78,6 +80,7 @@ def test_flutter(span: tuple[float, float], J: float) -> None:
                 assert np.nanmin([abs(column(value, p.load, *plane) - value) for plane in ((1, J), (10, 0))]) < 1e-6
 
 
+@pytest.mark.long
 def test_ordinate_of_a_load_that_is_not_known_better() -> None:
     """A stretching column stays straight, and its length is ``1 - P/EA``: its bar is that of P over EA.
 
@@ -147,6 +150,7 @@ def test_motions_have_names() -> None:
         assert np.min(abs(mu - expected)) < 1e-8 * abs(mu)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("elements", "degree"), [(2, 2), (2, 3), (8, 1), (4, 6)])
 @pytest.mark.parametrize("P", [1.8, 30.0])
 def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: float) -> None:

@@ -58,6 +58,7 @@ def floating(ends: tuple, span: tuple[float, float], **loads) -> Scene:
 PRESSED = (free(lambda c: (0.0, 0.0, c.P)), free(lambda c: (0.0, 0.0, -c.P)))
 
 
+@pytest.mark.long
 @pytest.mark.short
 def test_frequencies_and_rigid_motions() -> None:
     """Six zero eigenvalues, of three translations and three rotations, and pairs of frequencies in two planes."""
@@ -72,6 +73,7 @@ def test_frequencies_and_rigid_motions() -> None:
     assert (verdict.negative, verdict.zero) == (0, 6) and verdict.certified
 
 
+@pytest.mark.long
 def test_dead_forces_at_both_ends() -> None:
     """Pressed, it turns round at once, in two directions; besides, it buckles as between pins.  Pulled it is stable."""
     diagram = rodfem.trace(floating(PRESSED, (1.0, 45.0)), MESH, Plan(depth=0))
@@ -97,6 +99,7 @@ def beal(load: float) -> np.ndarray:
     return np.linalg.eigvals(np.linalg.solve((w * weight) @ w.T, K))
 
 
+@pytest.mark.long
 def test_thrust_along_the_end() -> None:
     """In the frame that moves with the rod the load is balanced by its inertia; Beal (AIAA J. 3, 1965): 109.69."""
     low, high = 100.0, 120.0
@@ -113,6 +116,7 @@ def test_thrust_along_the_end() -> None:
     assert found.point.load == pytest.approx(109.69, abs=5e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rotary", [0.0, 0.01])
 def test_thrust_of_a_rod_that_bends_unlike_in_its_planes(rotary: float) -> None:
     """Each plane by itself, the stiffer one as at half the load; a tilt of the rod is no state of its own.
@@ -151,6 +155,7 @@ def with_mass_at_nose(m: float, stiffness: tuple[float, float, float], span: tup
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mesh", [MESH, pytest.param(Discretization("pointwise", 8, 5), marks=pytest.mark.long)])
 @pytest.mark.usefixtures("few_loads")
 def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretization) -> None:
@@ -192,6 +197,7 @@ def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretizat
     assert not found.warnings
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_divergence_of_two_planes_that_bend_nearly_alike() -> None:
     """Each plane at its stiffness times one load, both in one step, beside eigenvalues that are zero at all loads."""
@@ -205,6 +211,7 @@ def test_divergence_of_two_planes_that_bend_nearly_alike() -> None:
     assert abs(second.point.load - ratio * first.point.load) < error and not found.warnings
 
 
+@pytest.mark.long
 def test_ring_under_a_pressure_that_follows(monkeypatch: pytest.MonkeyPatch) -> None:
     """Out of its plane, by ``v`` and a twist ``a`` of n waves, a ring of radius one under forces P along its normal.
 
@@ -228,6 +235,7 @@ def test_ring_under_a_pressure_that_follows(monkeypatch: pytest.MonkeyPatch) -> 
     assert not found.warnings
 
 
+@pytest.mark.long
 def test_forces_that_nothing_balances() -> None:
     one_sided = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
     with pytest.raises(SceneError, match="nothing holds the rod against"):
@@ -238,6 +246,7 @@ def test_forces_that_nothing_balances() -> None:
         rodfem.trace(floating((free(), free()), (0.0, 5.0), distributed=lambda c: (0.0, 0.0, -c.P)), MESH)
 
 
+@pytest.mark.long
 def test_a_spring_that_resists_turning_alone() -> None:
     """A rod that turns against a spring at one end and is held nowhere: stable, and free to move along e1, e2, e3."""
     spring = End(energy=lambda x, c: loads.rotational_spring(x.q, 2.0 + c.P))

@@ -48,6 +48,7 @@ def interior(branch: Branch) -> list:
     return [p for p in branch.points[1:] if id(p) not in singular]
 
 
+@pytest.mark.long
 def test_first_branch() -> None:
     first = from_point(branches(), "straight", 0)
     for load in AT:
@@ -87,6 +88,7 @@ def test_second_branch_ends_where_the_stretch_vanishes() -> None:
     assert min(p.stretch for p in second.points[:-1]) > 0
 
 
+@pytest.mark.long
 def test_secondary_pitchfork() -> None:
     found = branches(constants=(0.0, 1.0, 1.0, 3.0))
     first = from_point(found, "straight", 0)
@@ -99,6 +101,7 @@ def test_secondary_pitchfork() -> None:
         assert [p.ordinate for p in user_points(leaving, load)] == pytest.approx([ordinate], abs=1e-10)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("constants", "number", "load", "before", "after"),
     [
@@ -159,6 +162,7 @@ def errors(found: list[Branch]) -> list[tuple[str, float, float]]:
     return out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("formulation", "elements", "degree"),
     [
@@ -176,6 +180,7 @@ def test_error_estimates_bound_the_error(formulation: str, elements: int, degree
         assert estimate <= most * true + 2e-11, name
 
 
+@pytest.mark.long
 def test_formulations_agree_within_their_estimates() -> None:
     both = [branches(formulation, *PLAIN) for formulation in ("reduced", "pointwise")]
     for a, b in zip(*both, strict=True):
@@ -231,6 +236,7 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
             assert (p.negative, p.zero) == (1, 2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("apart", [1e-3, 1e-5])
 def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> None:
     """Pinned column on a foundation k = 4 pi^4 (1 + d), where modes 1 and 2 nearly meet at P = 5 pi^2.

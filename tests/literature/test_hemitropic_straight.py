@@ -27,12 +27,14 @@ def buckling_points(formulation: str, elements: int, degree: int, constants: Con
     return specials(straight, "branch point")
 
 
+@pytest.mark.few(5)
 @pytest.mark.alone
 @pytest.mark.parametrize("constants", REFERENCE)
 def test_closed_form(constants: Constants) -> None:
     np.testing.assert_allclose(closed_form_hemitropic.loads(*constants), REFERENCE[constants], rtol=0, atol=1e-14)
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_loads_of_both_formulations(formulation: str) -> None:
@@ -43,6 +45,7 @@ def test_loads_of_both_formulations(formulation: str) -> None:
     assert all(s.located_to < 1e-10 for s in found)
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("constants", REFERENCE)
 def test_loads_and_indices(constants: Constants) -> None:
@@ -69,6 +72,7 @@ def test_straight_states() -> None:
         assert abs(p.ordinate) < 1e-12
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize(
     ("formulation", "degree", "meshes"),

@@ -55,6 +55,7 @@ def is_right(text: str, value: float) -> bool:
     return f"{value:.{len(text.partition('.')[2])}f}" == text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", REFERENCES)
 def test_rows_of_the_table(name: str) -> None:
     (row,) = [row for row in ROWS if row[0].startswith(name)]

@@ -54,6 +54,7 @@ def ring(turns: int, load: str, span: tuple[float, float], **more: Any) -> Scene
     )  # type: ignore[arg-type]  # fmt: skip
 
 
+@pytest.mark.long
 def test_ring_covered_twice() -> None:
     """Out of its plane a mode of wave number p has the energy ``B (a p - b)^2 + C (a - b p)^2 - M (a^2 ...)``.
 
@@ -70,6 +71,7 @@ def test_ring_covered_twice() -> None:
         assert abs(special.point.load - k0) < special.error_estimate < 1e-8
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "count"])
 def test_vibrating_ring(method: str) -> None:
     """Love: ``n^2 (n^2 - 1)^2 / (n^2 + B/C)`` out of the plane, ``B2 n^2 (n^2 - 1)^2 / (n^2 + 1)`` in it.
@@ -85,6 +87,7 @@ def test_vibrating_ring(method: str) -> None:
     assert verdict.values == pytest.approx(np.repeat(expected, 2), rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("above", [0.0, 0.2, -0.2])
 def test_load_above_a_strip(above: float) -> None:
     """A strip that does not bend in its plane, loaded across at its tip, off its axis (Prandtl, Timoshenko & Gere 6.3).
@@ -124,6 +127,7 @@ def torque(T: float) -> float:
     return float(brentq(determinant, grid[i], grid[i + 1], xtol=1e-13))
 
 
+@pytest.mark.long
 def test_torque_and_tension() -> None:
     turned: Any = lambda c: (ufl.cos(c.phi / 2), 0.0, 0.0, ufl.sin(c.phi / 2))  # noqa: E731
     rod = column(
@@ -137,6 +141,7 @@ def test_torque_and_tension() -> None:
         assert 2.0 * phi == pytest.approx(torque(T), rel=1e-8)
 
 
+@pytest.mark.long
 def test_buckling_in_tension() -> None:
     """Haringx: ``P (1 + P/GA) = n^2 pi^2 B``, the negative root; for n = 0, ``P = -GA``, all sections turn alike."""
     GA = 10.0
@@ -151,6 +156,7 @@ def test_buckling_in_tension() -> None:
         assert abs(special.point.load - P) < special.error_estimate < 1e-9
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("start", "rotation"),
     [
@@ -187,6 +193,7 @@ def eight(C: float, m: float) -> float:
     return float(eigvalsh(size)[:4].sum())
 
 
+@pytest.mark.long
 def test_figure_eight() -> None:
     """A closed elastica that crosses itself, ``2 E(m) = K(m)``: stable in space where C exceeds two.
 
@@ -211,6 +218,7 @@ def test_figure_eight() -> None:
     assert abs(last.point.load - sqrt(3)) < 1e-9 and abs(last.point.ordinate) == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.long
 def test_moebius_band() -> None:
     """Ends that meet, one turned by pi: an oblong section fits its own back, and the band slides along itself.
 

@@ -34,6 +34,7 @@ def quartic(v: Any, k: Any, c: Any) -> Any:
     return bending_and_twist(k, (9.0, 1.0, 1.0)) + c.beta * k[1] ** 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("beside", [0.9, 1.001])
 def test_material_that_is_not_linear(beside: float) -> None:
     """For ``k^2/2 + beta k^4`` ``P = pi^2 + pi^4/8 (1 + 24 beta pi^2) x^2``: subcritical below -1/(24 pi^2)."""
@@ -44,6 +45,7 @@ def test_material_that_is_not_linear(beside: float) -> None:
     assert abs(found.law.coefficient - pi**4 / 8 * (1 - beside)) <= found.law.uncertainty < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("excess", [0.3, pytest.param(1e-3, marks=pytest.mark.long), 1e-4])
 def test_column_that_stretches(excess: float) -> None:
     """``P (1 - P/EA) = pi^2`` has two roots if EA exceeds 4 pi^2: it buckles, and is straight again when it is shorter.
@@ -67,6 +69,7 @@ def test_column_that_stretches(excess: float) -> None:
         assert abs(special.law.coefficient - expected) <= special.law.uncertainty < 1e-3 * abs(expected)
 
 
+@pytest.mark.long
 def test_buckling_in_tension() -> None:
     """Under a tension T a column that shears buckles supercritically: the law with ``T (T/GA - 1)``, ``T^2/(6 GA)``."""
     GA = 10.0
@@ -80,6 +83,7 @@ def test_buckling_in_tension() -> None:
     assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("of", [lambda r, q: 0.0, lambda r, q: float(r[1]), lambda r, q: float(r[0]) ** 4])
 def test_ordinate_that_does_not_change(of: Any) -> None:
     """``P = pi^2 + pi^2/4 a^2`` whatever the ordinate is: ``a^2`` is the integral of the square of the angle."""
@@ -107,6 +111,7 @@ def test_size_of_a_displacement_at_a_transcritical_point() -> None:
     assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("C", [1.3, 1.4])
 def test_ring_whose_ordinate_is_its_length(C: float) -> None:
     """Michell's ring buckles supercritically for C/B above 11/8, also where nothing is measured of it."""
@@ -126,6 +131,7 @@ def michell(C: float, ordinate: Ordinate) -> Any:
     return rodfem.trace(ring, Discretization(elements=14, degree=6), plan).special("branch point", "ring")[0]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("C", [1.3, 1.4])
 def test_ring_of_intrinsic_twist(C: float) -> None:
     """Michell's ring buckles supercritically for C/B above 11/8 (Le Bret 1984): ``t = sqrt(3)/C + (C - 11/8)/C x``.
@@ -139,6 +145,7 @@ def test_ring_of_intrinsic_twist(C: float) -> None:
     assert found.law.coefficient == pytest.approx((C - 11 / 8) / C, abs=1e-7)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("beta", [1.0, *(pytest.param(x, marks=pytest.mark.long) for x in (0.3, 0.01)), 1e-3])
 def test_foundation_that_is_softer_on_one_side(beta: float) -> None:
     """With ``beta x^3`` per length ``P = pi^2 + 8 beta/pi^3 x + pi^4/8 x^2 + ...``: two branches, a fold on one.
@@ -164,6 +171,7 @@ def test_foundation_that_is_softer_on_one_side(beta: float) -> None:
     assert not any(branch.unexplained for branch in diagram) and not diagram.warnings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("asked", [True, False])
 def test_loads_between_a_fold_and_its_branch_point(asked: bool) -> None:
     """Two bent states, the roots of ``8 beta/pi^3 x + pi^4/8 x^2 = P - pi^2``, beside the straight one."""
@@ -188,6 +196,7 @@ def test_fold_within_the_uncertainty_of_a_branch_point() -> None:
     assert point.note == "a branch that leaves here turns back in a fold that is 1e-10 away in load"
 
 
+@pytest.mark.long
 def test_sides_that_differ_across_the_plane() -> None:
     """``g x y^2`` does nothing in the plane across y: of the two sides of the pitchfork one is unstable in space."""
     ends = (clamped(), sliding(ON_AXIS, force=push))
@@ -198,6 +207,7 @@ def test_sides_that_differ_across_the_plane() -> None:
     assert ends_at[1.0].ordinate == pytest.approx(-ends_at[-1.0].ordinate, rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("planar", [None, "e2"])
 def test_states_beside_a_pitchfork(planar: str | None, folder: Path) -> None:
     """At loads just above the critical one the straight state and the bent one, ``x = sqrt(8 (P - pi^2)) / pi^2``."""

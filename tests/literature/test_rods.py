@@ -50,6 +50,7 @@ def linearized(stiffness: Any, k: Any, m: Any, n: Any) -> np.ndarray:
 # --- many eigenvalues nearer to zero than the one that crosses ------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("EI", [1e-3, 1e-6])
 def test_whirling_string(EI: float) -> None:
     """Pulled by T, spinning at sqrt(P): ``P = EI (n pi)^4 + T (n pi)^2``, twice each; torsion is softer by far."""
@@ -67,6 +68,7 @@ def test_whirling_string(EI: float) -> None:
 # --- loads without a potential --------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_divergence_under_a_force_that_turns_partly() -> None:
     """Of a thrust P a part ``a < 1/2`` turns with the tip: ``cos sqrt(P/EI) = -a/(1 - a)``, no flutter before."""
     a = 0.3
@@ -82,6 +84,7 @@ def test_divergence_under_a_force_that_turns_partly() -> None:
     assert len(after) == 1
 
 
+@pytest.mark.long
 def test_beck_on_a_foundation() -> None:
     """An elastic foundation does not change the load of flutter (Smith & Herrmann 1972)."""
     rod = column(
@@ -91,6 +94,7 @@ def test_beck_on_a_foundation() -> None:
     assert sweep(rod).loads("flutter") == pytest.approx([20.0509536], rel=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("span", [(20.0, 60.0), (60.0, 20.0)])
 def test_divergence_and_flutter_in_one_step(span: tuple[float, float]) -> None:
     """Beck's column with a spring at its tip: ``w'''' + P w'' = mu w``, ``w'' = 0`` and ``w''' = k w`` there.
@@ -124,6 +128,7 @@ def test_divergence_and_flutter_in_one_step(span: tuple[float, float]) -> None:
     assert not diagram.warnings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.356, 0.3546])
 def test_divergence_beside_flutter(share: float) -> None:
     """Where 0.35431 of a thrust turns with the tip, two frequencies become zero at once (Kordas & Zyczkowski 1963).
@@ -155,6 +160,7 @@ def test_divergence_beside_flutter(share: float) -> None:
     assert not diagram.warnings
 
 
+@pytest.mark.long
 def test_hauger() -> None:
     """Tangential thrust ``P (1 - s)`` along a rod that bends alike in all planes, against polynomials of degree 15."""
     x, weight = np.polynomial.legendre.leggauss(40)
@@ -182,6 +188,7 @@ def test_hauger() -> None:
 # --- planar rods with more than dead forces at an end ---------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_planar_rod_against_an_incline(formulation: str) -> None:
     """The tip slides on ``x + z = 1`` without friction: to first order it does not move, as on a pin."""
@@ -192,6 +199,7 @@ def test_planar_rod_against_an_incline(formulation: str) -> None:
     assert explore(rod, formulation).loads() == pytest.approx([20.1907285564], rel=4e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_planar_column_with_a_spring(formulation: str) -> None:
     """``tan w / w = 1 - w^2 / k`` with ``P = w^2``, as for a column in space."""
@@ -277,6 +285,7 @@ def turned_end() -> tuple[Scene, list[float]]:
     return rod, zeros(spin, 0.5, 15.0, 3000)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("make", [coupled, softening, strip, hinges, turned_end])
 def test_critical_loads(make: Callable[[], tuple[Scene, list[float]]], formulation: str) -> None:
@@ -285,6 +294,7 @@ def test_critical_loads(make: Callable[[], tuple[Scene, list[float]]], formulati
     assert explore(rod, formulation).loads() == pytest.approx(expected, rel=1e-8)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("n", [2, 3])
 def test_ring_with_too_much_curvature(n: int) -> None:
     """``m^2 - (B + C) m - B C (n^2 - 1) = 0`` for the moment ``m = 1 - k0`` of a ring that is curved by k0 when cut."""
@@ -298,6 +308,7 @@ def test_ring_with_too_much_curvature(n: int) -> None:
     assert explore(ring, elements=10).loads() == pytest.approx([k0], rel=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("planar", [None, "e2"])
 def test_clothoid(planar: str | None) -> None:
     """A rod whose natural curvature grows along it rolls up to Euler's spiral: Fresnel's integrals."""

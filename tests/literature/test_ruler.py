@@ -67,6 +67,7 @@ def test_work_of_the_force() -> None:
         assert b.energy - a.energy - b.load * x[2] + a.load * x[0] == pytest.approx(-integral, abs=1e-9)
 
 
+@pytest.mark.long
 def test_lateral_buckling() -> None:
     plane = default()["plane"]
     first, second = specials(plane, "branch point")
@@ -92,6 +93,7 @@ def test_buckled(name: str, index: int) -> None:
     assert {p.negative for p in branch.points[1:]} == {index}
 
 
+@pytest.mark.long
 def test_nothing_happens_the_easy_way() -> None:
     found = explored("ruler", direction="e2")
     (plane,) = found.branches
@@ -101,6 +103,7 @@ def test_nothing_happens_the_easy_way() -> None:
     assert tip(found, plane.points[-1]) == pytest.approx(end[7:10], abs=1e-9)
 
 
+@pytest.mark.long
 def test_inextensible_limit() -> None:
     stretchings = np.array([1e5, 1e6])
     loads = []
@@ -112,6 +115,7 @@ def test_inextensible_limit() -> None:
     assert limit == pytest.approx(lateral_buckling(4.62, inf), abs=1e-9)
 
 
+@pytest.mark.long
 def test_formulations_agree() -> None:
     for one, other in zip(default("reduced").branches, default("pointwise").branches, strict=True):
         assert (one.name, one.ended) == (other.name, other.ended)

@@ -49,6 +49,7 @@ def quartic(P: float, k: float, n: int) -> float:
     return (P / 8 - k / (2 * n**2 * pi**2)) * (n * pi / sin(n * pi * S)) ** 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("B2", [2.0, 5.0])
 @pytest.mark.parametrize("make", [on_foundation, propped])
 def test_both_branches_leave(make: Callable[[float], Scene], B2: float) -> None:
@@ -76,6 +77,7 @@ def test_no_more_branches_than_asked_for_leave_one_point() -> None:
     assert len(rodfem.trace(on_foundation(2.0), plan=plan).branches) == 2
 
 
+@pytest.mark.long
 def test_two_waves_are_two_elasticas() -> None:
     """They leave the spring in the middle alone: each half is a column between pins, ``P = (4 K(m))^2``."""
     P = 44.0

@@ -105,6 +105,7 @@ def shape(mu: complex, P: float, s: np.ndarray, adjoint: bool) -> np.ndarray:
     return np.tensordot([row[1], -row[0]], basis(s, 0), 1)
 
 
+@pytest.mark.few(2)
 @pytest.mark.versions
 @pytest.mark.parametrize(
     ("P", "near"), [(10.0, 26.8), (10.0, 345.5), pytest.param(30.0, 50 + 150j, marks=pytest.mark.short)]
@@ -134,6 +135,7 @@ NEAR_FLUTTER: dict[float, tuple[complex, ...]] = {
 """Loads 1e-5 to 1e-8 beside Beck's, and omega^2: roots of his characteristic equation, by mpmath with 40 digits."""
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("elements", [4, 6])
 @pytest.mark.parametrize("load", NEAR_FLUTTER)
 def test_bars_where_frequencies_meet(load: float, elements: int) -> None:
@@ -145,6 +147,7 @@ def test_bars_where_frequencies_meet(load: float, elements: int) -> None:
         assert abs(modes.value[i] - exact) <= modes.error[i] < 1e-4 * abs(exact)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("elements", "degree"), [(3, 1), (2, 2), (2, 3), (2, 4)])
 def test_bars_on_coarse_meshes_are_those_of_the_same_mode(elements: int, degree: int) -> None:
     """Beck's column: the third mode of a coarse mesh is nearer to a higher one of the next mesh than to the third."""
@@ -171,6 +174,7 @@ CASES = {
 }
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.short) if x == "cord" else x for x in CASES])
 def test_motion_is_the_derivative_of_the_shape(name: str, formulation: str) -> None:
@@ -308,6 +312,7 @@ def test_animation_is_a_loop_without_a_jump(root: complex, grows: bool) -> None:
         np.testing.assert_allclose(start[1:] / start[:-1], start[1] / start[0])  # exponential
 
 
+@pytest.mark.long
 @pytest.mark.versions
 @pytest.mark.short
 def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:

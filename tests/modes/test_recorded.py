@@ -56,6 +56,7 @@ def test_euler_column(folder: Path) -> None:
         np.testing.assert_allclose(first[::6], 2**0.5 * np.sin(w[0] * s), atol=1e-5)
 
 
+@pytest.mark.long
 def test_a_double_eigenvalue_has_one_mode(folder: Path) -> None:
     """Where Beck's column flutters, P = 20.05, omega = 11.02 (Beck 1952): the one mode of the closed form there."""
     found = recorded(classics.beck(span=(19.0, 21.0)), Plan(error_bars=False), folder, Discretization("auto", 6, 6))
@@ -71,6 +72,7 @@ def test_a_double_eigenvalue_has_one_mode(folder: Path) -> None:
     np.testing.assert_allclose(moved / moved[-1], exact / exact[-1], atol=1e-4)
 
 
+@pytest.mark.long
 def test_a_complex_pair_is_one_mode(folder: Path) -> None:
     """Beck's column after flutter, P = 30, against the equation of its frequencies."""
     found = recorded(classics.beck(span=(29.0, 30.0)), Plan(error_bars=False), folder, Discretization("auto", 6, 6))
@@ -112,6 +114,7 @@ def test_a_trace_is_the_same_with_and_without_them(folder: Path) -> None:
     assert saved == json.loads(json.dumps(alone.data["branches"]))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("fault", [lambda: ConvergenceError("No eigenvalue was found."), MemoryError])
 @pytest.mark.parametrize("often", [1, 100])
 def test_where_they_are_not_found_the_file_says_why(

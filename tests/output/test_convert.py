@@ -30,6 +30,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.versions
 def test_vtk_reads_the_steps(saved: Path, tmp_path: Path) -> None:
     io = pytest.importorskip("vtkmodules.vtkIOHDF")  # without the other modules, whose import takes seconds

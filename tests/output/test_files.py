@@ -66,6 +66,7 @@ def diagram(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "diagram.json").read_text(), parse_constant=pytest.fail)  # no NaN, no Infinity
 
 
+@pytest.mark.long
 @pytest.mark.versions
 @FORMULATIONS
 def test_diagram_says_what_was_computed(results: dict[str, Path], formulation: str) -> None:

@@ -104,6 +104,7 @@ ENTRIES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
 ]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("text", TEXTS, ids=range(len(TEXTS)))
 def test_texts(text: str, bad: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = bad / "diagram.json"

@@ -239,6 +239,7 @@ def _alike(dims: list[str], told: list[str]) -> bool:
     return len(dims) == len(told) and all(a == b or not b.isdigit() for a, b in zip(dims, told, strict=True))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("file", FILES)
 def test_page_has_what_files_have(results: Path, file: str) -> None:
     told, missing = described()[file], []
@@ -341,6 +342,7 @@ NAMES = {
 }
 
 
+@pytest.mark.long
 def test_files_say_what_they_are_and_are_read_without_it(copied: Path) -> None:
     """Those of today, and those of yesterday, which said nothing; a saved result is used again."""
     assert f"version: {rodfem.__version__}\n" in (HOME / "CITATION.cff").read_text()
@@ -427,6 +429,7 @@ def test_old_modes_and_diagrams_that_lack_something(copied: Path, capfd: pytest.
     )
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("version", [0, "1", None, 1.5])
 def test_versions_that_are_none(version: Any) -> None:
     with pytest.raises(InputError, match="where a whole number from 1 on was expected"):

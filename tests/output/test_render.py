@@ -223,6 +223,7 @@ def test_record_of_every_row_can_be_read_back(folder: Path) -> None:
             np.testing.assert_allclose(setting.section[1], [np.diag([2.0, 1.0])], atol=1e-8)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("kind", ENDS)
 def test_only_what_holds_an_end_is_drawn(folder: Path, kind: str) -> None:
     file = saved(folder / "states.h5", column(clamped(), ENDS[kind]))
@@ -233,6 +234,7 @@ def test_only_what_holds_an_end_is_drawn(folder: Path, kind: str) -> None:
     assert not colors(old(file))
 
 
+@pytest.mark.long
 def test_picture_shows_a_clamp_where_there_is_one(folder: Path) -> None:
     """Pixels: a grey block at the left end, and none at the free end."""
     pytest.importorskip("pyvista")

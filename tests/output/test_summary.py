@@ -62,6 +62,7 @@ def test_ends_of_a_narrow_range_are_told_apart(loads: tuple[float, float], words
     assert told_apart(*loads) == words
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "first", "load", "verb"),
     [
@@ -146,6 +147,7 @@ def test_how_a_branch_ends() -> None:
     assert words.endswith("; it ends there: stretch reaches zero.")
 
 
+@pytest.mark.long
 def test_a_load_asked_for_that_is_critical() -> None:
     """Its own state is undecided, which says nothing of the states beside it."""
     scene = classics.column("column", classics.SUPPORTS["clamped-free"], (1.0, 4.0))

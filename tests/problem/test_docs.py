@@ -101,6 +101,7 @@ def traced(name: str) -> tuple[list[Branch], str]:
     return diagram.branches, terminal.getvalue()
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("name", [name for name, scene in scenes().items() if scene.conservative])
 def test_scenes_of_the_page_are_traced_without_a_warning(name: str) -> None:
     branches, words = traced(name)
@@ -147,6 +148,7 @@ def printed() -> dict[str, list[str]]:
     return {name: numbers.split(", ") for name, numbers in rows}
 
 
+@pytest.mark.long
 def test_numbers_of_the_page_are_those_of_their_sources() -> None:
     assert set(printed()) == set(scenes()) == set(expected())
     for name, texts in printed().items():

@@ -34,6 +34,7 @@ def scene(**more: Any) -> Scene:
     return column("bed", SUPPORTS["pinned-pinned"], (0.0, 40.0), potential=bed, constants={"B2": 9.0}, **more)
 
 
+@pytest.mark.long
 def test_a_foundation_that_ends_inside_an_element() -> None:
     """On 14 cubic elements, halved or not, all points of the quadrature are on the same side: 23.5588 +- 3e-7."""
 

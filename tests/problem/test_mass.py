@@ -38,6 +38,7 @@ def lowest(scene: Scene) -> float:
     return sqrt(solver.modes(solver.equilibrium(0.0), 1).value[0].real)
 
 
+@pytest.mark.long
 @pytest.mark.short
 def test_a_mass_alone_is_that_of_a_slender_rod() -> None:
     """Its frequency is that of the textbook; of torsion, with a rotary inertia about d3 alone, pi/2 over its root."""

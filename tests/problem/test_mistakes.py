@@ -293,6 +293,7 @@ def test_ufl_prints_nothing_besides(capfd: pytest.CaptureFixture[str]) -> None:
     assert not getLogger("UFL").disabled
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     "changes",
     [

@@ -39,6 +39,7 @@ def test_an_integral_is_one_number() -> None:
         )
 
 
+@pytest.mark.long
 def test_an_attachment_knows_its_place() -> None:
     """Twice ``c.s`` is one half-way along: Euler's load of half the length."""
     half = Attachment(0.5, force=lambda c: (0.0, 0.0, -2 * c.P * c.s))
@@ -47,6 +48,7 @@ def test_an_attachment_knows_its_place() -> None:
     assert abs(found.point.load - 9.869604401089358) < found.error_estimate
 
 
+@pytest.mark.long
 def test_a_weight_that_vanishes_at_an_end() -> None:
     """Column with ``int r1 s ds = 0``: pi^2/4 and 9 pi^2/4 in the other plane, 25.585755 by Galerkin's method in this.
 
@@ -61,6 +63,7 @@ def test_a_weight_that_vanishes_at_an_end() -> None:
         assert special.error_estimate < 1e-5
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("places", "breaks"), [((0.4, 0.4 + 1e-13), ()), ((0.1 + 0.3, 0.4), (0.4 - 1e-13,)), ((0.1 + 0.2,) * 2, (0.3,))]
 )

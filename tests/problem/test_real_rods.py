@@ -16,6 +16,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "real-rods.md"
 pytestmark = pytest.mark.alone
 
 
+@pytest.mark.long
 def test_every_number_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     """The blocks assert what they print, and the numbers in their comments are those printed."""
     text, names = PAGE.read_text(), {}

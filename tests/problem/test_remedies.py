@@ -46,6 +46,7 @@ def named() -> set[tuple[str, str]]:
     return found
 
 
+@pytest.mark.long
 def test_every_argument_exists_and_has_an_option() -> None:
     assert {("StepControl", "largest"), ("Plan", "depth"), ("Discretization", "elements"), ("run", "output")} <= named()
     for owner, name in named():

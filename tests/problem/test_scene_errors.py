@@ -195,6 +195,7 @@ OFF_PLANE: list[tuple[dict, str]] = [
 """Scenes of a rod that is planar across e2 with something off that plane, at loads inside of the range alone too."""
 
 
+@pytest.mark.few(82)
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -323,6 +324,7 @@ def test_functions_that_a_number_satisfies_but_no_expression() -> None:
         System(scene, Discretization("reduced", 4, 2))
 
 
+@pytest.mark.long
 @pytest.mark.short
 def test_a_rod_squeezed_to_nothing() -> None:
     """The energy is written in v3, not in v3 - 1: without a load the rod has no length."""
@@ -437,6 +439,7 @@ def test_scenes_that_are_no_mistakes() -> None:
     Scene(**(GOOD | {"ends": Ring(odd=False), "start": lambda s: turns(s, 2)}))
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("change", "what"),
     [
@@ -561,6 +564,7 @@ def test_numpys_numbers_are_numbers(folder: Path) -> None:
     assert Plan(np.array([0.0, 1.0]), np.array([0.5])) == Plan((0.0, 1.0), (0.5,))  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_a_plan_without_a_range_takes_the_scenes(folder: Path) -> None:
     rod = Scene(**(GOOD | {"span": (0.0, 0.3)}))
     for plan, rows in ((Plan(error_bars=False), []), (Plan(at=(0.1,), error_bars=False), [0.1])):
@@ -572,6 +576,7 @@ def test_a_plan_without_a_range_takes_the_scenes(folder: Path) -> None:
         Plan(at=(1.0,)).check(rod)
 
 
+@pytest.mark.long
 @pytest.mark.short
 def test_constraints_that_repeat_each_other() -> None:
     """Named where no first equilibrium can be found: twice the same one, and one on what an end holds."""

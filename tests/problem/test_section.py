@@ -15,6 +15,7 @@ STEEL = {"E": 210e9, "nu": 0.3, "density": 7850.0}
 pytestmark = pytest.mark.alone
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("made", "inside"),
     [
@@ -93,6 +94,7 @@ def test_a_strip() -> None:
         section.strip(1.0, 2.0, **STEEL)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rod", ["flexible", "unshearable", "inextensible", "unshearable and inextensible"])
 def test_a_column_in_metres_and_newtons(rod: str) -> None:
     """Euler's load of a steel strip, 30 mm by 2 mm, one metre long, of an unshearable one pi^2 E I / 4; no warning."""

@@ -51,6 +51,7 @@ def top(c: Any) -> tuple[float, float, float]:
     return (0.0, 0.0, 1.0)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("planar", [None, "e2"])
 @pytest.mark.parametrize(("left", "expected"), [(clamped(), TAN), (hinged(E2), pi**2)], ids=["clamped", "hinged"])
@@ -61,6 +62,7 @@ def test_inclined_guide(left: End, expected: float, planar: str | None, formulat
     assert critical(scene, formulation) == pytest.approx(expected * cos(TILT), rel=1e-8)
 
 
+@pytest.mark.long
 def test_along_an_axis_it_is_the_plain_hinge() -> None:
     plain = column(clamped(), hinged(E2, lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P)))
     slides = column(clamped(), sliding_hinge(E2, (1e-17, 0.0, 2.0), force=push))
@@ -68,6 +70,7 @@ def test_along_an_axis_it_is_the_plain_hinge() -> None:
     assert found[0] == found[1] == pytest.approx(TAN, rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_a_turned_frame_gives_equal_numbers(formulation: str) -> None:
     """All is turned: the clamp, the held directors and the guide, which has three components then."""
@@ -100,6 +103,7 @@ def shot(P: float, bent: float, guess: np.ndarray) -> np.ndarray:
     return end(fsolve(miss, guess, xtol=1e-12))[2:]
 
 
+@pytest.mark.long
 @pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_bent_rod_on_an_inclined_guide(formulation: str) -> None:
@@ -118,6 +122,7 @@ def test_bent_rod_on_an_inclined_guide(formulation: str) -> None:
     np.testing.assert_allclose(sample["r"][-1, [0, 2]], expected, atol=1e-8)
 
 
+@pytest.mark.long
 def test_it_is_stored_and_drawn_as_what_it_is(folder: Path) -> None:
     right = sliding_hinge((0.0, 2.0, 0.0), INCLINED, top, force=push)
     run(column(clamped(), right, (0.0, 1.0)), Discretization("reduced", 4, 4), Plan(error_bars=False), folder,
@@ -136,6 +141,7 @@ def test_it_is_stored_and_drawn_as_what_it_is(folder: Path) -> None:
         assert abs(longest @ INCLINED) == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("make", "words"),
     [

@@ -38,6 +38,7 @@ def equal(number: int) -> Callable[[float], list[tuple[float, float]]]:
     return lambda s: [(a, b) for a, b in pairwise(ends) if a <= s <= b]
 
 
+@pytest.mark.long
 def test_a_steep_stiffness() -> None:
     """``theta' = M/B, M' = -P theta`` with ``B = 1 + tanh((s - 0.786)/1e-4) / 2``, by Runge and Kutta."""
     place = lambda s: (s - STEEP) / WIDTH  # noqa: E731
@@ -63,6 +64,7 @@ def test_a_steep_stiffness() -> None:
     assert seeing.warnings == []
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("f", "elements", "said"),
     [
@@ -108,6 +110,7 @@ def test_a_load_that_is_sharp_in_another_unit() -> None:
     assert "distributed force changes too sharply about s = 7" in sentence and "from 625 to 750" in sentence
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kink", [0.751, 0.7503])
 def test_a_kink_beside_the_end_of_an_element(kink: float) -> None:
     """No point of the quadrature is between the kink and the end at 0.75: 2e-11 was the bar of 6e-7 (0.751)."""

@@ -45,6 +45,7 @@ def test_a_variable_that_changes_is_named(what: str) -> None:
         K["value"] = 1.0
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_scenes_of_a_loop() -> None:
     """All but the last one would be the last one; with the value kept each is its own."""

@@ -53,6 +53,7 @@ def dimensionless(rod: str) -> rodfem.Diagram:
     return rodfem.trace(column(1.0, 1.0, rod), MESH, Plan(depth=1))
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("rod", ["unshearable and inextensible", "flexible"])
 @pytest.mark.parametrize(
@@ -78,6 +79,7 @@ def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> Non
         np.testing.assert_allclose(found, [(s.point.load, s.point.ordinate) for s in a.special], rtol=1e-9, atol=1e-10)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("units", [(1.0, 1e-35), (1e4, 1e-21)])
 def test_index_where_the_stiffness_is_lost_beside_the_constraints(units: tuple[float, float]) -> None:
     """A rod of natural curvature, held straight between clamps that slide, buckles at 4 pi^2 B/L^2, as one without.
@@ -112,6 +114,7 @@ def aside(length: float, stiffness: float) -> Scene:
     return replace(column(length, stiffness, "flexible"), ends=(clamped(), free(force=lambda c: (0.0, lateral, -c.P))))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "units", [DNA[:2], *(pytest.param(x, marks=pytest.mark.alone) for x in [(1.0, 1e6), (1e-3, 1.0), (1e4, 1e9)])]
 )
@@ -143,6 +146,7 @@ def pushed(length: float, stiffness: float, mass: float) -> Scene:
     )
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("units", [DNA, PIPELINE], ids=["DNA", "pipeline"])
 def test_flutter(units: tuple[float, float, float]) -> None:
@@ -156,6 +160,7 @@ def test_flutter(units: tuple[float, float, float]) -> None:
     assert [p.negative for p in diagram["straight"].points if p.load < flutter.point.load][-1] == 0
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize(("length", "force"), [(1e-9, 1e-12), (1e4, 1e9)])
 @pytest.mark.parametrize("elements", [2, 8])
@@ -173,6 +178,7 @@ def test_frequencies_of_a_cantilever(length: float, force: float, elements: int)
     assert pencil.asymmetry()[0] == 4
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
 def test_methods(method: str) -> None:
@@ -186,6 +192,7 @@ def test_methods(method: str) -> None:
     np.testing.assert_allclose(values[1], values[0], rtol=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "units"), [("cord", (7.0, 1e6)), ("hemitropic", (1e-3, 1e6))])
 def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> None:
     """Off natural units its pivots do not tell a singular state from others: branch points are missed."""
@@ -208,6 +215,7 @@ def test_numbers_in_words() -> None:
     assert digits.in_decimals(1.0, 3, 1.0) == "1.000"
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize(
     "name",
@@ -232,6 +240,7 @@ def test_recorded_scenes(name: str) -> None:
     assert not differences(name, *METRES_AND_NEWTONS)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("name", ["classic haringx", "classic bow", "classic Beck"])
 def test_loads_have_units_too(name: str) -> None:
@@ -239,6 +248,7 @@ def test_loads_have_units_too(name: str) -> None:
     assert not differences(name, *STEEL)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_fold_feels_a_load_of_any_unit() -> None:
     """In a unit of 1e-13 the derivative in the load is as small as that of equations that do not feel it."""

@@ -164,6 +164,7 @@ def test_writhe_of_a_knot() -> None:
     assert writhe(lambda t: trefoil(t)[0] * (1, 1, 0), round_) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("turns", [2.5, 27.25])
 def test_writhe_of_an_open_helix(turns: float) -> None:
     """Of radius one and rise b a radian: ``(2 pi)^-1 int (T - x) f(x) dx``, as all pairs x apart are alike."""

@@ -63,6 +63,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["pinned", "locus", "planar", "follower", "ring", "foundation", "guided", "accurate"])
 def test_every_kind_of_run_has_a_page(results: Path, name: str) -> None:
     payload = payload_of(results / name)
@@ -194,6 +195,7 @@ def test_commands(results: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     assert re.search(r"short +pinned +20\d\d-\d\d-\d\d 1 +\d+ +none: ", listed)
 
 
+@pytest.mark.long
 def test_it_needs_neither_dolfinx_nor_mpi() -> None:
     program = "import sys, rodfem.report.page; print(*{'dolfinx', 'mpi4py'} & set(sys.modules))"
     out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout

@@ -57,6 +57,7 @@ def at(name: str, formulation: str, load: float, bent: bool) -> tuple[Assessor, 
     return Assessor(system), x
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize(("name", "load", "bent"), STATES)
 def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> None:
@@ -79,6 +80,7 @@ def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> 
     assert assessor(x, "count").negative == negative
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("name", "formulation"),
     [
@@ -148,6 +150,7 @@ def reference() -> tuple[Assessor, PETSc.Vec]:
     return Assessor(solver.system), x
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("method", SOLVERS)
@@ -264,6 +267,7 @@ def test_interval_between_eigenvalues() -> None:
     assert {2, 3} <= {int(np.argmin(abs(every - v))) for v in found} <= {1, 2, 3, 4}
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("apart", [0.0, 1e-10, 1e-6])
 @pytest.mark.parametrize("method", SOLVERS)
 def test_triple_cluster(method: str, apart: float) -> None:
@@ -284,6 +288,7 @@ def test_triple_cluster(method: str, apart: float) -> None:
     assert np.linalg.eigvalsh(gram / np.sqrt(np.outer(np.diag(gram), np.diag(gram)))).min() > 0.1  # three directions
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("mass", "rotary"),
     [(0.0, (1.0, 1.0, 0.0)), (1.0, (0.0, 0.0, 0.0)), (1.0, (0.0, 0.0, 1e-3))],
@@ -305,6 +310,7 @@ def test_fields_without_mass(name: str, mass: float, rotary: tuple[float, float,
         assert found.certified, method
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("method", SOLVERS)
 def test_an_unstable_direction_without_mass(method: str) -> None:
     """Its eigenvalue is minus infinity."""
@@ -316,6 +322,7 @@ def test_an_unstable_direction_without_mass(method: str) -> None:
     assert Assessor(solver.system)(x, "count").negative == 1
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("method", SOLVERS)
 def test_no_mass_at_all(method: str) -> None:
     """One sentence: infinite eigenvalues are none."""
@@ -364,6 +371,7 @@ def test_exact_zero() -> None:
     assert abs(found.values[0]) < 1e-9 * found.values[1]
 
 
+@pytest.mark.long
 @SERIAL
 @pytest.mark.parametrize(("formulation", "elements"), [("reduced", 10_000), ("pointwise", 3_000)])
 def test_small_eigenvalues_on_many_elements(formulation: str, elements: int) -> None:

@@ -38,6 +38,7 @@ def equal() -> Scene:
     return replace(classics.beck(), parameters={**classics.beck().parameters, "B2": Parameter(1.0)})
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("make", "size"),
     [(classics.beck, 2), (lambda: rescaled.rescaled(classics.beck(), 1e-2, 1e4), 2), (equal, 4)],
@@ -72,6 +73,7 @@ def test_what_an_eigensolver_leaves_open() -> None:
     assert left.of_discriminant >= left.discriminant + left.discriminant_left
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("low", "high"), [(85, 92), pytest.param(0, 100, marks=pytest.mark.long)])
 def test_flutter_of_steel_by_other_factors(low: int, high: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """MUMPS leaves 1e-10 of a flutter load in newtons; that is in its bar: with rows at each percent of the range."""

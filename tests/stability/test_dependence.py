@@ -53,6 +53,7 @@ def solver_of(scene: Scene, formulation: str, mesh: tuple[int, int], factors: st
     return Solver(scene, Discretization(formulation, *mesh, factors=factors)).equilibria
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("factors", ["chain", "petsc"])
 @pytest.mark.parametrize("formulation", ["pointwise", "reduced"])
 @pytest.mark.parametrize("mesh", meshes((4, 3), (3, 3), (2, 2), (7, 5), (24, 1), (30, 4)))
@@ -63,6 +64,7 @@ def test_a_taut_rod_is_refused_on_any_mesh(formulation: str, mesh: tuple[int, in
             trace(scene, Discretization(formulation, *mesh, factors=factors), PLAN)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mesh", meshes((5, 4), (9, 2)))
 def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
     """To first order shear does not lengthen a straight rod either."""
@@ -70,6 +72,7 @@ def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
         trace(shortened(rod="inextensible"), Discretization("pointwise", *mesh), PLAN)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("planar", [pytest.param("e2", marks=pytest.mark.alone), None])
 def test_a_range_that_ends_where_the_rod_is_taut(planar: str | None) -> None:
     """Its ends are as far apart as it is long at P = 0: nothing is missing there, and that is what is said."""
@@ -80,6 +83,7 @@ def test_a_range_that_ends_where_the_rod_is_taut(planar: str | None) -> None:
     assert not diagram.special("fold") and not diagram.special("branch point")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["pointwise", "reduced"])
 @pytest.mark.parametrize("mesh", meshes((4, 3), (7, 5), (40, 2)))
 @pytest.mark.parametrize("slack", [1e-8, 1e-4])
@@ -109,6 +113,7 @@ def test_a_state_given_is_looked_at_as_well() -> None:
         solver.equilibrium(0.0, point)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("factors", ["chain", "petsc"])
 @pytest.mark.parametrize("mesh", meshes((4, 3), (5, 6), (7, 5)))
 def test_a_rod_that_is_held_twice_is_refused_on_any_mesh(mesh: tuple[int, int], factors: str) -> None:
@@ -130,6 +135,7 @@ def test_a_rod_that_is_held_twice_is_refused_on_any_mesh(mesh: tuple[int, int], 
     assert trace(bent, Discretization("pointwise", *mesh, factors=factors), PLAN)[0].points[0].negative == 0
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_neither_units_nor_small_numbers_make_constraints_depend() -> None:
     """Of a rod a nanometre long, in metres, and of a constraint that is multiplied by 1e-9."""

@@ -39,6 +39,7 @@ def dead(mu: float, thrust: float) -> float:
     return tip(mu, thrust, 0.0).real
 
 
+@pytest.mark.long
 @ANY_UNITS
 def test_each_method_finds_those_of_a_cantilever_under_thrust(units: tuple[float, float, float]) -> None:
     length, stiffness, mass = units
@@ -73,6 +74,7 @@ def test_a_spectrum_along_a_branch() -> None:
     assert first.spectrum[0] == pytest.approx(12.362363368326239 * stiffness / (mass * length**4), rel=1e-8)
 
 
+@pytest.mark.few(1)
 @ANY_UNITS
 def test_a_rod_that_turns_about_a_hinge(units: tuple[float, float, float]) -> None:
     """Its free rotation left out, ``tan b = tanh b``: a rotation with a mass of its own, whatever the units."""

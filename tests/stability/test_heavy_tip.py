@@ -37,6 +37,7 @@ def body_of(P: float, omega2: float) -> float:
     return float(-shear / (omega2 * deflection))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("body", [1e4, 1e6, 1e8])
 def test_what_is_infinite_is_not_found(body: float) -> None:
     """All eigenvalues of the stable column are those of its waves; with a body of 1e5 one was -28734, beside 28714."""
@@ -47,6 +48,7 @@ def test_what_is_infinite_is_not_found(body: float) -> None:
     assert body_of(3.306966, float(found.values[0].real)) == pytest.approx(body, rel=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_two_that_pass_one_another_stay_real() -> None:
     """Those of the two planes do at P = 17.2383, where round-off, 1e-6 of them, made complex pairs of them."""
@@ -57,6 +59,7 @@ def test_two_that_pass_one_another_stay_real() -> None:
         assert (found.values.imag == 0).all()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 @pytest.mark.alone
 def test_flutter() -> None:

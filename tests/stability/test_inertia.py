@@ -62,6 +62,7 @@ def eigenvalues(S: np.ndarray, M: np.ndarray, f: BranchSolver) -> np.ndarray:
     return scipy.linalg.eigh(condensed, np.diag(size[~massless]), eigvals_only=True)
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.short
 @FORMULATIONS

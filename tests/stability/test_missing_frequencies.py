@@ -21,6 +21,7 @@ def check(found: np.ndarray, dense: np.ndarray) -> None:
     assert abs(found - every).max() < 1e-6 * every[-1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [pytest.param(172, marks=pytest.mark.long), 175])
 def test_a_sweep_ends_where_the_rod_is_taut(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The tension of a taut rod is any, and so are its frequencies: 115.9 and -21.7 were recorded for one state.
@@ -39,6 +40,7 @@ def test_a_sweep_ends_where_the_rod_is_taut(number: int, monkeypatch: pytest.Mon
         check(np.array([value for value, _ in point.omega2]), oracle.squares(point.x))
 
 
+@pytest.mark.long
 def test_an_element_of_6e_7() -> None:
     """Its stiffness is so large that finite eigenvalues have the round-off of infinite ones."""
     scene = wider.scene(16, 174)[0]
@@ -48,6 +50,7 @@ def test_an_element_of_6e_7() -> None:
     check(np.sort(found.real)[:7], Oracle(system).squares(x))
 
 
+@pytest.mark.long
 def test_no_pair_is_cut_in_two() -> None:
     """The last of 14 eigenvalues at this load is one of a pair: 11 unstable ones were counted between 10 and 10."""
     scene = wider.scene(16, 146)[0]

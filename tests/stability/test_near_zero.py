@@ -34,6 +34,7 @@ def dense(inertia: Inertia, x: Point) -> np.ndarray:
     return np.asarray(scipy.linalg.eigh(K, M, eigvals_only=True))
 
 
+@pytest.mark.long
 def test_values_and_what_they_cost(ruler: Diagram, monkeypatch: pytest.MonkeyPatch) -> None:
     """Three are asked for, whose neighbours lie dense: a soft one is sharp, the others tell their signs."""
     solves, inverse = [0], Factored._inverse
@@ -56,6 +57,7 @@ def test_values_and_what_they_cost(ruler: Diagram, monkeypatch: pytest.MonkeyPat
         assert found.firm + int((found.values < 0).sum()) == point.negative
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("apart", [1e-6, 1e-7])
 def test_signs_in_a_band_as_wide_as_the_lowest_eigenvalue(apart: float) -> None:
     """One element of 1e-6 makes the round-off of a count as large as bending: quotients tell all signs.

@@ -52,6 +52,7 @@ def test_zeros_of_symmetries_stay_zeros() -> None:
     assert (index.negative, index.zero) == (3, 1)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("place", [1e-6, 1e-7])
 def test_a_band_wider_than_the_lowest_eigenvalue(place: float) -> None:
     """A short element leaves the signs of eigenvalues up to 8, and 760, to round-off; Euler's loads are 2.467, 4.935.

@@ -35,6 +35,7 @@ def nearly_free(k: float) -> Scene:
     return column("nearly free", (joint, free(push)), (-1.0, 1.0), constants={"k": k})
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("k", "stable", "index"), [(1e-4, True, 0), pytest.param(1e-8, True, 0, marks=pytest.mark.short), (-1e-6, False, 3)]
 )
@@ -49,6 +50,7 @@ def test_an_end_nearly_free_to_turn(k: float, stable: bool, index: int) -> None:
     assert [m.name for m in verdict.soft] == [m.name for m in point.soft]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("part", [1 - 1e-9, pytest.param(1.0, marks=pytest.mark.short), 1 + 1e-9, 1 + 1e-7])
 def test_an_eigenvalue_at_the_tolerance_of_the_count(part: float) -> None:
     """``mu = pi^2 - P``: at -1e-7 of the lowest bending eigenvalue the count and the quotient need not agree."""
@@ -72,6 +74,7 @@ def test_an_end_too_free_to_tell() -> None:
         assert "undecided, index 0 to 3" in stream.getvalue() and "sign undecided" in stream.getvalue()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("k", "error_bars"),
     [
@@ -96,6 +99,7 @@ def test_a_zero_of_the_count_is_decided_by_richer_meshes_or_not_at_all(k: float,
     assert len(said) == (not error_bars) and all(s.endswith("decide that, ask for error bars.") for s in said)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("imperfection", [1e-9, -1e-9, 1e-6])
 def test_sections_that_are_nearly_round(imperfection: float) -> None:
     """A circle turns its sections inside out at the cost of (B1 - B2)/2 sin^2 in the curvature 1, over 2 pi."""
@@ -128,6 +132,7 @@ def decay(diagram: Diagram, point: Point) -> float:
     return sqrt(point.load - (0.789 / 1.345 * twist) ** 2 / 4)
 
 
+@pytest.mark.long
 def test_sliding_costs_what_the_tails_of_a_buckle_tell() -> None:
     """Its tails decay like exp(-delta s), and meet the clamps half a length away: mu ~ delta^2 exp(-delta)."""
     diagram = buckle(40)
@@ -145,6 +150,7 @@ def test_sliding_costs_what_the_tails_of_a_buckle_tell() -> None:
     assert "sliding along the rod, mu = 2.8e-06 +- " in str(asked.point.soft[0])
 
 
+@pytest.mark.long
 def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
     """With 27 elements it is in the middle of one, unstable on this mesh: a second direction that no rod has."""
     diagram = buckle(27)
@@ -167,6 +173,7 @@ def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
     assert [p.soft for p in again[1].points] == [p.soft for p in branch.points]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("elements", [27, *(pytest.param(n, marks=pytest.mark.long) for n in (23, 33))])
 def test_a_mesh_that_pins_a_buckle_is_found_out_without_error_bars(elements: int) -> None:
     """The derivative along the rod solves the linearised equations of the rod, not of this mesh: by how much tells.
@@ -186,6 +193,7 @@ def test_a_mesh_that_pins_a_buckle_is_found_out_without_error_bars(elements: int
 # --- in words and pictures ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_an_index_that_no_richer_mesh_confirms() -> None:
     """At twenty times its critical load an elastica has other strains on 4 linear elements than on 2, of one index."""

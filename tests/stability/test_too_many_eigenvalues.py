@@ -10,6 +10,7 @@ from rodfem import Discretization, Solver
 from rodfem.errors import InputError
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("method", ["auto", "dense", "shift-invert", "slicing", "cayley"])
 def test_there_are_no_more_than_the_nodes_that_turn(method: str) -> None:
     """Between clamps 2 elements of degree 2 have 3 nodes that turn, by 3 angles each: 9.
