@@ -181,12 +181,6 @@ FAULTS = {
     "rods-by-their-code-alone": Fault(
         "rodfem/app/code_digest.py", "*_stated(scene), repr(scene.numbers), ", "", "tests/app/test_many.py"
     ),
-    "infinite-eigenvalues-are-kept": Fault(
-        "rodfem/stability/finite_pairs.py",
-        "noise > DOUBT * size * kinetic",
-        "False",
-        "tests/diagram/test_sweep.py",
-    ),
     "zeros-beside-the-fastest-motions": Fault(
         "rodfem/stability/frequencies.py",
         "return greatest if self.floating else",
@@ -434,7 +428,7 @@ FAULTS = {
         "tests/diagram/test_pairs_at_rows.py",
     ),
     "low-modes-by-the-usual-shift-alone": Fault(
-        f"{CONTINUATION}determinants.py", "FAR = 0.1", "FAR = 0.0", "tests/diagram/test_functions_between_rows.py"
+        f"{CONTINUATION}determinants.py", "FAR = 0.1", "FAR = 0.0", "tests/diagram/test_opposite_crossings.py"
     ),
     "a-search-ends-at-what-counts-as-zero": Fault(
         f"{CONTINUATION}pair_search.py",
@@ -460,12 +454,6 @@ FAULTS = {
         "off > np.maximum(CLOSE * size, least)",
         "tests/diagram/test_functions_between_rows.py",
     ),
-    "one-step-a-range": Fault(
-        "rodfem/problem/fast_load.py",
-        "(self.high - self.low) / STEPS",
-        "(self.high - self.low)",
-        "tests/diagram/test_functions_between_rows.py",
-    ),
     "between-looks-nothing-is-compared": Fault(
         "rodfem/diagram/unfollowed.py",
         "in self.far.look(point, found):",
@@ -482,12 +470,6 @@ FAULTS = {
         "rodfem/codim2/others.py",
         "return int((abs(everything.unstable - shift)",
         "return 0 * int((abs(everything.unstable - shift)",
-        "tests/diagram/test_slow_and_far_frequencies.py",
-    ),
-    "extrema-of-a-load-are-not-looked-at": Fault(
-        "rodfem/diagram/unfollowed.py",
-        "(last or turn or self._rows % every == 1",
-        "(last or self._rows % every == 1",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "of-unstable-rows-nothing-else-is-looked-at": Fault(
@@ -555,12 +537,6 @@ FAULTS = {
         "            off, _, size = told(function, low[some], high[some], seen)\n",
         "            off, size, _ = told(function, low[some], high[some], seen)\n"
         "            size = 200.0 * np.ptp(seen[1], axis=0)\n",
-        "tests/diagram/test_functions_between_rows.py",
-    ),
-    "energies-are-looked-at-in-their-values": Fault(
-        "rodfem/problem/parameter_functions.py",
-        "first.items())\n    for x, y in combinations_with_replacement(symbols, 2):",
-        "[])\n    for x, y in []:",
         "tests/diagram/test_functions_between_rows.py",
     ),
     "sweeps-have-no-rows-at-extrema": Fault(
@@ -996,9 +972,6 @@ FAULTS = {
     ),
     "a-stiff-twist-hides-a-load": Fault(
         "rodfem/fem/verification.py", "ZERO = 1e-10", "ZERO = 1e-4", "tests/fem/test_nearly_symmetric.py"
-    ),
-    "infinite-eigenvalues-beside-a-heavy-tip": Fault(
-        "rodfem/stability/finite_pairs.py", "DOUBT = 1e-4", "DOUBT = 1e2", "tests/stability/test_heavy_tip.py"
     ),
     "stiff-strains-hide-the-load": Fault(
         "rodfem/continuation/special_points.py",

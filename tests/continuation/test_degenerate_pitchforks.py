@@ -36,7 +36,7 @@ def on_one_rank(*given: Any) -> list[Any]:
     return [pytest.param(*one if isinstance(one, tuple) else (one,), marks=pytest.mark.alone) for one in given]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("beside", [-1e-3, *on_one_rank(-1e-2, -2e-3, -5e-4, -2e-4)])
 def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     """Beyond the fold the branch is stable, and at loads above: there the pitchfork is none that is supercritical.
@@ -93,7 +93,7 @@ def test_a_coefficient_that_is_not_told_from_zero() -> None:
     assert "undetermined form" in diagram.in_words()
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("slow", "span"), [(1e-4, 0.02), *on_one_rank((1e-5, 0.3))])
 def test_an_eigenvalue_that_passes_zero_slowly(slow: float, span: float) -> None:
     """``u (slow (u - P) + u^2) = 0``: the trunk, u = 0, has the eigenvalue ``-slow P``, the tolerance of a count or so.

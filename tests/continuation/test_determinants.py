@@ -28,7 +28,7 @@ def eigenvalues(solver: BranchSolver, row: Point) -> np.ndarray:
     return np.asarray(values[np.isfinite(values) & (abs(values) < INFINITE)])
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize("planar", [None, "e1"])
 def test_the_determinant_of_low_modes_is_a_product_over_the_pencil(planar: str | None) -> None:
     """``prod mu / (mu + sigma)``: multipliers, phase conditions and the load's unknown leave no trace."""

@@ -117,7 +117,6 @@ def test_equilibria_at_the_load_of_a_special_point() -> None:
             assert abs(below - above) == 2 and len(found) == (below + above) / 2
 
 
-@pytest.mark.long
 def test_a_fold_of_a_coarser_mesh_is_at_no_load_of_the_finest() -> None:
     diagram = trace(scene("cord"), Discretization("auto", 3, 3), Plan(depth=1, accuracy=1e-8))
     (fold,) = diagram.special("fold")

@@ -98,7 +98,7 @@ def test_every_wave_of_a_thrust_that_grows_as_the_stiffness_does() -> None:
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9)
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("above", "other", "power"), [(1e-4, 2.0, 1), (1e-6, 1.0, 3), pytest.param(1e-2, 9.0, 1, marks=pytest.mark.long)]
 )

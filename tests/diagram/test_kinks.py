@@ -62,7 +62,6 @@ def one_sided() -> Diagram:
     return trace(rod, Discretization(elements=3, degree=4), Plan(depth=0, at=(6.0,)))
 
 
-@pytest.mark.long
 def test_a_spring_at_the_tip_on_one_side() -> None:
     """The column is on the kink at all loads; to the free side it falls at 2 pi^2/4: it was called stable to 15."""
     found = one_sided()

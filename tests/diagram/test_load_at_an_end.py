@@ -72,7 +72,7 @@ def rows_are_apart(diagram: Diagram) -> bool:
     return all(b.arclength - a.arclength > 1e-6 for branch in diagram for a, b in pairwise(branch.points))
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("span", "at", "accuracy"),
     [
@@ -111,7 +111,7 @@ def test_nothing_is_found_beside_the_only_state() -> None:
     assert [p.ordinate for p in found.at(1.0)] == pytest.approx(tips(1.0), abs=1e-6)
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize("span", [(0.0, HIGH), (HIGH, 0.0)])
 def test_branches_that_are_found_at_an_end_of_the_range(span: tuple[float, float]) -> None:
     """All states that shooting finds, each once, on branches that end with the range."""

@@ -83,7 +83,7 @@ HARDER = {
 """Numbers and seeds of random draws of up to five zeros, and what is no shallower."""
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", TOGETHER)
 def test_opposite_crossings_at_one_load(name: str) -> None:
     """A branch point at which two eigenvalues vanish and the index stays, located as others are."""
@@ -116,7 +116,7 @@ def test_several_crossings_beside_each_other(name: str) -> None:
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", HARDER)
 def test_up_to_five_crossings(name: str) -> None:
     number, seed, shallow = HARDER[name]

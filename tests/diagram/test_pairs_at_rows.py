@@ -8,7 +8,7 @@ from hard.ranges import beside_a_pair, pair_at_a_row
 pytestmark = pytest.mark.alone
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("row", [0, 3, -1])
@@ -19,7 +19,7 @@ def test_one_of_two_branch_points_is_at_a_row(row: int, side: float, sign: float
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "given",
     [

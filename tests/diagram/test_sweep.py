@@ -222,7 +222,7 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
     assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("twisting", [1e-3, 1e-4])
 @pytest.mark.usefixtures("few_loads")
@@ -288,7 +288,6 @@ def pflueger(z: np.ndarray) -> list[float]:
     return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
-@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("light", [1e-3, 1e-5])
 @pytest.mark.usefixtures("few_loads")

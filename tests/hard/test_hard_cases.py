@@ -44,7 +44,6 @@ def test_a_hard_case(case: Case, value: Any) -> None:
     assert found.right or (case.promised == SAID and found.said), f"{found.error:.3g} {found.wrong} {found.said}"
 
 
-@pytest.mark.long
 def test_steps_are_shortened_about_a_narrow_bend() -> None:
     """Two folds 3e-4 apart in load are found, not only said to be missing perhaps."""
     found = bifurcations.dent(3e-4)

@@ -147,7 +147,7 @@ def test_bars_where_frequencies_meet(load: float, elements: int) -> None:
         assert abs(modes.value[i] - exact) <= modes.error[i] < 1e-4 * abs(exact)
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("elements", "degree"), [(3, 1), (2, 2), (2, 3), (2, 4)])
 def test_bars_on_coarse_meshes_are_those_of_the_same_mode(elements: int, degree: int) -> None:
     """Beck's column: the third mode of a coarse mesh is nearer to a higher one of the next mesh than to the third."""
