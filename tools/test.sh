@@ -4,13 +4,12 @@
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
-# Those marked `long` run with all=yes in the environment only, but on ranks where they are `short`.  Two ranks do without
-# the tests marked `alone` that are not `short`.  With quick=yes there are only the tests marked `versions`: serially, and
-# of them on two ranks what two ranks run.
+# Those marked `long` run with all=yes in the environment only.  Two ranks do without the tests marked `alone` that are not
+# `short`.  With quick=yes there are only the tests marked `versions`: serially, and of them on two ranks what two ranks run.
 set -eu
 cd "$(dirname "$0")/.."
-marks="short or not (alone or long)" serial="not long"
-[ "${all-}" != yes ] || marks="short or not alone" serial=
+marks="(short or not alone) and not long" shortest="short and not long" serial="not long"
+[ "${all-}" != yes ] || marks="short or not alone" shortest=short serial=
 [ "${quick-}" != yes ] || marks="versions and ($marks)" serial="versions and not long"
 python=$1 mpirun=$2 limit=$3
 shift 3
@@ -45,5 +44,5 @@ ranks() { # ranks NUMBER MARKS [options for pytest]
         -p no:cacheprovider -m "$chosen" "$@"
 }
 ranks 2 "$marks" "$@"
-[ "${quick-}" = yes ] || ranks 3 short "$@"
+[ "${quick-}" = yes ] || ranks 3 "$shortest" "$@"
 echo "== Passed"

@@ -126,6 +126,7 @@ def test_every_row_of_a_taut_rod(accuracy: float) -> None:
     assert len({p.mesh for p in branch.points}) > 2
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_graded_mesh_beats_uniform_ones() -> None:
     """The same error at the end of the taut rod's branch takes twelve times the unknowns on equal elements."""
@@ -168,6 +169,7 @@ def test_what_was_used_where(folder: Path) -> None:
         assert other.shape.ordinate(x) == pytest.approx(rows["ordinate"][row], abs=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_elements_beside_an_accuracy() -> None:
     """They are not used, which a note says; of a mesh that was had before nothing is, and vertices are the first."""

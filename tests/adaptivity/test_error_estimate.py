@@ -65,7 +65,7 @@ def tip(P: float) -> float:
     return float(2 * sqrt(brentq(lambda m: ellipk(m) - sqrt(P), 0.0, 1 - 1e-12, xtol=1e-16) / P))
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     "mesh",
     [*(pytest.param(x, marks=pytest.mark.alone) for x in [(8, 1), (3, 2), (4, 3), (2, 4), (4, 5), (2, 6)]), (8, 6)],
@@ -147,6 +147,7 @@ def test_arithmetic_of_many_elements() -> None:
         assert abs(s.point.load - pi**2 / 4) <= s.located_to <= s.error_estimate < 1e-8
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_highest_degree() -> None:
     """Of the highest degree there is none richer: halves of the elements do."""
@@ -247,6 +248,7 @@ def test_printed_bars_hold() -> None:
         assert abs(float(shown) - value) + error <= float(bar[:-1]) * (1 + 1e-9) <= 3 * error
 
 
+@pytest.mark.long
 def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is stopped a thousandth of the way to the state at another load: one more step takes that back."""
     solver = Solver(classics.lateral(), Discretization("reduced", 4, 4))

@@ -144,6 +144,7 @@ def solver_and_state(mesh: tuple[int, int]) -> tuple[BranchSolver, PETSc.Vec]:
     return solver, point.x
 
 
+@pytest.mark.long
 def test_more_places_of_the_same_polynomials() -> None:
     """They are those of each element through its nodes, and ends of elements are exactly what they are."""
     solver, x = solver_and_state((5, 3))
@@ -162,6 +163,7 @@ def test_more_places_of_the_same_polynomials() -> None:
     assert np.linalg.norm(more["q"], axis=1) == pytest.approx(1.0, abs=1e-14)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(
     "of",

@@ -44,7 +44,7 @@ def test_no_state_is_computed_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(finer) == {1}
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("largest", [0.2, 0.11, 0.05])
 def test_a_branch_point_in_the_last_step_before_the_end(largest: float) -> None:
     """A pinned rod on a spring e turns as a rigid body where ``(e v - P) v < 0`` with the stretch ``v = 1 - P/40``."""

@@ -76,7 +76,7 @@ PAIRS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("what", PAIRS)
 def test_scenes_that_state_other_rods_have_other_digests(what: str) -> None:
     """Each pair has the same name, load, range and constants, and functions of the same code."""

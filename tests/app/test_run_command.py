@@ -131,6 +131,7 @@ def test_what_stands_beside_a_file_hides_no_module(tmp_path: Path, monkeypatch: 
         load(tmp_path / "mine.py")
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", demo_cases.FUNCTIONS)
 def test_constants_of_the_demos_are_described(name: str) -> None:
     statement = Statement(getattr(demo_cases.module(name), demo_cases.FUNCTIONS[name]))

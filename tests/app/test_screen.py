@@ -236,6 +236,7 @@ def test_most_branches() -> None:
     assert found.in_words().endswith("2 branch points were not followed.")
 
 
+@pytest.mark.long
 def test_a_quick_look(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     common = ("--range", "0", "0.5", "--elements", "6", "--degree", "3", "--output", str(folder))
     run_demo(*common, "--quick", "--most-branches", "2")

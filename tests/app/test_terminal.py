@@ -77,7 +77,7 @@ def test_energy_is_that_of_the_rod_alone(folder: Path, printed: Any) -> None:
     assert not FIRST or re.search(r"ordinate +int W ds +index", out)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("rod", "ignored", "better"),
     [

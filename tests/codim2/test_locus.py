@@ -112,6 +112,7 @@ def test_buckling_of_the_straight_rod() -> None:
     assert abs(turns[1][1]) <= found.error[found.marks[1].row, 1]
 
 
+@pytest.mark.long
 def test_straight_cord() -> None:
     (first, _) = specials(demo("cord")["straight"], "branch point")
     found = locus(demo("cord").follower, first, "k0", ((-10.0, 60.0), (3.0, 16.0)), steps=WIDE, error_bars=2)
@@ -164,6 +165,7 @@ def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
     assert found.values[found.start, 0] == pytest.approx(0.3534002860735, abs=1e-9)
 
 
+@pytest.mark.long
 def test_cusp() -> None:
     """A thrust above Euler's and a force across that sweeps from one side to the other: folds that meet at a cusp."""
     diagram = cantilever("e", (0.3, -0.3))

@@ -70,6 +70,7 @@ def test_a_locus_leaves_the_symmetries_of_its_diagram() -> None:
     assert len(diagram.locus(special, "C", (0.5, 2.0)).values) > 5
 
 
+@pytest.mark.long
 def test_a_special_point_of_another_diagram_is_refused() -> None:
     diagram = column(0.5)
     with pytest.raises(InputError, match=r"P = 1\.2337006 is not one of this diagram"):

@@ -87,6 +87,7 @@ def test_the_same_column_in_units_of_a_molecule() -> None:
     check(found, "the double eigenvalue vanishes", DOUBLE_ZERO)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("number", "index", "elements"),
     [

@@ -45,6 +45,7 @@ def test_every_row_of_every_scene(name: str) -> None:
         assert np.median(abs(a - b)[known]) < SAME * max(1.0, abs(b[known]).max())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("load", "nearby"), [(3.601, True), (8.0, False)])
 def test_factors_of_a_state_nearby_serve_first(load: float, nearby: bool) -> None:
     """The same equilibrium as by new factors; where the state is not nearby after all there are new ones at once."""
@@ -61,6 +62,7 @@ def test_factors_of_a_state_nearby_serve_first(load: float, nearby: bool) -> Non
     assert (compiled.newton.factorisations < made) == nearby
 
 
+@pytest.mark.long
 def test_the_reference_uses_nothing_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """With PETSc's factors neither the chain nor the compiled assembly of matrices is used."""
 

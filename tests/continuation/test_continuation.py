@@ -27,6 +27,7 @@ WEIGHTS = 0.1 * weights
 AT = (0.05, 0.5, *GAUSS, 0.9)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.versions
 def test_user_points_and_ends_lie_at_their_loads_exactly() -> None:
@@ -120,7 +121,7 @@ def test_newton_converges_quadratically() -> None:
     assert np.log(sizes[3] / sizes[2]) / np.log(sizes[2] / sizes[1]) == pytest.approx(2, abs=0.2)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:

@@ -56,6 +56,7 @@ def test_a_stiffness_that_the_load_takes_away(energy: Energy, until: float) -> N
         Solver(rod(energy), MESH).equilibrium(1.0)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_search_where_it_is_lost() -> None:
     """Equilibria that a search finds there begin no branch."""
@@ -95,7 +96,7 @@ def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
     assert found.lost == pytest.approx((1.0 - width - low) / (high - low), abs=1e-9)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("width", [pytest.param(1e-2, marks=pytest.mark.alone), 1e-3])
 def test_convexity_lost_between_the_places_of_the_quadrature(width: float) -> None:
     """Twisting stiffness ``(s - 0.37)^2 + (P - 1)^2 - width^2``: negative within a width of 0.37, where P is near 1."""
@@ -198,7 +199,7 @@ def test_a_locus(energy: Energy, until: float) -> None:
     assert {tuple(row) for row in curve.index.tolist()} == {(0, 1)}
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("loss", [pytest.param(3.0, marks=pytest.mark.alone), 3.99])
 def test_convexity_lost_in_the_step_to_zero_stretch(loss: float) -> None:
     """A thrust squeezes a rod of ``EA = 4`` to nothing at 4; before that its twisting stiffness vanishes."""

@@ -24,6 +24,7 @@ def demo(name: str, formulation: str) -> tuple[BranchSolver, list[Branch]]:
     return found.follower, found.branches
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("formulation", ["reduced", pytest.param("pointwise", marks=pytest.mark.alone)])
 @pytest.mark.parametrize("name", ["hemitropic", *(pytest.param(x, marks=pytest.mark.alone) for x in ("cord", "ruler"))])
 def test_index_is_that_of_two_shifts_at_every_point(name: str, formulation: str) -> None:

@@ -93,7 +93,7 @@ def test_a_coefficient_that_is_not_told_from_zero() -> None:
     assert "undetermined form" in diagram.in_words()
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(("slow", "span"), [(1e-4, 0.02), *on_one_rank((1e-5, 0.3))])
 def test_an_eigenvalue_that_passes_zero_slowly(slow: float, span: float) -> None:
     """``u (slow (u - P) + u^2) = 0``: the trunk, u = 0, has the eigenvalue ``-slow P``, the tolerance of a count or so.

@@ -98,7 +98,7 @@ def test_a_rod_under_high_tension() -> None:
         assert assess(solver, point.x, "reduction").negative == 1
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("apart", "most"), [(3e-3, 4.0), (1e-4, 4.0), (1e-6, 4.0), (1e-6, 40.0)])
 def test_neighbours_in_one_step(apart: float, most: float) -> None:
     """A column that bends almost alike about both axes: (2n - 1)^2 pi^2 B/4, each with its own index on either side.
@@ -114,7 +114,7 @@ def test_neighbours_in_one_step(apart: float, most: float) -> None:
     assert [(s.negative_before, s.negative_after) for s in found] == [(n, n + 1) for n in range(len(expected))]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("half", [1e-6, 1e-5, 1e-3])
 def test_a_range_about_the_buckling_load(half: float) -> None:
     """The eigenvalue that vanishes is within the tolerance of zero at every row but the ends."""
@@ -125,6 +125,7 @@ def test_a_range_about_the_buckling_load(half: float) -> None:
     assert (special.negative_before, special.negative_after) == (0, 1)
 
 
+@pytest.mark.long
 def test_a_double_point_that_the_mesh_splits() -> None:
     """Michell's ring of C = 1.5 at its fourth mode, C t0 = sqrt(15): one point, where two eigenvalues vanish."""
     scene = column(
@@ -215,6 +216,7 @@ def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: 
     assert [(s.negative_before, s.negative_after) for s in straight.special] == [(0, 2), (2, 0), (0, 0)]
 
 
+@pytest.mark.long
 def test_a_row_beside_a_pair_of_crossings() -> None:
     """A step of 0.3 ends 6e-4 beyond two double branch points that are 4e-3 apart, and tells nothing of them."""
     constants = (0.554629, 1.0, 1.0, 2.851609)
@@ -271,6 +273,7 @@ def test_a_pair_of_crossings_that_no_parabola_shows(slope: float, largest: float
     assert [s.point.load for s in found] == pytest.approx([-apart / 2, apart / 2], abs=1e-10)
 
 
+@pytest.mark.long
 def test_every_row_of_the_ring_demo(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its branch comes back to where it ends, which its last rows tell, however short their steps are."""
     monkeypatch.setattr(explorer, "TAIL", 1)
@@ -326,7 +329,7 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
     assert abs(branch.points[-1].ordinate - 2.0) > 0.3
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("short", [0.0, 1e-9, 1e-4])
 def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
     """All rows are within the range; a branch of which it has nothing is none."""
@@ -362,6 +365,7 @@ def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> Non
     assert "The first state, at P = 2.4674011, is singular" in said
 
 
+@pytest.mark.long
 def test_an_eigenvalue_that_stays_small_is_no_critical_load() -> None:
     """A spring of 5e-10 that falls by a tenth over the range: no load in it is critical, and the sign is undecided."""
     foot = End(

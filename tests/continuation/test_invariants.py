@@ -47,7 +47,7 @@ def spoilt(system: System, x: PETSc.Vec, field: str) -> PETSc.Vec:
     return system.vector(system.fields.filled(values), [0.0] * len(system.drifts))
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_mutations_are_caught(formulation: str) -> None:

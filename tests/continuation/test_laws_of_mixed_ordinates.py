@@ -47,7 +47,7 @@ def test_shortening_and_part_of_a_slope(eps: float, span: tuple[float, float]) -
     assert holds(law, pi**2 / 8 / eps**2, 1e-6)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(8.0, 11.0), (9.8, 9.9)])
 def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> None:

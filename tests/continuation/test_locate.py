@@ -61,6 +61,7 @@ def test_what_a_series_leaves_out(f: Callable[[np.ndarray], np.ndarray], half: f
     assert error <= left_out(series) + 1e-15 <= 1e3 * error + 1e-14
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("noise", [1e-6, 1e-3, 0.05])
 def test_noise_is_no_sharp_zero(noise: float) -> None:
     """The last coefficient alone is less than the error in two cases of three, than a third of it in one of three."""

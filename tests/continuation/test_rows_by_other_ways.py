@@ -44,6 +44,7 @@ def rows(name: str, formulation: str) -> tuple[BranchSolver, list[Point]]:
     return solver, points
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "formulation"), BOTH)
 def test_second_variation_is_that_of_petsc(name: str, formulation: str) -> None:
     """To the last bit: the same kernels, and the same sums."""

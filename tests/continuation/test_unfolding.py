@@ -74,7 +74,7 @@ def fold_of(lateral: float) -> float:
     return float(found.fun)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("lateral", [1e-3, pytest.param(1e-9, marks=pytest.mark.long), 1e-12, 1e-6])
 def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     """The first branch is stable all along; the detached one has a fold, and no branch point is left.

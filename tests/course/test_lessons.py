@@ -59,7 +59,7 @@ def test_a_lesson_ends_with_its_number(path: Path, folder: Path, monkeypatch: py
     assert list((folder / "results" / "course").glob("*.png")), "a lesson has a picture"
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
 def test_a_solution_is_right(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -112,6 +112,7 @@ def test_hemitropic() -> None:
                 assert force(follower, x) < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_ring_in_its_plane() -> None:
     """Moved, turned, or run around along itself it is the same ring: a circle, and beyond 3 the pressed one."""
@@ -162,6 +163,7 @@ def test_ruler() -> None:
     assert down.points[-1].load == pytest.approx(4.42594840243, abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_nothing_to_find() -> None:
     """Under a small load there is one equilibrium: it is found, nothing else is, and the report says so."""

@@ -90,7 +90,7 @@ columns = cache(swept)
 """The same, once for each set of arguments."""
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0), (19.0, 21.0)])
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def by_values(comm: MPI.Comm, found: Frequencies, others: Frequencies) -> dict[i
     return {mine[i]: there[j] for i, j in zip(rows.tolist(), columns.tolist(), strict=True)}
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0)])
 def test_a_pair_that_is_mistaken_is_put_right(span: tuple[float, float], monkeypatch: pytest.MonkeyPatch) -> None:

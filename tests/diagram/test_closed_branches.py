@@ -16,7 +16,7 @@ pytestmark = pytest.mark.alone
 EXCESS = 0.04
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("at", [0.0, 0.07])
 def test_a_closed_branch_ends_at_its_start(at: float) -> None:
     """At a load between the folds there are two states of the isola: each is reported once."""

@@ -24,7 +24,7 @@ def AXIS(c: Any) -> tuple[float, float, None]:
     return (0.0, 0.0, None)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("apart", [0.5, 0.0, -0.1])
 def test_the_distance_of_the_ends_of_an_elastica(apart: float) -> None:
     """That of a pinned column is ``2 E(m)/K(m) - 1`` at ``P = 4 K(m)^2``; where they meet the loop may turn, too."""
@@ -135,6 +135,7 @@ def test_corners_on_a_curved_branch(largest: float) -> None:
     assert not found.warnings
 
 
+@pytest.mark.long
 def test_an_event_that_is_zero_all_along_is_said_to_be() -> None:
     """Of a straight branch the deflection is zero; where the buckled branch leaves it, that is no event of its own."""
     rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 12.0), planar="e1")

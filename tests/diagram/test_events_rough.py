@@ -105,7 +105,7 @@ def test_a_sweep_refuses_events() -> None:
         rodfem.trace(classics.beck(), plan=Plan(events=(Event("tip", of=lambda state: state.r[-1, 0]),)))
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("power", [0.2, 1 / 3, 0.5, 1.0, 1.5, 3.0])
 def test_samples_show_a_root_wherever_it_is(power: float) -> None:
     """Also beside a node, of which each side is a parabola to its error."""

@@ -67,6 +67,7 @@ def test_straight_is_a_matter_of_shape_alone() -> None:
     assert is_straight(s * way - 2.0 * s * (1.0 - s) * way)  # it goes back and forth
 
 
+@pytest.mark.long
 def test_no_two_branches_have_one_name() -> None:
     """What leaves a branch that a search found was called ``branch 1``, as what leaves the first: files have one."""
     explorer = Explorer.__new__(Explorer)

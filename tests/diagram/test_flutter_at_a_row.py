@@ -87,7 +87,7 @@ def test_a_range_that_begins_at_a_flutter_load(share: float, strong: float, whic
     assert not diagram.warnings and not diagram[0].unexplained
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(("span", "at"), [((0.3, 25.0), 0.1 * 3), ((0.0, 20.1), nextafter(20.1, 0.0))])
 def test_loads_that_differ_by_round_off_are_one(span: tuple[float, float], at: float) -> None:
     """A step of one unit in the last place ended the sweep."""

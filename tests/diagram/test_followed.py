@@ -106,6 +106,7 @@ TWICE = ("classic Beck", "docs leipholz", "Leipholz")
 """Scenes much like the demo under a force that follows."""
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", [pytest.param(x, marks=[pytest.mark.long] * (x in TWICE)) for x in SCENES])
 def test_every_row_is_that_of_solving_anew(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Frequencies, motions and the numbers of unstable eigenvalues; most loads need no SLEPc.

@@ -36,7 +36,7 @@ def test_a_sweep_ends_before_a_negative_mass() -> None:
     assert 0.38 < branch.points[-1].load < 0.39 + 1e-9
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mass", "spectrum", "words"),
     [

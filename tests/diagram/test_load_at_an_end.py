@@ -103,6 +103,7 @@ def test_states_at_a_branch_point() -> None:
     assert len(found.at(special.point.load)) == 1
 
 
+@pytest.mark.long
 def test_nothing_is_found_beside_the_only_state() -> None:
     """Far below its first critical load the cantilever has one equilibrium."""
     assert len(tips(1.0)) == 1

@@ -16,7 +16,7 @@ from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, 
 pytestmark = pytest.mark.alone
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("down", [False, True])
 @pytest.mark.parametrize(("load", "share"), [(3.0, 0.02), pytest.param(4.0, 0.1, marks=pytest.mark.long), (5.0, 0.2)])
 def test_a_path_ends_at_its_fold(load: float, share: float, down: bool) -> None:

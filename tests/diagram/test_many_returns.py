@@ -16,6 +16,7 @@ from rodfem.diagram.special_search import SpecialSearch
 OFTEN, DEEP = 400, 300
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_no_stack_overflows(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four hundred times, where three hundred calls are left: the rows are those that are found without."""

@@ -65,7 +65,7 @@ def test_two_loads_or_none(
     assert said == [True] * hidden
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
 @pytest.mark.parametrize(("kind", "top"), [("late flutter", 5e-12), ("divergence", 1e-9), ("divergence", 1e-13)])

@@ -11,6 +11,7 @@ from classics import column, push
 from rodfem import Discretization, Event, Plan, clamped, free, trace
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_how_far_apart_the_states_are_is_in_a_note() -> None:
     """The widest of five places in the longest step: 0.46 (1 - 0.46) or 0.54^2 of it."""

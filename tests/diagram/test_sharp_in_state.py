@@ -62,6 +62,7 @@ def ordinates(found: Diagram) -> list[tuple[float, float, float]]:
     return [(s.point.load, s.point.ordinate, s.ordinate_error) for s in found[0].special if s.point.load in LOADS]
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_bars_hold_or_there_are_none() -> None:
     """Of 128 ordinates 25 were above their bars at the width 1e-4, up to 37 times, without a warning."""

@@ -114,7 +114,7 @@ def test_flutter_that_comes_and_goes_beyond_the_frequencies_that_are_followed() 
     assert words.startswith("At p = 5.") and "is not among those that are followed" in words
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(("above", "said"), [(2e-4, 1), (-2e-4, 0)])
 def test_flutter_between_two_looks_where_no_load_turns(above: float, said: int) -> None:
     """A thrust of ``p`` and a stiffness of ``(1 + p^2)/2`` times: both grow, and their ratio is greatest at ``p = 1``.
@@ -134,7 +134,7 @@ def test_flutter_between_two_looks_where_no_load_turns(above: float, said: int) 
         assert float(words.split()[3]) == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("growth", "ratio", "unstable"),
     [

@@ -170,6 +170,7 @@ TWICE_HELD = replace(
 """A straight rod that bends about d2 alone, whose end is kept on the axis twice."""
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_constraints_that_follow_from_others_are_refused() -> None:
     """Without it a singular pencil, with an eigenvalue that is any number, is what frequencies are computed of."""
@@ -222,7 +223,7 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
     assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("twisting", [1e-3, 1e-4])
 @pytest.mark.usefixtures("few_loads")
@@ -288,6 +289,7 @@ def pflueger(z: np.ndarray) -> list[float]:
     return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
+@pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("light", [1e-3, 1e-5])
 @pytest.mark.usefixtures("few_loads")
@@ -317,6 +319,7 @@ def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bar of its ordinate, 1e-12 for a straight rod, is none of the load."""

@@ -18,7 +18,7 @@ EXACT = 1e-14
 """Relative difference of sums that are added up in another order."""
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 @pytest.mark.alone
 @pytest.mark.parametrize("name", distinct())
 def test_forms_of_every_scene(name: str) -> None:
@@ -55,7 +55,7 @@ def test_forms_of_every_scene(name: str) -> None:
         assert theirs.norm(PETSc.NormType.INFINITY) <= EXACT * size
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize(("name", "formulation"), [("cord", "reduced"), ("hemitropic", "pointwise"), ("ring", "auto")])

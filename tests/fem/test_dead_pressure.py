@@ -80,7 +80,7 @@ def circle_at(found: StaticSolver, p: float) -> Any:
     return x
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "p", [pytest.param(0.5, marks=pytest.mark.alone), 4.5, pytest.param(9.5, marks=pytest.mark.alone)]
 )
@@ -96,6 +96,7 @@ def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) 
     assert mu[0] <= -p + 1e-9  # a rigid rotation lowers the energy
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_special_points_of_the_circle() -> None:
     """It buckles in its plane at n^2, on top of the rotation."""
@@ -146,6 +147,7 @@ def test_symmetries_of_a_loaded_ring(load: Any, potential: Any, motions: list[st
     assert sorted(names) == sorted(always + motions)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_false_symmetry_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rotation of the ring is none: claimed, it is dropped at the first state, and said to be."""

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.alone
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("mesh", [(24, 1), (5, 2), (6, 5)])
 def test_energy_of_a_bow(mesh: tuple[int, int], formulation: str) -> None:

@@ -52,6 +52,7 @@ def test_another_number_compiles_nothing() -> None:
     assert COMM.allreduce(said, op=MPI.SUM) == []
 
 
+@pytest.mark.long
 def test_values_are_those_of_the_numbers() -> None:
     """Also in conditions and in the base of a power; exponents, integers and the numbers of formulas stay."""
     mesh = compat.interval_mesh(MPI.COMM_SELF, 8, 0.0, 1.0)

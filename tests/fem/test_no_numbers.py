@@ -13,6 +13,7 @@ from rodfem import Discretization, Solver
 from rodfem.errors import SceneError
 
 
+@pytest.mark.long
 def test_the_derivative_of_tanh_of_large_numbers() -> None:
     """UFL has it as 2 cosh(x) / (cosh(2 x) + 1), which overflows, where tanh(x) is one."""
 

@@ -9,6 +9,7 @@ from rodfem import Discretization, Plan, trace
 from rodfem.continuation.kinds import BRANCH_POINT
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_ring_that_is_bent_a_little_moves_along_itself() -> None:
     """Translations apart, a circle has its rotation in the plane alone, which is its motion along itself, too.

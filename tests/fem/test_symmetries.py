@@ -141,6 +141,7 @@ def test_round_rods_that_shear() -> None:
     assert {(p.negative, p.zero, p.undecided) for p in diagram["branch 1"].points[1:]} == {(0, 1, 0)}
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_first_equilibrium_far_from_the_start() -> None:
     """A coiled rod let go from straight: Newton's method alone does not get there, going downhill does."""

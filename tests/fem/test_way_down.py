@@ -22,7 +22,7 @@ def beside_a_saddle() -> tuple[StaticSolver, PETSc.Vec, float]:
     return e, *e.off(saddle, e.start(load))
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("times", [1, 4, 8, 100])
 def test_a_step_is_uphill_where_it_is_too_long(
     times: float, beside_a_saddle: tuple[StaticSolver, PETSc.Vec, float]

@@ -143,6 +143,7 @@ def test_linearized_balance_is_the_linearisation_of_the_weak_form(rod: str, form
         assert abs(second - linearised) > 1e-3
 
 
+@pytest.mark.long
 def test_they_agree_at_an_equilibrium_and_only_there() -> None:
     """A straight rod under tension and twist; a rotation of the moment, which breaks its balance, tells them apart."""
     mesh = compat.interval_mesh(MPI.COMM_SELF, 4, 0.0, 1.0)

@@ -58,7 +58,7 @@ def rod(folder: Path) -> Path:
 # --- names, locales -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("locale", ["C", "de_DE.UTF-8"])
 def test_names_and_locales(locale: str, rod: Path) -> None:
     out = rod.parent / f"Ergebnisse é {locale}"
@@ -153,7 +153,7 @@ def cut(file: Path, part: float) -> None:
     file.write_bytes(data[: int(part * len(data))])
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.parametrize("part", [0.0, 0.001, 0.5, 0.999])
 def test_own_code_that_is_cut_short_is_compiled_again(
@@ -203,6 +203,7 @@ jit.compile_forms([form()], cache_dir=Path({folder!r}))
 """
 
 
+@pytest.mark.long
 def test_what_a_killed_process_was_compiling_is_compiled_at_once(tmp_path: Path) -> None:
     """Nobody touches the module of a process that lives; FFCx by itself waits for one of a dead process, too."""
     script = KILLED.format(tests=str(Path(__file__).parents[1]), folder=str(tmp_path))

@@ -51,7 +51,7 @@ def few_rows(monkeypatch: pytest.MonkeyPatch, few_loads: None) -> None:
     monkeypatch.setattr(comparison, "ROWS", (14, 5))
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("seed", "number"), SCENES)
 @pytest.mark.usefixtures("few_rows")
 def test_a_random_scene(seed: int, number: int) -> None:
@@ -221,6 +221,7 @@ def test_both_factors_refuse_a_rod_that_is_held_twice() -> None:
                 trace(rod, Discretization(*mesh, factors=factors), plan)
 
 
+@pytest.mark.long
 def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """An index too high by one, and a special point moved by three bars, of the first trace."""
     trace, traces = comparison.trace, []

@@ -64,7 +64,7 @@ def test_one_process(folder: Path, number: int) -> None:
     assert not (folder / ".lock").exists()
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("whom", "number", "status"),
     [

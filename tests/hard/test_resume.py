@@ -204,6 +204,7 @@ def cut(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder / "cut"
 
 
+@pytest.mark.long
 def test_another_run_is_refused(cut: Path) -> None:
     """By the first entry that differs; equations are compared where all numbers agree.  Nothing is written."""
     scene, plan = hemitropic_cases.scene(), rodfem.Plan((0.0, 0.2), error_bars=False, depth=1)
@@ -244,6 +245,7 @@ def test_a_damaged_step(cut: Path) -> None:
             rodfem.resume(cut, scene, figures=False, quiet=True)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_nothing_to_do(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty folder: the run begins.  A complete one: it says so.  One of an older version: it is refused."""
@@ -269,6 +271,7 @@ def test_nothing_to_do(folder: Path, capfd: pytest.CaptureFixture[str], monkeypa
         rodfem.resume(folder / "new", scene, figures=False, quiet=True)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_same_input_same_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Byte for byte, but for times, their date among them, and the name of the run."""

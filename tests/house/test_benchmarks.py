@@ -23,7 +23,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 pytestmark = pytest.mark.alone
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("scene", "branch"), RODS)
 def test_scipy_solves_the_same_rods(scene: str, branch: str) -> None:
     rod, (target,) = RODS[scene, branch], [t for t in TARGETS[scene][branch] if t.at is not None]

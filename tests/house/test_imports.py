@@ -108,6 +108,7 @@ def levels(graph: dict[str, set[str]]) -> int:
     return max(map(level, graph))
 
 
+@pytest.mark.long
 def test_no_circle_of_imports() -> None:
     assert circles(arrows()) == []
     assert circles(arrows(functions=True)) == CIRCLES
@@ -181,6 +182,7 @@ def test_matrices_know_no_rods() -> None:
         assert arrows(functions=True, annotations=True)[module] <= MATRICES | BELOW_MATRICES, module
 
 
+@pytest.mark.long
 def test_arrows_are_what_the_interpreter_follows() -> None:
     """Loading a module loads those that the graph says it reaches, and packages."""
     program = "import sys, rodfem.app.many; print(*(m for m in sys.modules if m.startswith('rodfem')))"

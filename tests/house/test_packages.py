@@ -63,6 +63,7 @@ def files(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.long
 def test_wheel_is_both_packages_and_their_licence(built: dict[str, Path]) -> None:
     with zipfile.ZipFile(built["wheel"]) as wheel:
         found = {name for name in wheel.namelist() if not name.endswith("/")}

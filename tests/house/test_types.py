@@ -92,6 +92,7 @@ def test_a_scene_is_stated_without_what_computes_and_draws(statement: str) -> No
     assert not {*HEAVY} & {*out.split()}
 
 
+@pytest.mark.long
 def test_a_run_without_pictures_loads_nothing_else(tmp_path: Path) -> None:
     """Once its forms are compiled; and whoever needs ``pkg_resources`` afterwards has it."""
     words = ["hemitropic", "--no-figures", "--range", "0", "0.05", "--elements", "2", "--degree", "2"]

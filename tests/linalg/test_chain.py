@@ -106,6 +106,7 @@ class Both:
         assert (matrix * out - right).norm() < BACKWARD * matrix.norm(PETSc.NormType.INFINITY) * out.norm()
 
 
+@pytest.mark.few(12)
 @pytest.mark.alone
 @pytest.mark.parametrize("name", distinct())
 def test_matrices_of_every_scene(name: str) -> None:

@@ -123,6 +123,7 @@ def test_natural_sizes(package: str) -> None:
         check(factors, matrix, inertia.seed(1))
 
 
+@pytest.mark.few(1)
 @pytest.mark.versions
 @PACKAGES
 @FORMULATIONS

@@ -85,7 +85,7 @@ def parts_of(cells: int, vertex: int, inner: int, pieces: int, rng: np.random.Ge
     return [np.arange(*ends) for ends in zip(begin, end, strict=True)]
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(3)
 @pytest.mark.alone
 @alone
 @KINDS

@@ -131,7 +131,7 @@ def test_values_in_the_literature() -> None:
     assert pytest.approx(7.8373474389, rel=1e-10) == HEAVY
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("name", "formulation"),
     [
@@ -202,7 +202,7 @@ def helix(s: np.ndarray, curvature: float, torsion: float) -> np.ndarray:
     return np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_helix_of_any_pitch(formulation: str) -> None:
     """A helix is a solution for any pitch; what holds it is a force and a moment along its axis."""
@@ -233,7 +233,7 @@ def test_helix_as_the_degree_grows() -> None:
     assert all(b < a / 50 or b < 1e-13 for a, b in pairwise(errors))
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_extension_of_a_helical_spring(formulation: str) -> None:
     """A helix under every force along its axis, of curvature and torsion that its two equilibrium equations give."""
@@ -320,7 +320,7 @@ def test_planar_column(formulation: str) -> None:
     assert r[1] == 0
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("kind", ["moment", "follower_moment"])
 def test_rolled_up(kind: str, formulation: str) -> None:
@@ -433,7 +433,7 @@ def test_leipholz(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sweep(scene).loads("flutter") == pytest.approx([40.0537365149], rel=1e-9)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["moment", "follower_moment"])
 def test_torque_on_a_cantilever(kind: str) -> None:
     """Nicolai's paradox: where both stiffnesses are equal there is flutter, however small the torque."""
@@ -485,6 +485,7 @@ def test_torque_on_an_oblong_cantilever(monkeypatch: pytest.MonkeyPatch) -> None
     assert sweep(scene).loads("flutter") == pytest.approx([root(nicolai, 0.5, 0.95)], rel=2e-7)
 
 
+@pytest.mark.long
 def test_which_loads_have_a_potential() -> None:
     def conservative(**load: Callable) -> bool:
         return column("loaded", (clamped(), End(**load)), (0.0, 1.0), inertia=classics.BEAM).conservative

@@ -78,6 +78,7 @@ def test_euler_buckling_out_of_the_plane_of_curvature() -> None:
     assert all(abs(s.point.load + 4 * pi**2) > 1e-6 for s in folds)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["branch 1", "branch 2"])
 def test_perversions(name: str) -> None:
     (p,) = user_points(default()[name], 40.0)

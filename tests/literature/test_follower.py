@@ -63,7 +63,7 @@ def test_two_flutters_in_a_coarse_sweep() -> None:
     assert found[0].error_estimate < 1e-9
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(("span", "J"), [((0.0, 25.0), 0.0), ((25.0, 15.0), 1e-3)])
 def test_flutter(span: tuple[float, float], J: float) -> None:
     branch = swept(span, (J, 0.0, 0.0))
@@ -100,6 +100,7 @@ def test_ordinate_of_a_load_that_is_not_known_better() -> None:
     assert abs(s.point.ordinate - (1 - t.point.load / EA)) <= s.ordinate_error <= 1.01 * s.error_estimate / EA + 1e-11
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("P", [0.0, 10.0])
 def test_two_planes(P: float) -> None:
     values = vibration(P).near(6, 1.0).values[:6]
@@ -114,6 +115,7 @@ def test_two_planes(P: float) -> None:
             assert column(expected, P) == pytest.approx(expected, rel=1e-11)
 
 
+@pytest.mark.few(1)
 @pytest.mark.short
 @pytest.mark.parametrize(("P", "near"), [(40.0, 10 - 11j), (100.0, 9.4 - 35j)])
 def test_past_flutter(P: float, near: complex) -> None:

@@ -255,6 +255,7 @@ def test_a_spring_that_resists_turning_alone() -> None:
     assert (point.negative, point.zero) == (0, 3)
 
 
+@pytest.mark.long
 def test_states_of_a_rod_that_a_thrust_accelerates() -> None:
     """Beal's free beam without thrust: two planes of 22.37, 61.67; its rigid motions are neither unstable nor modes.
 

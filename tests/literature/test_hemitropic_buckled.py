@@ -200,6 +200,7 @@ def test_formulations_agree_within_their_estimates() -> None:
     )
 
 
+@pytest.mark.long
 def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
     """Where ``2 E(m) = K(m)``, at ``P0 = 4 K^2``, the ends of a pinned column meet: its loop may turn about any axis.
 

@@ -27,7 +27,7 @@ def buckling_points(formulation: str, elements: int, degree: int, constants: Con
     return specials(straight, "branch point")
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 @pytest.mark.alone
 @pytest.mark.parametrize("constants", REFERENCE)
 def test_closed_form(constants: Constants) -> None:
@@ -72,7 +72,7 @@ def test_straight_states() -> None:
         assert abs(p.ordinate) < 1e-12
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(
     ("formulation", "degree", "meshes"),

@@ -68,6 +68,7 @@ def test_rows_of_the_table(name: str) -> None:
     assert bar < 10.0 ** -len(row[2].partition(".")[2]) / 2
 
 
+@pytest.mark.long
 def test_errors_of_coarse_meshes() -> None:
     wrong = printed()[1]
     assert "{:.1e}, {:.1e} and {:.1e} of itself".format(*wrong) in TEXT

@@ -71,7 +71,7 @@ def test_ring_covered_twice() -> None:
         assert abs(special.point.load - k0) < special.error_estimate < 1e-8
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "count"])
 def test_vibrating_ring(method: str) -> None:
     """Love: ``n^2 (n^2 - 1)^2 / (n^2 + B/C)`` out of the plane, ``B2 n^2 (n^2 - 1)^2 / (n^2 + 1)`` in it.

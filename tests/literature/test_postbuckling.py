@@ -83,7 +83,7 @@ def test_buckling_in_tension() -> None:
     assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("of", [lambda r, q: 0.0, lambda r, q: float(r[1]), lambda r, q: float(r[0]) ** 4])
 def test_ordinate_that_does_not_change(of: Any) -> None:
     """``P = pi^2 + pi^2/4 a^2`` whatever the ordinate is: ``a^2`` is the integral of the square of the angle."""
@@ -96,6 +96,7 @@ def test_ordinate_that_does_not_change(of: Any) -> None:
     assert "where it buckles supercritically;" in diagram.in_words()
 
 
+@pytest.mark.long
 def test_size_of_a_displacement_at_a_transcritical_point() -> None:
     """``8 beta/pi^3 |x|`` would have two signs: it is ``8 beta/pi^3 sqrt(2)/pi a`` with ``a^2`` of the angle alone.
 
@@ -111,7 +112,7 @@ def test_size_of_a_displacement_at_a_transcritical_point() -> None:
     assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("C", [1.3, 1.4])
 def test_ring_whose_ordinate_is_its_length(C: float) -> None:
     """Michell's ring buckles supercritically for C/B above 11/8, also where nothing is measured of it."""
@@ -188,6 +189,7 @@ def test_loads_between_a_fold_and_its_branch_point(asked: bool) -> None:
     assert [p.negative for p in found] == [0, 1, 0]
 
 
+@pytest.mark.long
 def test_fold_within_the_uncertainty_of_a_branch_point() -> None:
     """With beta = 3e-4 it is 1.2e-10 below: it is not located, which is said."""
     linear = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731

@@ -50,7 +50,7 @@ def linearized(stiffness: Any, k: Any, m: Any, n: Any) -> np.ndarray:
 # --- many eigenvalues nearer to zero than the one that crosses ------------------------------------------------------
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("EI", [1e-3, 1e-6])
 def test_whirling_string(EI: float) -> None:
     """Pulled by T, spinning at sqrt(P): ``P = EI (n pi)^4 + T (n pi)^2``, twice each; torsion is softer by far."""
@@ -308,7 +308,7 @@ def test_ring_with_too_much_curvature(n: int) -> None:
     assert explore(ring, elements=10).loads() == pytest.approx([k0], rel=1e-9)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("planar", [None, "e2"])
 def test_clothoid(planar: str | None) -> None:
     """A rod whose natural curvature grows along it rolls up to Euler's spiral: Fresnel's integrals."""
@@ -325,6 +325,7 @@ def test_clothoid(planar: str | None) -> None:
 # --- error bars -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_error_bars_are_rounded_up() -> None:
     for error in 10.0 ** np.random.default_rng(3).uniform(-14, 3, 200):
         assert error * 0.998 <= rounded_up(error) <= 2 * error

@@ -81,6 +81,7 @@ def test_lateral_buckling() -> None:
             assert (p.negative, p.zero) == ((p.load > first.point.load) + (p.load > second.point.load), 0)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "index"), [("branch 1", 0), ("branch 2", 1)])
 def test_buckled(name: str, index: int) -> None:
     branch = default()[name]

@@ -71,6 +71,7 @@ def test_both_branches_leave(make: Callable[[float], Scene], B2: float) -> None:
     assert not diagram.warnings
 
 
+@pytest.mark.long
 def test_no_more_branches_than_asked_for_leave_one_point() -> None:
     """Two do; of a ring that its load leaves free in three motions there were tens, of seven asked for."""
     plan = Plan(depth=1, error_bars=False, most_branches=2)

@@ -76,6 +76,7 @@ def test_euler_column() -> None:
         np.testing.assert_allclose(sign * modes.displacement[i], moved, atol=1e-6)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_straight_cord(formulation: str) -> None:
     """Its fourth mode stays in the plane of the coil: rotation sqrt(2) sin 2 pi s, mu = (2 pi)^2 + lam."""
@@ -105,7 +106,7 @@ def shape(mu: complex, P: float, s: np.ndarray, adjoint: bool) -> np.ndarray:
     return np.tensordot([row[1], -row[0]], basis(s, 0), 1)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.parametrize(
     ("P", "near"), [(10.0, 26.8), (10.0, 345.5), pytest.param(30.0, 50 + 150j, marks=pytest.mark.short)]
@@ -275,6 +276,7 @@ def test_counting_finds_no_modes() -> None:
 # --- files and pictures ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.versions
 def test_file_and_pictures(folder: Path, capfd: pytest.CaptureFixture) -> None:
     modes = modes_of(*state(classics.beck(span=(1.0, 35.0)), Discretization("pointwise", 6, 6), 30.0), 2)
@@ -347,6 +349,7 @@ def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
         assert MPI.COMM_WORLD.rank or sentence in err
 
 
+@pytest.mark.long
 @pytest.mark.short
 def test_null_vectors_in_files_are_motions(folder: Path) -> None:
     """At the first buckling load the straight rod's null vector moves it sideways, and holds its ends."""

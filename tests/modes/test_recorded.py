@@ -105,6 +105,7 @@ def test_rows_that_are_typical(folder: Path) -> None:
         assert gaps.max() <= along[-1] / (EVENLY - 1) + largest
 
 
+@pytest.mark.long
 def test_a_trace_is_the_same_with_and_without_them(folder: Path) -> None:
     """Modes are computed between two branches: nothing of the next one may depend on that, not even its last bit."""
     plan = Plan((0.0, 12.0), depth=2, error_bars=False)
@@ -139,6 +140,7 @@ def test_where_they_are_not_found_the_file_says_why(
     assert len(shown["modes"]) == max(len(found) - often, 0)
 
 
+@pytest.mark.long
 def test_a_rod_without_inertia_has_none(folder: Path) -> None:
     nothing = Inertia(rho_A=lambda c: 0.0, rho_I=lambda c: (0.0, 0.0, 0.0))
     scene = replace(classics.euler("clamped-free"), inertia=nothing)

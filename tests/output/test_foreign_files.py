@@ -198,6 +198,7 @@ def spoil(path: Path, change: bytes | Callable[[h5py.File], None]) -> None:
         change(file)
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize(("change", "words"), STATES)
 def test_states(change: Any, words: str, bad: Path, capfd: Any) -> None:
     path = bad / "states.h5"
@@ -211,12 +212,14 @@ def test_states(change: Any, words: str, bad: Path, capfd: Any) -> None:
         assert "\n" not in sentence
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("change", "words"), LOADED)
 def test_states_of_no_rod(change: Any, words: str, bad: Path, capfd: Any) -> None:
     spoil(bad / "states.h5", change)
     assert words in refused(lambda: rodfem.load(bad, SCENE), capfd)
 
 
+@pytest.mark.few(17)
 @pytest.mark.parametrize("name", ["load", "s", "r", "q", "value", "motion", "displacement"])
 @pytest.mark.parametrize("value", [3.5, "abc", np.zeros((1, 1)), h5py.SoftLink("/branches")], ids=range(4))
 def test_modes(name: str, value: Any, bad: Path, capfd: Any) -> None:

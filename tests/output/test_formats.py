@@ -263,6 +263,7 @@ def test_units_are_told() -> None:
     assert [name for name, unit in units.items() if not unit] == []
 
 
+@pytest.mark.long
 def test_example_of_the_page(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(results.parent)
     (block,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)

@@ -223,7 +223,7 @@ def test_record_of_every_row_can_be_read_back(folder: Path) -> None:
             np.testing.assert_allclose(setting.section[1], [np.diag([2.0, 1.0])], atol=1e-8)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", ENDS)
 def test_only_what_holds_an_end_is_drawn(folder: Path, kind: str) -> None:
     file = saved(folder / "states.h5", column(clamped(), ENDS[kind]))

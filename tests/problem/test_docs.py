@@ -101,7 +101,7 @@ def traced(name: str) -> tuple[list[Branch], str]:
     return diagram.branches, terminal.getvalue()
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", [name for name, scene in scenes().items() if scene.conservative])
 def test_scenes_of_the_page_are_traced_without_a_warning(name: str) -> None:
     branches, words = traced(name)

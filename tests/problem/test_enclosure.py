@@ -31,6 +31,7 @@ SEVEN = [
 ]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("f", SEVEN)
 def test_pieces_are_known(f: Callable[[Any], Any]) -> None:
     """Between its places each function is the straight line, to what is looked for: as told by 64 places on each."""
@@ -63,7 +64,7 @@ def test_intervals_hold_their_values() -> None:
     )
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("width", [1e-5, 1e-7, pytest.param(1e-9, marks=pytest.mark.long), 1e-12])
 @pytest.mark.parametrize(("peak", "integral"), [
     (lambda x: ufl.exp(-(x**2)), sqrt(pi)), (lambda x: (1 + x**2) ** -2, pi / 2), (lambda x: 1 - ufl.tanh(x) ** 2, 2.0),

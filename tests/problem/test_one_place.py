@@ -63,7 +63,7 @@ def test_a_weight_that_vanishes_at_an_end() -> None:
         assert special.error_estimate < 1e-5
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("places", "breaks"), [((0.4, 0.4 + 1e-13), ()), ((0.1 + 0.3, 0.4), (0.4 - 1e-13,)), ((0.1 + 0.2,) * 2, (0.3,))]
 )

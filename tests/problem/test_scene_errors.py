@@ -195,7 +195,7 @@ OFF_PLANE: list[tuple[dict, str]] = [
 """Scenes of a rod that is planar across e2 with something off that plane, at loads inside of the range alone too."""
 
 
-@pytest.mark.few(82)
+@pytest.mark.few(73)
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -317,6 +317,7 @@ def test_parameters_that_nothing_feels() -> None:
             Plan((0.0, 1.0), locus=locus).check(scene.varying(load, (0.0, 1.0)))
 
 
+@pytest.mark.long
 def test_functions_that_a_number_satisfies_but_no_expression() -> None:
     """``math.cosh`` takes the numbers of the first checks; the forms are more than numbers."""
     scene = Scene(**(GOOD | {"energy": lambda v, k, c: GOOD["energy"](v, k, c) + cosh(k[0])}))
@@ -338,6 +339,7 @@ def turns(s: np.ndarray, count: int) -> np.ndarray:
     return np.stack([np.cos(pi * count * s), 0 * s, np.sin(pi * count * s), 0 * s], axis=1)
 
 
+@pytest.mark.few(10)
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -439,7 +441,7 @@ def test_scenes_that_are_no_mistakes() -> None:
     Scene(**(GOOD | {"ends": Ring(odd=False), "start": lambda s: turns(s, 2)}))
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("change", "what"),
     [

@@ -51,7 +51,7 @@ def top(c: Any) -> tuple[float, float, float]:
     return (0.0, 0.0, 1.0)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("planar", [None, "e2"])
 @pytest.mark.parametrize(("left", "expected"), [(clamped(), TAN), (hinged(E2), pi**2)], ids=["clamped", "hinged"])

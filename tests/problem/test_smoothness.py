@@ -64,7 +64,7 @@ def test_a_steep_stiffness() -> None:
     assert seeing.warnings == []
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("f", "elements", "said"),
     [

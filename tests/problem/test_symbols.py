@@ -90,6 +90,7 @@ def test_every_function_is_asked(changes: dict[str, Any], words: str) -> None:
         scene(**changes)
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize(
     "changes",
     [

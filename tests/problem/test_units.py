@@ -53,7 +53,7 @@ def dimensionless(rod: str) -> rodfem.Diagram:
     return rodfem.trace(column(1.0, 1.0, rod), MESH, Plan(depth=1))
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("rod", ["unshearable and inextensible", "flexible"])
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def aside(length: float, stiffness: float) -> Scene:
     return replace(column(length, stiffness, "flexible"), ends=(clamped(), free(force=lambda c: (0.0, lateral, -c.P))))
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     "units", [DNA[:2], *(pytest.param(x, marks=pytest.mark.alone) for x in [(1.0, 1e6), (1e-3, 1.0), (1e4, 1e9)])]
 )
@@ -178,7 +178,7 @@ def test_frequencies_of_a_cantilever(length: float, force: float, elements: int)
     assert pencil.asymmetry()[0] == 4
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
 def test_methods(method: str) -> None:

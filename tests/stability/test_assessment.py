@@ -57,7 +57,7 @@ def at(name: str, formulation: str, load: float, bent: bool) -> tuple[Assessor, 
     return Assessor(system), x
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize(("name", "load", "bent"), STATES)
 def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> None:
@@ -80,7 +80,7 @@ def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> 
     assert assessor(x, "count").negative == negative
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "formulation"),
     [
@@ -267,7 +267,7 @@ def test_interval_between_eigenvalues() -> None:
     assert {2, 3} <= {int(np.argmin(abs(every - v))) for v in found} <= {1, 2, 3, 4}
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("apart", [0.0, 1e-10, 1e-6])
 @pytest.mark.parametrize("method", SOLVERS)
 def test_triple_cluster(method: str, apart: float) -> None:
@@ -288,7 +288,7 @@ def test_triple_cluster(method: str, apart: float) -> None:
     assert np.linalg.eigvalsh(gram / np.sqrt(np.outer(np.diag(gram), np.diag(gram)))).min() > 0.1  # three directions
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mass", "rotary"),
     [(0.0, (1.0, 1.0, 0.0)), (1.0, (0.0, 0.0, 0.0)), (1.0, (0.0, 0.0, 1e-3))],

@@ -113,7 +113,7 @@ def test_a_state_given_is_looked_at_as_well() -> None:
         solver.equilibrium(0.0, point)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("factors", ["chain", "petsc"])
 @pytest.mark.parametrize("mesh", meshes((4, 3), (5, 6), (7, 5)))
 def test_a_rod_that_is_held_twice_is_refused_on_any_mesh(mesh: tuple[int, int], factors: str) -> None:

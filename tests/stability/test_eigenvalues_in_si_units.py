@@ -64,6 +64,7 @@ def test_each_method_finds_those_of_a_cantilever_under_thrust(units: tuple[float
         assert (modes.error < 1e-5 * abs(modes.value)).all()
 
 
+@pytest.mark.long
 def test_a_spectrum_along_a_branch() -> None:
     """The count of inertia and the frequencies of a row agree in any units."""
     length, stiffness, mass = UNITS[0]

@@ -21,6 +21,7 @@ def stiffening(load: float) -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_the_band_of_a_far_state_is_not_kept() -> None:
     """At curvatures of 100 the stiffness is 1e43, and all eigenvalues of such a state are round-off of one another."""

@@ -156,6 +156,7 @@ def test_spectrum_of_the_straight_rod(load: float) -> None:
     assert modes.errors.max() < 1e-8
 
 
+@pytest.mark.long
 def test_spectrum_counts_as_inertia_does_along_branches() -> None:
     """Sylvester's law: the number of negative eigenvalues does not depend on the metric."""
     f = follower("reduced", 8, 6)

@@ -18,6 +18,7 @@ from rodfem.stability.nonsymmetric import NonsymmetricSolver
 EA = 40.0
 
 
+@pytest.mark.long
 def test_vibrations_along_a_rod() -> None:
     """Of a clamped bar ``omega = (n - 1/2) pi sqrt(EA)``; round-off made "mixed" or "bending" of them."""
     scene = replace(classics.shearable("flexible", 60.0, EA), inertia=classics.BEAM)
@@ -29,6 +30,7 @@ def test_vibrations_along_a_rod() -> None:
     assert {kind for kind in found.kinds if kind != STRAIGHT} == {"bending about d1", "bending about d2"}
 
 
+@pytest.mark.long
 def test_a_follower_thrust_leaves_vibrations_along_a_tapered_rod_alone() -> None:
     """What does not change with the thrust is torsion, or without rotation."""
     solver = Solver(fuzz.scene(30, 52), Discretization("pointwise", 2, 6))

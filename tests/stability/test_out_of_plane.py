@@ -10,7 +10,7 @@ from rodfem import Discretization, Solver
 from rodfem.stability.out_of_plane import InSpace
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.short
 @pytest.mark.parametrize("out", [0.0, 0.3, 1.0])
 def test_share_out_of_the_plane(out: float) -> None:

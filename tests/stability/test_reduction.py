@@ -100,7 +100,7 @@ def test_sizes_for_linear_elements_are_those_of_the_paper(n: int) -> None:
     assert sizes("follower", "pointwise", "tangent", n, 1) == (6 * n, 3 * n)
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [2])
 @pytest.mark.parametrize(
     ("name", "ends", "free", "held"), [("cord", 2, 0, 5), ("hemitropic", 2, 1, 6), ("ruler", 1, 1, 3)]
@@ -119,7 +119,7 @@ def test_sizes_for_any_degree(name: str, ends: int, free: int, held: int, degree
         assert sizes(name, formulation, coordinates, 4, degree) == (rows, columns)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "load", "bent"), STATES)
 def test_symmetry(name: str, load: float, bent: bool) -> None:
     p = pencil(name, "pointwise", load, bent)
@@ -161,7 +161,7 @@ def test_impossible_coordinates() -> None:
 # --- kernels ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(20)
+@pytest.mark.few(18)
 @pytest.mark.parametrize(("name", "formulation", "load", "bent", "coordinates"), CASES)
 def test_kernel_is_orthonormal(name: str, formulation: str, load: float, bent: bool, coordinates: str) -> None:
     p = pencil(name, formulation, load, bent, coordinates)
@@ -235,7 +235,7 @@ def test_work_is_linear() -> None:
 # --- eigenvalues -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("name", "formulation", "load", "bent", "coordinates"), CASES)
 def test_eigenvalues_are_those_of_dense_matrices(
     name: str, formulation: str, load: float, bent: bool, coordinates: str

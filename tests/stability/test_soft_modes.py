@@ -74,7 +74,7 @@ def test_an_end_too_free_to_tell() -> None:
         assert "undecided, index 0 to 3" in stream.getvalue() and "sign undecided" in stream.getvalue()
 
 
-@pytest.mark.few(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("k", "error_bars"),
     [
