@@ -9,16 +9,15 @@ import pytest
 from hard import loci, loci_codim2
 from hard.case import Case, Measured
 from hard.cases import CASES
-from hard.test_hard_cases import APART
+from hard.test_hard_cases import APART, value_of
 
 from rodfem.codim2.locus import COARSE
 from rodfem.continuation.kinds import GAP
 
 pytestmark = pytest.mark.alone
-EVERY = [(case, value) for case in CASES[APART] for value in case.few]
 
 
-@pytest.mark.parametrize(("case", "value"), EVERY, ids=[f"{case.name}-{value}" for case, value in EVERY])
+@pytest.mark.parametrize(("case", "value"), [value_of(case, value) for case in CASES[APART] for value in case.few])
 def test_a_hard_locus(case: Case, value: Any) -> None:
     found = case.measure(value)
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"

@@ -521,6 +521,7 @@ def seconds(page: Any) -> float:
     return float(next(metric["value"] for metric in metrics if metric["name"] == "TaskDuration"))
 
 
+@pytest.mark.long
 def test_a_long_branch_stays_fluent(opened: Callable[..., Any]) -> None:
     page = opened("pinned", change=long)
     until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#states canvas"))
