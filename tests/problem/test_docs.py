@@ -156,6 +156,7 @@ def test_numbers_of_the_page_are_those_of_their_sources() -> None:
             assert abs(float(text) - value) <= 0.51 * 10.0 ** -len(text.partition(".")[2]), (name, value)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("name", [name for name, scene in scenes().items() if scene.conservative])
 def test_scenes_of_the_page_do_what_it_says(name: str) -> None:
     first = traced(name)[0][0]
