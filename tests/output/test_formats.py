@@ -91,11 +91,14 @@ RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
 }
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with a folder of each run."""
-    folder = Path(MPI.COMM_WORLD.bcast(str(tmp_path_factory.mktemp("files")))) / "results"
-    for name, (scene, mesh, plan) in RUNS.items():
+COPIED = ("pinned", "locus")
+"""Runs that have files of all formats but one."""
+
+
+def made(folder: Path, *names: str) -> Path:
+    """The folder, with a folder of each run of these names."""
+    for name in names:
+        scene, mesh, plan = RUNS[name]
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("rodfem.diagram.sweep.LOADS", 26)
             diagram = run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
@@ -103,9 +106,22 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
             diagram[0].points[0].kink = "stored energy"
             diagram[0].unexplained = [Unexplained(*diagram[0].points[:2], 0, 1)]
             diagram.save(folder / "unexplained")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def some(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with a file of each format."""
+    folder = made(Path(MPI.COMM_WORLD.bcast(str(tmp_path_factory.mktemp("files")))) / "results", *COPIED)
     WORKED.clear()
     many([scenes()["euler"]], counted, folder / "many")
     return folder
+
+
+@pytest.fixture(scope="module")
+def results(some: Path) -> Path:
+    """Folder with a folder of each run."""
+    return made(some, *(name for name in RUNS if name not in COPIED))
 
 
 # --- the page and the files ------------------------------------------------------------------------------------------
@@ -307,11 +323,11 @@ def counted(scene: Scene) -> dict[str, Any]:
 
 
 @pytest.fixture
-def copied(results: Path, folder: Path) -> Path:
+def copied(some: Path, folder: Path) -> Path:
     """Copy of files of all formats."""
     for name in ("pinned/diagram.json", "pinned/states.h5", "pinned/modes.h5", "locus/locus-1.json"):
-        (folder / Path(name).name).write_bytes((results / name).read_bytes())
-    (folder / "rod-00000.json").write_bytes((results / "many" / "rod-00000.json").read_bytes())
+        (folder / Path(name).name).write_bytes((some / name).read_bytes())
+    (folder / "rod-00000.json").write_bytes((some / "many" / "rod-00000.json").read_bytes())
     return folder
 
 
