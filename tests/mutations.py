@@ -427,6 +427,36 @@ FAULTS = {
         "LASTING = 1.0",
         "tests/diagram/test_pairs_at_rows.py",
     ),
+    "infinite-eigenvalues-are-kept": Fault(
+        "rodfem/stability/finite_pairs.py",
+        "noise > DOUBT * size * kinetic",
+        "False",
+        "tests/diagram/test_light_rods.py",
+    ),
+    "what-is-sure-confirms-what-is-doubtful": Fault(
+        "rodfem/stability/finite_pairs.py",
+        "                _taken(others, sure)",
+        "                pass",
+        "tests/diagram/test_light_rods.py",
+    ),
+    "one-step-a-range": Fault(
+        "rodfem/problem/fast_load.py",
+        "(self.high - self.low) / STEPS",
+        "(self.high - self.low)",
+        "tests/diagram/test_fast_load.py",
+    ),
+    "energies-are-looked-at-in-their-values": Fault(
+        "rodfem/problem/parameter_functions.py",
+        "first.items())\n    for x, y in combinations_with_replacement(symbols, 2):",
+        "[])\n    for x, y in []:",
+        "tests/diagram/test_fast_load.py",
+    ),
+    "extrema-of-a-load-are-not-looked-at": Fault(
+        "rodfem/diagram/unfollowed.py",
+        "(last or turn or self._rows % every == 1",
+        "(last or self._rows % every == 1",
+        "tests/diagram/test_slow_and_far_frequencies.py",
+    ),
     "low-modes-by-the-usual-shift-alone": Fault(
         f"{CONTINUATION}determinants.py", "FAR = 0.1", "FAR = 0.0", "tests/diagram/test_opposite_crossings.py"
     ),
@@ -1152,6 +1182,18 @@ FAULTS = {
         "return Inertia(self.planar).at(x)",
         "tests/literature/test_rods.py tests/literature/test_ruler.py tests/literature/test_classics.py",
     ),
+    "what-no-mesh-decides-is-refined-again": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "abs(values) + of_mesh <= rounding",
+        "abs(values) < 0",
+        "tests/stability/test_soft_modes.py",
+    ),
+    "all-that-is-undecided-is-within-round-off": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "abs(values) + of_mesh <= rounding",
+        "abs(values) >= 0",
+        "tests/adaptivity tests/stability/test_soft_modes.py tests/diagram/test_at_special_points.py",
+    ),
     "zeros-that-nobody-decided": Fault(
         "rodfem/adaptivity/soft_states.py",
         "0.0 if self._richer else tolerance",
@@ -1484,7 +1526,7 @@ FAULTS = {
     ),
     "what-hardly-moves-is-infinite": Fault(
         "rodfem/stability/finite_pairs.py",
-        "AGAIN = 1e-3",
+        "AGAIN = 1e-2",
         "AGAIN = -1.0",
         "tests/stability/test_missing_frequencies.py",
     ),
@@ -1502,8 +1544,8 @@ FAULTS = {
     ),
     "noise-is-sought-where-it-is-far": Fault(
         "rodfem/stability/finite_pairs.py",
-        "target + SHIFT) if pair.noisy]",
-        "target + SHIFT) if pair.doubtful]",
+        "others = self._pairs(number, target + SHIFT)",
+        "others = [pair for pair in self._pairs(number, target + SHIFT) if pair.doubtful]",
         "tests/stability/test_missing_frequencies.py",
     ),
     "left-vectors-have-free-motions": Fault(

@@ -2,10 +2,11 @@ r"""Soft modes of states, with what the mesh adds to their uncertainty, and refi
 
 The state is solved for again on a mesh of half the elements' length and one degree more.  With eigenvalues ``mu`` on
 the mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - mu| / (1 - rho)``
-(:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh.  Where
-an eigenvalue changes by more than itself on the mesh that bound is none of what the mesh says of its sign: all of the
-change is added.  One whose sign is another one than on the mesh itself is undecided there, whatever richer meshes say,
-and so is one where the richer mesh has another state than the mesh, by the strains of the two.
+(:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh, unless
+it is within round-off on every one.  Where an eigenvalue changes by more than itself on the mesh that bound is none of
+what the mesh says of its sign: all of the change is added.  One whose sign is another one than on the mesh itself is
+undecided there, whatever richer meshes say, and so is one where the richer mesh has another state than the mesh, by the
+strains of the two.
 
 What vanishes at a special point is zero there by construction, and undecided.  The special point of a richer mesh is at
 another load, so that its other eigenvalues are compared across the branch.
@@ -200,7 +201,9 @@ class SoftStates:
                 finer, rounding = _nearest(richer.solver, point, len(modes), own, still)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
-            left = again.rho / (1 - again.rho) * abs(finer - values) + rounding
+            of_mesh = again.rho / (1 - again.rho) * abs(finer - values)
+            left = of_mesh + rounding
+            lost = _within_round_off(finer, of_mesh, rounding)
             values = finer
             # a sign that is another one than the mesh's own is not decided there
             coarse = np.array([m.value for m in modes])
@@ -208,7 +211,8 @@ class SoftStates:
             bars = np.where(away > abs(coarse), left + away, left)
             out = [replace(m, value=float(v), uncertainty=float(u))
                    for m, v, u in zip(modes, values, bars, strict=True)]  # fmt: skip
-            if all(m.decided for m in out) or (contrary & (left < abs(values))).any():
+            settled = all(m.decided or is_lost for m, is_lost in zip(out, lost, strict=True))
+            if settled or (contrary & (left < abs(values))).any():
                 return out
         return out
 
@@ -265,6 +269,11 @@ def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
     """A vector of a system, which is changed, with metric norm 1."""
     v.scale(1.0 / system.norm(v))
     return v
+
+
+def _within_round_off(values: np.ndarray, of_mesh: np.ndarray, rounding: np.ndarray) -> np.ndarray:
+    """Whether eigenvalues are within round-off wherever the error of the mesh may move them: no richer mesh decides."""
+    return np.asarray(abs(values) + of_mesh <= rounding)
 
 
 def _nearest(

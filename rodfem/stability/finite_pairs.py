@@ -48,8 +48,8 @@ It is that of the stiffness over the kinetic energy of the vector: 5e-4 and more
 its mass a light rod has them among the finite ones.  It is 2e-5 and less for others, but for a rod that cannot stretch
 and is nearly taut, of whose vectors the forces are the largest part.
 """
-AGAIN = 1e-3
-"""Relative difference of a finite eigenvalue from one shift and from another: 3e-5 and less, of others 0.2 and more."""
+AGAIN = 1e-2
+"""Relative difference of a finite eigenvalue from one shift and from another: 2e-3 and less, of others 0.2 and more."""
 LOST = 1e-6
 """Relative round-off of the kinetic energy above which an eigenvalue has no digits: beside a body of 1e9 masses of the
 rod."""
@@ -137,16 +137,15 @@ class FinitePairs:
     def _shifted(self, number: int, target: complex) -> list[EigenPair]:
         """Solve with a shift that this PETSc's numbers can express.
 
-        What may be infinite, for its round-off, is sought from another shift: finite eigenvalues are found again.
+        What may be infinite, for its round-off, is sought from another shift: finite eigenvalues are found again, each
+        of them once.
         """
         found = self._pairs(number, target)
         if any(pair.doubtful for pair in found):
-            others = [pair.value for pair in self._pairs(number, target + SHIFT) if pair.noisy]
-            found = [
-                pair
-                for pair in found
-                if not pair.doubtful or any(abs(pair.value - v) <= AGAIN * abs(v) for v in others)
-            ]
+            others = self._pairs(number, target + SHIFT)
+            for sure in (pair for pair in found if not pair.doubtful):
+                _taken(others, sure)
+            found = [pair for pair in found if not pair.doubtful or _taken(others, pair)]
         return found[: number + SPARE]
 
     def _pairs(self, number: int, target: complex) -> list[EigenPair]:
@@ -239,6 +238,15 @@ class FinitePairs:
         for made in (shifted, upper, lower, pencil, masses):
             made.destroy()
         return out[:number]
+
+
+def _taken(others: list[EigenPair], pair: EigenPair) -> bool:
+    """Whether one of the ``others`` is the same finite eigenvalue as that of a ``pair``; it is taken from them."""
+    nearest = min(others, key=lambda other: abs(other.value - pair.value), default=None)
+    if nearest is None or abs(nearest.value - pair.value) > AGAIN * abs(nearest.value):
+        return False
+    others.remove(nearest)
+    return True
 
 
 def _whole_pairs(found: list[EigenPair], target: complex) -> list[EigenPair]:

@@ -59,6 +59,28 @@ def test_ordinary_functions_bound_no_step() -> None:
         assert not len(fast.low)
 
 
+def test_each_range_has_a_row_inside() -> None:
+    """What comes and goes in a range is told by three rows: one in its inside, wherever the rows before it are."""
+    fast = FastLoad(column(lambda c: (0.0, 0.0, -3 * ufl.sin(20 * c.P))), (0.0, 1.0))
+    assert len(fast.low) > 4
+    for slope in (1.0, -0.3):
+        rows = [0.0 if slope > 0 else 1.0]
+        while 0.0 <= rows[-1] <= 1.0:
+            rows.append(rows[-1] + slope * fast.room(rows[-1], slope))
+        for low, high in zip(fast.low, fast.high, strict=True):
+            assert sum(low < row < high for row in rows) >= 1
+
+
+def test_a_notch_that_the_energy_hides() -> None:
+    """Bending softens at one load; of the energy itself that is a part of 1e-7, of its second derivative a half."""
+    thrust = lambda c: (0.0, 0.0, -2.0)  # noqa: E731
+    notch = lambda c: 1.0 - 0.5 * ufl.exp(-(((c.P - 0.3712) / 1e-3) ** 2))  # noqa: E731
+    hidden = lambda v, k, c: bending_and_twist(k, (notch(c), 9.0, 1.0)) + 1e7 * ufl.sin(c.P)  # noqa: E731
+    fast = FastLoad(replace(column(thrust), energy=hidden), (0.0, 1.0))
+    about = (fast.low < 0.3722) & (fast.high > 0.3702)
+    assert (fast.high - fast.low)[about].max() < 1e-3
+
+
 @pytest.mark.long
 @pytest.mark.alone
 def test_a_notch_of_one_piece() -> None:

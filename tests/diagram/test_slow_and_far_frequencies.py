@@ -16,6 +16,8 @@ from forms import loads
 from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, End, Inertia, Plan, Scene, clamped, free, trace
 from rodfem.codim2.others import NEAREST
+from rodfem.continuation.branch import Point
+from rodfem.diagram.unfollowed import Unfollowed
 
 pytestmark = pytest.mark.alone
 
@@ -112,6 +114,23 @@ def test_flutter_that_comes_and_goes_beyond_the_frequencies_that_are_followed() 
     rod = column("peak", ends, (0.0, 10.0), load="p", inertia=inertia, constants=constants)
     (words,) = swept(rod, error_bars=False).warnings
     assert words.startswith("At p = 5.") and "is not among those that are followed" in words
+
+
+@pytest.mark.usefixtures("few_loads")
+def test_all_eigenvalues_are_looked_at_where_a_load_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That is at the nearest row of the grid, p = 5.2; from one look to the next p changes by 1."""
+    looked, examine = [], Unfollowed._examine
+
+    def watched(self: Unfollowed, point: Point, *given: Any, **options: Any) -> bool:
+        looked.append(point.load)
+        return examine(self, point, *given, **options)
+
+    monkeypatch.setattr(Unfollowed, "_examine", watched)
+    thrust = lambda c: (0.0, 0.0, -(9.0 - (c.p - 5.27) ** 2))  # noqa: E731
+    inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0))
+    ends, constants = (clamped(), free(follower=thrust)), {"p": 3.0, "B2": 10.0}
+    swept(column("peak", ends, (3.0, 8.0), load="p", inertia=inertia, constants=constants), error_bars=False)
+    assert min(abs(load - 5.27) for load in looked) < 0.1
 
 
 @pytest.mark.long
