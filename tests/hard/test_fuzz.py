@@ -21,10 +21,10 @@ from rodfem.errors import ConvergenceError, SceneError
 pytestmark = pytest.mark.alone
 
 SCENES = [
-    *((1, 9), (1, 21), (1, 37), (1, 50), (1, 57), (7, 110), (12, 253), (15, 73)),
+    *((1, 50), (1, 9), (1, 21), (1, 37), (1, 57), (7, 110), (12, 253), (15, 73)),
     *(pytest.param(*given, marks=pytest.mark.long) for given in ((4, 55), (17, 431))),
 ]
-"""Seed and number: a clamp that turns; a thrust, with cosh; a load without a potential; a plane; a logarithm;
+"""Seed and number: a plane; a clamp that turns; a thrust, with cosh; a load without a potential; a logarithm;
 a stretch that vanishes at the very load of a coarser mesh; a curved rod that bends further, whose straight start has
 36 half-waves at the end of the range; a ring under dead loads, begun at an unstable circle.  Long: a rod of a
 millimetre that turns freely, with frequencies as of the third; another ring, begun beside a circle."""
@@ -65,7 +65,7 @@ def test_a_random_scene(seed: int, number: int) -> None:
     assert not any("symmetry" in sentence for sentence in found.said)
 
 
-WIDE = [(1, 8), pytest.param(1, 31, marks=pytest.mark.long)]
+WIDE = [(1, 31), pytest.param(1, 8, marks=pytest.mark.long)]
 """Seed and number."""
 
 
