@@ -90,15 +90,20 @@ def merge_doubles(branch: Branch) -> None:
     """Merge neighbouring branch points that are closer than the error of the discretisation.
 
     A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
+    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.
     """
+    bars = {id(s): s.error_estimate for s in branch.special}
     for p, q in list(pairwise(branch.special)):
         apart = abs(p.point.load - q.point.load)
         if (
             p.kind == q.kind == BRANCH_POINT
             and p.test_function == q.test_function == "mu"
             and p.point.mesh == q.point.mesh
-            and apart <= p.error_estimate + q.error_estimate < inf
+            and apart <= bars[id(p)] + bars[id(q)] < inf
         ):
+            beside = abs(p.point.ordinate - q.point.ordinate)
+            q.error_estimate = max(q.error_estimate, apart + p.error_estimate)
+            q.ordinate_error = max(q.ordinate_error, beside + p.ordinate_error)
             q.null_vectors = p.null_vectors + q.null_vectors
             q.negative_before = p.negative_before
             q.point.zero += p.multiplicity
