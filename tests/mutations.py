@@ -405,8 +405,14 @@ FAULTS = {
     ),
     "steps-are-short-from-where-a-branch-goes-back-to": Fault(
         "rodfem/diagram/shorter_steps.py",
-        "return max(self._largest, self._since - point.arclength)",
-        "return self._largest",
+        "max(piece.largest, piece.since - point.arclength)",
+        "piece.largest",
+        "tests/diagram/test_shorter_steps.py",
+    ),
+    "pieces-of-short-steps-are-forgotten": Fault(
+        "rodfem/diagram/shorter_steps.py",
+        "[piece for piece in self._pieces if piece not in inside] + [new]",
+        "[new]",
         "tests/diagram/test_shorter_steps.py",
     ),
     "the-nearest-eigenvalue-is-a-pole": Fault(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import inf
 
 from rodfem.continuation.branch import Point
@@ -16,28 +17,44 @@ class Unresolved(Exception):
     """A piece of a branch is to be looked at again, with shorter steps."""
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """Steps from arclength ``since`` ``until`` another are of at most the ``largest`` length, after some ``tries``."""
+
+    since: float
+    until: float
+    largest: float
+    tries: int
+
+
 class ShorterSteps:
-    """The bound of the steps of one branch: short ones about the piece that was asked for last."""
+    """The bound of the steps of one branch: short ones about the pieces that were asked for.
+
+    A piece is known for as long as the branch is followed: it may go back beyond one on account of another one, and
+    would go to and fro between the two for ever if each were asked for as often.
+    """
 
     def __init__(self, largest: float = inf, until: float = -inf) -> None:
         """Steps of at most ``largest`` up to the arclength ``until``."""
-        self._since, self._until, self._largest, self._tries = -inf, until, largest, 0
+        self._pieces = [_Piece(-inf, until, largest, 0)]
 
     def ask(self, a: Point, b: Point, parts: int = PARTS, *, once: bool = False) -> None:
         """Make steps shorter from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are already.
 
         The piece is divided into so many ``parts``; ``once``: steps that are short already do.
         """
-        if once and self._since <= a.arclength < self._until:
+        first, last = a.arclength, b.arclength
+        if once and any(piece.since <= first < piece.until for piece in self._pieces):
             return
-        self._tries = self._tries + 1 if a.arclength < self._until else 1
-        if self._tries <= SHORTER:
-            length = b.arclength - a.arclength
-            self._since, self._until, self._largest = a.arclength, b.arclength + length, length / parts
+        inside = [piece for piece in self._pieces if piece.since < last and first < piece.until]
+        tries = 1 + max((piece.tries for piece in inside), default=0)
+        if tries <= SHORTER:
+            length = last - first
+            new = _Piece(first, last + length, length / parts, tries)
+            self._pieces = [piece for piece in self._pieces if piece not in inside] + [new]
             raise Unresolved
 
     def reach(self, point: Point) -> float:
-        """Largest step from a ``point``: up to the piece, and then short ones."""
-        if point.arclength >= self._until:
-            return inf
-        return max(self._largest, self._since - point.arclength)
+        """Largest step from a ``point``: up to the next piece, and then short ones."""
+        ahead = (piece for piece in self._pieces if point.arclength < piece.until)
+        return min((max(piece.largest, piece.since - point.arclength) for piece in ahead), default=inf)

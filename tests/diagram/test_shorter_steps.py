@@ -37,3 +37,17 @@ def test_what_is_short_already_is_not_asked_for_for_ever() -> None:
     steps.ask(row(1.0), row(1.0 + length))
     with pytest.raises(Unresolved):
         steps.ask(row(9.0), row(9.5))
+
+
+def test_a_branch_does_not_go_to_and_fro_between_two_pieces() -> None:
+    """It goes back beyond both of them each time: each is known when the other one is asked for."""
+    steps, asked = ShorterSteps(), 0
+    for _ in range(10):
+        for first in (3.0, 5.0):
+            try:
+                steps.ask(row(first), row(first + 0.2), once=first == 3.0)
+            except Unresolved:
+                asked += 1
+    assert asked == 1 + SHORTER
+    assert steps.reach(row(3.1)) == pytest.approx(0.2 / PARTS)
+    assert steps.reach(row(3.5)) == pytest.approx(1.5)
