@@ -142,7 +142,7 @@ def test_a_double_point_that_the_mesh_splits() -> None:
 
 
 def test_bars_of_a_double_point_hold_for_both_loads() -> None:
-    """Euler's loads of two planes, 8e-6 apart, are in error by 5.6e-6 each: a bar of 6e-6 was 1.4e-5 off for one."""
+    """Euler's loads of two planes, 8e-6 apart, are in error by 5.6e-6 each: the point is 1.4e-5 off for one."""
     apart = 8e-6
     scene = column("nearly round", (clamped(), free(push)), (2.0, 3.0), constants={"B2": 1.0 + apart / EULER})
     (special,) = trace(scene, Discretization("reduced", 2, 3), Plan(depth=0)).special("branch point")

@@ -72,7 +72,7 @@ def test_a_sign_that_changes_through_infinity_is_no_divergence() -> None:
 def test_each_finite_eigenvalue_once(elements: int, number: int, target: float) -> None:
     """Beside the tip, which hardly moves, those of a rod clamped and hinged: about ``((j + 1/4) pi)^4 / rho``.
 
-    The thrust is small.  One of ten was lost, as its round-off makes it doubtful, and with eight came one too many.
+    The thrust is small.  Of ten one is doubtful by its round-off; beside eight there is an infinite one among them.
     """
     solver = Solver(light(1e-4, (0.0, 30.0)), Discretization(elements=elements))
     pencil = NonsymmetricSolver(solver.equilibria.system).at(solver.equilibrium(1.0).x)

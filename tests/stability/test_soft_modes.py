@@ -104,7 +104,7 @@ def test_a_zero_of_the_count_is_decided_by_richer_meshes_or_not_at_all(k: float,
     ("k", "last"), [(5e-10, 0.02), *(pytest.param(k, 0.5, marks=pytest.mark.long) for k in (2e-10, 1e-7))]
 )
 def test_what_no_mesh_decides_is_not_refined_again(k: float, last: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A second richer mesh leaves every row as it is; it was asked for at each of hundreds of rows."""
+    """A second richer mesh would leave every row as it is."""
     levels, companion = list[int](), SoftStates._companion
 
     def rows() -> list[tuple[Any, ...]]:
