@@ -306,8 +306,8 @@ FAULTS = {
     ),
     "a-pair-found-by-a-zero-is-looked-for-again": Fault(
         "rodfem/diagram/special_search.py",
-        "self._touching.add(b, crossings(found), told",
-        "self._touching.add(b, [], told",
+        "self._touching.add(b, crossings(found), blind",
+        "self._touching.add(b, [], blind",
         "tests/diagram/test_pairs_at_rows.py",
     ),
     "a-zero-is-no-negative-eigenvalue": Fault(
@@ -1104,9 +1104,21 @@ FAULTS = {
     "first-parabola-is-believed": Fault(f"{CONTINUATION}pair_search.py", "tried >= CLOSER", "tried >= 0", CHAIN),
     "parabola-of-one-side": Fault(
         f"{CONTINUATION}touching.py",
-        "if not (self._told or seen) and",
-        "if self._begun and not self._told and",
+        "if not (self._blind or seen) and",
+        "if self._begun and not self._blind and",
         "tests/diagram/test_pairs_at_rows.py",
+    ),
+    "a-search-is-over-where-its-function-falls-on": Fault(
+        f"{CONTINUATION}touching.py",
+        "search.dips(rows, a, b) and not search.falling",
+        "search.dips(rows, a, b)",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "unresolved-points-are-merged-with-others": Fault(
+        f"{CONTINUATION}index_chain.py",
+        "(p.resolved is False) == (q.resolved is False)",
+        "(p.resolved is False) >= (q.resolved is False)",
+        CHAIN,
     ),
     "pair-beside-a-row": Fault(f"{CONTINUATION}pair_search.py", "DEEP = 0.1", "DEEP = 0.0", f"{CHAIN} {HARD}"),
     "breaks-are-not-recorded": Fault(

@@ -90,7 +90,8 @@ def merge_doubles(branch: Branch) -> None:
     """Merge neighbouring branch points that are closer than the error of the discretisation.
 
     A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
-    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.
+    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.  The wide bar of
+    a point that the mesh does not resolve says nothing of one that it does: these stay two.
     """
     bars = {id(s): s.error_estimate for s in branch.special}
     for p, q in list(pairwise(branch.special)):
@@ -99,6 +100,7 @@ def merge_doubles(branch: Branch) -> None:
             p.kind == q.kind == BRANCH_POINT
             and p.test_function == q.test_function == "mu"
             and p.point.mesh == q.point.mesh
+            and (p.resolved is False) == (q.resolved is False)
             and apart <= bars[id(p)] + bars[id(q)] < inf
         ):
             beside = abs(p.point.ordinate - q.point.ordinate)

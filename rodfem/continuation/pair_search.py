@@ -44,11 +44,17 @@ class PairSearch:
     """Search by one test function; ``solver`` has the mesh of the rows, which are neighbours on a branch.
 
     "Another index" is one that the crossings that are ``known`` do not explain.
+
+    Attributes
+    ----------
+    falling
+        Whether a search has ended at a row, beyond which the function may fall further: what it found is not all.
     """
 
     def __init__(self, solver: BranchSolver, logarithm: Logarithm, known: Sequence[Crossing] = ()) -> None:
         """With the ``logarithm`` of the size of the test function, and crossings that are ``known``."""
         self.solver, self.logarithm, self.known = solver, logarithm, known
+        self.falling = False
 
     def inside(self, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
         """A state between the neighbours ``p`` and ``q`` among three ``rows`` whose index is not theirs, if found."""
@@ -148,6 +154,7 @@ class PairSearch:
             least, lowest = min((value, s) for s, value in known)
             middle = every.index((lowest, least))
             if not 0 < middle < len(every) - 1:
+                self.falling = True
                 break
             samples = every[middle - 1 : middle + 2]
         # what falls so low as a parabola may be the product of two

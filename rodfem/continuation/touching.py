@@ -45,25 +45,25 @@ class Touching:
         self._rows: list[Point] = []
         self._earlier: list[Point] = []
         self.known: list[Crossing] = []
-        self._begun, self._told, self._looked = True, False, False
+        self._begun, self._blind, self._looked = True, False, False
         self._seen: set[int] = set()
 
     def restart(self, rows: Sequence[Point]) -> None:
         """Begin at the last of some rows of one branch; the step before it counts as looked at."""
         same = [row for row in rows[-MOST:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
         self._earlier = same[:-2]
-        self._rows, self._begun, self._told = same[-2:], len(rows) < 2, False
+        self._rows, self._begun, self._blind = same[-2:], len(rows) < 2, False
         self._seen, self._looked = set(), len(rows) > 1
         self.known = [crossing for crossing in self.known if crossing.arclength <= rows[-1].arclength]
 
-    def add(self, row: Point, known: Sequence[Crossing], *, told: bool) -> None:
+    def add(self, row: Point, known: Sequence[Crossing], *, blind: bool) -> None:
         """Go on to the next row; ``known`` are crossings that have been found since.
 
-        ``told`` is whether special points are known in the step to it.
+        In a ``blind`` step the index changes by more than they say: a pair does not show there.
         """
         self._begun = self._begun and len(self._rows) < 2
         self._earlier = [*self._earlier, *self._rows[:-1]][2 - MOST :]
-        self._rows, self._told = [*self._rows[-1:], row], told
+        self._rows, self._blind = [*self._rows[-1:], row], blind
         since = row.arclength - LASTING * (row.arclength - self._rows[0].arclength)
         self.known = [crossing for crossing in self.known if crossing.arclength > since] + [*known]
 
@@ -89,22 +89,23 @@ class Touching:
 
         That is beside the crossings that have been ``found`` in this step; ``solver`` has the mesh.  Of two steps the
         parabola may have its vertex in the wrong one: where that of the last three rows was not in the step to ``a``,
-        that step is looked at, too, and its row before that step then comes first.
+        or the function still fell towards ``a``, that step is looked at, too, and its row before that step then comes
+        first.
         """
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
         rows, known = [self._rows[-2], a, b], [*self.known, *found]
-        # by numbers of the test functions: whether one had its vertex in the step before
+        # by numbers of the test functions: those that had their lowest value in the step before
         before, self._seen, looked, self._looked = self._seen, set(), self._looked, False
         for number, function in enumerate(functions(solver, rows, known)):
             search = PairSearch(solver, function, known)
-            if search.dips(rows, a, b):
-                self._seen.add(number)
             new = self._between(search, rows, looked or number in before) or (
                 self._again(search, found[0]) if found else []
             )
             if new:
                 return new
+            if search.dips(rows, a, b) and not search.falling:
+                self._seen.add(number)
         return []
 
     def _again(self, search: PairSearch, crossing: Crossing) -> list[Point]:
@@ -130,10 +131,10 @@ class Touching:
         """As :meth:`between`, by one test function, which has ``seen`` what is in the first of two steps."""
         first, a, b = rows
         found: list[Point] = []
-        if not (self._told or seen) and search.follows(a, first):
+        if not (self._blind or seen) and search.follows(a, first):
             early = search.inside(rows, first, a) or (search.beside(first, a) if self._begun else [])
             found += [first, *early, a] if early else []
-        if found or self._told:  # what lies on the other side of the row between the steps is known
+        if found or self._blind:  # what lies on the other side of the row between the steps is known
             near = search.beside(a, b)
         else:
             near = search.around(rows)
@@ -147,7 +148,7 @@ class Touching:
 
         A branch of one step has no third row, and its first one has been compared with none.
         """
-        if len(self._rows) < 2 or self._told or self.knows(*self._rows):
+        if len(self._rows) < 2 or self._blind or self.knows(*self._rows):
             return []
         a, b = self._rows
         for function in functions(solver, self._rows, self.known):

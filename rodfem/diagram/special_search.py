@@ -126,7 +126,7 @@ class SpecialSearch:
 
         Those that the index shows come first, and then pairs beside them, which it does not.
         """
-        a, b, inserted, told = rows[0], rows[-1], False, False
+        a, b, inserted = rows[0], rows[-1], False
         found = self._among(rows) if changed else []
         for _ in range(ROUNDS):
             known = crossings(found)
@@ -146,13 +146,12 @@ class SpecialSearch:
                 break
             if known:  # so many in one step show better in shorter ones
                 self._steps.ask(min(a, new[0], key=arclength), b)
-            told |= any(row.arclength > a.arclength for row in new)
             rows = sorted({id(row): row for row in (*rows, *new)}.values(), key=arclength)
             found, inserted = self._among(rows), True
         if not changed and not inserted:
             found = self._among(rows)
         self._shorten_about(a, b, found)
-        self._touching.add(b, crossings(found), told=told or blind)
+        self._touching.add(b, crossings(found), blind=blind)
         return found
 
     def _shorten_about(self, a: Point, b: Point, found: Sequence[SpecialPoint]) -> None:

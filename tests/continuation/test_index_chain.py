@@ -43,7 +43,7 @@ from rodfem.app.terminal import Report
 from rodfem.codim2.follow import locus
 from rodfem.continuation.branch import Point
 from rodfem.continuation.follow import _to_load
-from rodfem.continuation.index_chain import Row, breaks, chained, explain
+from rodfem.continuation.index_chain import Row, breaks, chained, explain, merge_doubles
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.switching import directions, leave
 from rodfem.diagram import explorer
@@ -149,6 +149,18 @@ def test_bars_of_a_double_point_hold_for_both_loads() -> None:
     assert special.multiplicity == 2 and special.resolved
     assert [abs(special.point.load - load) <= special.error_estimate for load in (EULER, EULER + apart)] == [True, True]
     assert special.error_estimate < 2 * apart
+
+
+def test_an_unresolved_point_is_no_half_of_a_double_one() -> None:
+    """Two critical loads a tenth apart: the bar of the first one, set to 3, reaches the resolved other one."""
+    scene = column("two", (clamped(), free(push)), (2.0, 3.0), constants={"B2": 1.1})
+    (branch,) = trace(scene, Discretization("reduced", 4, 5), Plan(depth=0))
+    first, second = branch.special[:2]
+    first.error_estimate, first.resolved, bar = 3.0, False, second.error_estimate
+    merge_doubles(branch)
+    assert branch.special[:2] == [first, second]
+    assert (second.multiplicity, second.error_estimate) == (1, bar) and bar < 1e-6
+    assert not breaks(branch.points, branch.special)
 
 
 @pytest.mark.short

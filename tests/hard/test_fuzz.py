@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from classics import column, push
 from hard.fuzz import comparison, known, wider, worker
-from hard.fuzz.comparison import compared, of_a_sentence
+from hard.fuzz.comparison import Compared, check_specials, compared, of_a_sentence
 from hard.fuzz.known import Known
 from hard.fuzz.oracle import Oracle, scaling
 from hard.fuzz.scenes import scene
 from hard.fuzz.summary import in_words
 
-from rodfem import Discretization, Plan, Scene, Solver, StepControl, trace
+from rodfem import Discretization, Plan, Scene, Solver, StepControl, clamped, free, trace
 from rodfem.errors import ConvergenceError, SceneError
 
 pytestmark = pytest.mark.alone
@@ -63,6 +64,33 @@ def test_a_random_scene(seed: int, number: int) -> None:
     assert found.rows > found.unclear
     assert (found.wrong, found.differs, found.refused) == ([], [], [])
     assert not any("symmetry" in sentence for sentence in found.said)
+
+
+UNLIKE = [
+    (49, 249, "A special point near load 3.1954772 could not be located"),
+    (49, 317, "the branch may have been left for another one beside it"),
+    (50, 446, "The last state, at P = 0, is singular, and was not resolved"),
+]
+"""Seed, number, and words of a scene of which two meshes show different things: nearly symmetric rings, of which one
+mesh misses special points or ends on another branch, and a thrust that ends at a singular state."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "number", "words"), UNLIKE)
+def test_a_scene_that_two_meshes_show_unlike_says_so(seed: int, number: int, words: str) -> None:
+    found = compared(scene(seed, number), number, depth=1)
+    assert not found.wrong and any(words in sentence for sentence in found.said)
+    assert max(found.ratios, default=0.0) <= 1
+
+
+def test_two_points_far_apart_are_no_pair() -> None:
+    """Otherwise their distance would count as an error, be it half of the range."""
+    rod = column("far", (clamped(), free(push)), (2.0, 3.0))
+    (here,) = trace(rod, Discretization("reduced", 4, 5), Plan(depth=0)).special("branch point")
+    for away, ratios, alone in ((1.6 * here.error_estimate, 1, 0), (0.02, 1, 0), (0.5, 0, 2)):
+        there, found = replace(here, point=replace(here.point, load=here.point.load + away)), Compared("far")
+        check_specials("trunk", [here], [there], found, 1.0)
+        assert (len(found.ratios), sum("partner" in sentence for sentence in found.differs)) == (ratios, alone)
 
 
 WIDE = [(1, 31), pytest.param(1, 8, marks=pytest.mark.long)]

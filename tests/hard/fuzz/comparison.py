@@ -57,6 +57,8 @@ OTHER = 0.05
 """Relative difference of stored energies of two resolved states that are two equilibria, not one with two errors."""
 FAMILY = "no symmetry of the scene explains"
 """What is said where two traces may have two states of a family."""
+APART = 0.05
+"""Part of the range beyond which two special points outside each other's bars are two: each lacks a partner."""
 AT = (0.37, 0.81)
 """Loads to stop at, as parts of the range."""
 NOTHING = Known()
@@ -260,12 +262,13 @@ def check_chain(branch: Branch, out: Compared) -> None:
 def check_pair(first: Diagram, second: Diagram, out: Compared) -> None:
     """Compare two diagrams: the first branches point by point, what leaves them by what is on it."""
     a, b = first[0], second[0]
+    width = abs(first.scene.span[1] - first.scene.span[0])
     if not first.scene.conservative and any(FAMILY in words for words in (*first.warnings, *second.warnings)):
         return
     if whole(a) and whole(b):
         if a.ended[:8] != b.ended[:8]:
             out.differs.append(f"{a.name} ended: {a.ended}; and {b.ended}")
-        check_specials("trunk", singular(a), singular(b), out)
+        check_specials("trunk", singular(a), singular(b), out, width)
     check_asked(first, second, out)
     if not (all(map(whole, first)) and all(map(whole, second))) or max(len(first), len(second)) >= MOST_BRANCHES:
         return
@@ -274,7 +277,7 @@ def check_pair(first: Diagram, second: Diagram, out: Compared) -> None:
         out.differs.append(f"{len(found[0])} branches, and {len(found[1])}")
     else:
         pools = [sorted((s for x in branches[1:] for s in singular(x)), key=_place) for branches in found]
-        check_specials("branches", *pools, out)
+        check_specials("branches", *pools, out, width)
 
 
 def joined(diagram: Diagram) -> list[Branch]:
@@ -299,13 +302,15 @@ def _place(s: SpecialPoint) -> tuple[float, float]:
     return s.point.load, s.point.ordinate
 
 
-def check_specials(where: str, first: Sequence[SpecialPoint], second: Sequence[SpecialPoint], out: Compared) -> None:
-    """Match two lists, each point with the nearest one of its kind in units of the bars."""
+def check_specials(
+    where: str, first: Sequence[SpecialPoint], second: Sequence[SpecialPoint], out: Compared, width: float
+) -> None:
+    """Match two lists, each point with the nearest one of its kind in units of the bars; ``width`` is the range's."""
     left = list(second)
     for s in first:
         candidates = [(ratio_of(s, t), t) for t in left if s.kind == t.kind and _change(s) == _change(t)]
         ratio, t = min(candidates, key=lambda pair: pair[0], default=(inf, None))
-        if t is None or ratio > 1e6:
+        if t is None or (ratio > 1 and abs(s.point.load - t.point.load) > APART * width):
             out.differs.append(f"{where}: {describe(s)} has no partner")
             continue
         left.remove(t)
