@@ -1459,7 +1459,10 @@ FAULTS = {
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
     ),
     "bracket-on-the-other-side": Fault(
-        f"{CONTINUATION}locate.py", "return low if first else high", "return high if first else low", LOCATE
+        f"{CONTINUATION}locate.py", "return (low, high) if first else (high, low)", "return high, low", LOCATE
+    ),
+    "a-crossing-is-told-by-its-number-alone": Fault(
+        f"{CONTINUATION}locate.py", "        if positive != negative:\n", "        if False:\n", LOCATE
     ),
     "two-measures-of-an-eigenvalue-are-one": Fault(
         f"{CONTINUATION}special_points.py",

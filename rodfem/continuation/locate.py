@@ -8,7 +8,7 @@ and are interpolated with spectral accuracy.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import inf
 
 import numpy as np
@@ -40,6 +40,8 @@ OFF = 1e-3
 """Distance beside a singular state at which one is solved for instead, relative to the piece."""
 ORDERED = 1e-4
 """Relative change of eigenvalues nearest zero at which their order is known."""
+BESIDE = 6
+"""Number of eigenvalues on either side of a crossing among which the one that crosses is looked for."""
 NARROWER = 6
 """Largest number of times a bracket is narrowed until the crossing eigenvalue is among those nearest zero."""
 
@@ -84,26 +86,55 @@ def eigenvalue(
     raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero", SMALLER_STEPS)
 
 
-def crossing_mode(
+def crossing_modes(
     solver: BranchSolver, curve: Curve, ends: tuple[float, float], order: int, still: Sequence[PETSc.Vec]
-) -> tuple[float, PETSc.Vec]:
-    """Where on a piece of a branch eigenvalue ``order`` changes its sign, nearly, and its vector there.
+) -> Iterator[tuple[float, PETSc.Vec]]:
+    """Yield where on a piece of a branch eigenvalue ``order`` changes its sign, nearly, and its vector there.
 
-    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero.  ``solver``,
-    ``curve`` and ``still`` are those of :func:`eigenvalue` and :func:`sample`; ``ends`` are parameters.  Raises
-    :class:`ConvergenceError` where the eigenvalue does not change its sign.
+    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero.  Where negative
+    ones stay near zero it may have another number on the side of the piece where it is positive: if the first is not
+    the one that crosses, the second is that without a partner there.  ``solver``, ``curve`` and ``still`` are those of
+    :func:`eigenvalue` and :func:`sample`; ``ends`` are parameters.  Raises :class:`ConvergenceError` where the
+    eigenvalue does not change its sign.
     """
     width = 0.1 * min(WINDOW, ends[1] - ends[0])
     for _ in range(NARROWER):
-        x, s = solve_beside(solver, curve, bracket(solver, curve, ends, order, still, width), OFF * width)
+        negative, positive = bracket(solver, curve, ends, order, still, width)
+        x, s = solve_beside(solver, curve, negative, OFF * width)
         try:
-            return s, eigenvalue(solver, x, order, still)[1]
+            mode = eigenvalue(solver, x, order, still)[1]
         except ConvergenceError:
             width /= 16
+            continue
+        yield s, mode
+        if positive != negative:
+            other = without_partner(solver, x, solve_beside(solver, curve, positive, OFF * width)[0], still)
+            if other is not None:
+                yield s, other
+        return
     raise ConvergenceError(
         f"Eigenvalue number {order} is not among those nearest zero near load {solver.system.scalar(x):.8g}",
         SMALLER_STEPS,
     )
+
+
+def without_partner(
+    solver: BranchSolver, x: PETSc.Vec, beside: PETSc.Vec, still: Sequence[PETSc.Vec]
+) -> PETSc.Vec | None:
+    """Vector of the negative eigenvalue nearest zero at the state ``x`` that is none at a state ``beside`` it; or None.
+
+    Vectors change little between the two, so that the one that has become positive is nearly orthogonal to those that
+    are negative there.  ``solver`` and ``still`` are those of :func:`eigenvalue`.
+    """
+
+    def negative(state: PETSc.Vec) -> list[PETSc.Vec]:
+        found = solver.inertia.at(state)
+        found.count()
+        values, vectors = found.nearest(BESIDE + len(still), ORDERED)
+        return [vectors[i].copy() for i in np.argsort(abs(values)) if values[i] < 0.0]
+
+    here, there = negative(x), negative(beside)
+    return next((mode for mode in here if across(solver.system, [mode], [*still, *there])), None)
 
 
 def bracket(
@@ -113,14 +144,14 @@ def bracket(
     order: int,
     still: Sequence[PETSc.Vec],
     width: float,
-) -> float:
+) -> tuple[float, float]:
     """Where on a piece of a branch eigenvalue ``order`` changes its sign, to ``width``.
 
-    By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero.  The end
-    where it is negative is returned: on the other side it may have changed its number with positive ones that stay near
-    zero (torsion of a taut string, say).  Where the counts at both ends agree it is zero next to an end: the one at
-    which it is smaller.  ``solver``, ``curve`` and ``still`` are those of :func:`eigenvalue` and :func:`sample`;
-    ``ends`` are parameters.
+    By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero. The end
+    where it is negative is the first: on the other side it may have changed its number with positive ones that stay
+    near zero (torsion of a taut string, say). Where the counts at both ends agree it is zero next to an end: the
+    one at which it is smaller, twice. ``solver``, ``curve`` and ``still`` are those of :func:`eigenvalue` and
+    :func:`sample`; ``ends`` are parameters.
     """
     low, high = ends
     h = high - low
@@ -131,11 +162,11 @@ def bracket(
     first = passed(low)
     if first == passed(high):  # the zero is nearer to an end than a state can be solved
         left, right = (eigenvalue(solver, solve_beside(solver, curve, s, OFF * h)[0], order, still)[0] for s in ends)
-        return low if abs(left) < abs(right) else high
+        return (low, low) if abs(left) < abs(right) else (high, high)
     while high - low > width:
         middle = (low + high) / 2
         low, high = (middle, high) if passed(middle) == first else (low, middle)
-    return low if first else high
+    return (low, high) if first else (high, low)
 
 
 def sample(
@@ -233,16 +264,31 @@ def locate(
     def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
         return hermite(a, b, s)
 
-    h, window = b.arclength - a.arclength, WINDOW
+    h, ends = b.arclength - a.arclength, (a.arclength, b.arclength)
     if test_function == "slope":
         x, guess = solve_beside(solver, curve, a.arclength + h * a.slope / (a.slope - b.slope), OFF * h)
         (mode,) = solver.inertia.modes_near_zero(x, 1, ROUGH)
-    else:
-        piece = a.arclength + OFF * h, b.arclength - OFF * h
-        guess, mode = crossing_mode(solver, curve, piece, order, still)
-        window *= NARROW
-    ends = a.arclength, b.arclength
-    return refine(solver, curve, guess, min(window, 0.45 * h), mode, test_function, len(still), ends=ends)
+        half = min(WINDOW, 0.45 * h)
+        return _inside(refine(solver, curve, guess, half, mode, test_function, len(still), ends=ends), a, b)
+    piece, half = (a.arclength + OFF * h, b.arclength - OFF * h), min(NARROW * WINDOW, 0.45 * h)
+    trouble: ConvergenceError | None = None
+    for guess, mode in crossing_modes(solver, curve, piece, order, still):
+        try:
+            return _inside(refine(solver, curve, guess, half, mode, test_function, len(still), ends=ends), a, b)
+        except ConvergenceError as error:
+            trouble = trouble or error
+    assert trouble is not None
+    raise trouble
+
+
+def _inside(located: Located, a: Point, b: Point) -> Located:
+    """What is located between two points, or nearly; else raises :class:`ConvergenceError`."""
+    margin = 0.01 * (b.arclength - a.arclength)
+    if not a.arclength - margin <= located.s <= b.arclength + margin:
+        raise ConvergenceError(
+            f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket", SMALLER_STEPS
+        )
+    return located
 
 
 def locate_mode(solver: BranchSolver, a: Point, b: Point, guess: float, mode: PETSc.Vec, persistent: int) -> Located:

@@ -268,12 +268,6 @@ def _special(
     solver: BranchSolver, a: Point, b: Point, order: int, test_function: str, still: Sequence[PETSc.Vec] = ()
 ) -> SpecialPoint:
     located = locate(solver, a, b, order, test_function, still)
-    margin = 0.01 * (b.arclength - a.arclength)
-    if not a.arclength - margin <= located.s <= b.arclength + margin:
-        raise ConvergenceError(
-            f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket",
-            SMALLER_STEPS,
-        )
     special = special_at(solver, located, located.s, still)
     special.test_function = test_function
     if test_function == "slope" and abs(located.after - located.before) == 1 and special.coupling > UNCOUPLED:

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hard.bifurcations import folds, opposite_other
+from hard.bifurcations import MESH, folds, opposite_other
+from hard.case import Change, compare, run, said, singular
+from hard.two_freedoms import scene
 from hemitropic_cases import explored
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
@@ -108,8 +110,18 @@ def test_a_bracket_ends_where_the_eigenvalue_is_negative(falling: bool, monkeypa
     inertia = SimpleNamespace(at=lambda s: SimpleNamespace(below=lambda mu: count(s)), tolerance=1e-7)
     solver: Any = SimpleNamespace(inertia=inertia)
     curve: Any = None
-    s = locate.bracket(solver, curve, (0.0, 1.0), 1, (), 1e-6)
-    assert abs(s - 0.3) < 1e-6 and count(s) == 2
+    negative, positive = locate.bracket(solver, curve, (0.0, 1.0), 1, (), 1e-6)
+    assert max(abs(negative - 0.3), abs(positive - 0.3)) < 1e-6 and (count(negative), count(positive)) == (2, 1)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_crossing_beside_a_negative_eigenvalue_that_stays_near_zero(sign: int) -> None:
+    """``-1e-6`` of a stretch all along: where the other one is negative, too, it is farther from zero, and is meant."""
+    rod = scene(lambda u, f2, c: -5e-7 * u**2 + 0.1 * (u**4 + f2**2) + 0.5 * sign * (c.P - 0.1) * f2, (-0.31, 0.4))
+    diagram = run(rod, MESH)
+    index = (2, 1) if sign > 0 else (1, 2)
+    found = compare(singular(diagram[0]), [Change(0.1, *index)], said(diagram))
+    assert found.right and not found.said, found
 
 
 def test_round_off_that_two_measures_differ_by() -> None:
