@@ -1114,6 +1114,21 @@ FAULTS = {
         "search.dips(rows, a, b)",
         "tests/diagram/test_opposite_crossings.py",
     ),
+    "growth-of-a-determinant-is-not-divided-out": Fault(
+        f"{CONTINUATION}determinants.py",
+        "(steady := without_growth(earlier, known)) is not None",
+        "False",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "last-step-is-not-halved": Fault(
+        f"{CONTINUATION}touching.py",
+        "(search.beside(a, b) if self._begun else []) or search.halved(a, b)",
+        "(self._begun and (search.beside(a, b) or search.halved(a, b)))",
+        "tests/diagram/test_opposite_crossings.py",
+    ),
+    "two-zeros-at-a-load-are-to-fall-far": Fault(
+        f"{CONTINUATION}pair_search.py", "return nearest", "return None", "tests/diagram/test_opposite_crossings.py"
+    ),
     "unresolved-points-are-merged-with-others": Fault(
         f"{CONTINUATION}index_chain.py",
         "(p.resolved is False) == (q.resolved is False)",

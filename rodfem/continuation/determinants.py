@@ -10,7 +10,9 @@ is exact for the constrained pencil (``M`` is zero on multipliers, whose infinit
 modes far above ``sigma`` do not count, whatever moves them.  The shift is the larger of the lowest bending eigenvalue
 and of twice that nearest zero; where this one is far below the other, as of a rod that has softened, it is another
 shift to be tried.  The ratio takes a factorisation a row, and has poles where an eigenvalue is ``-sigma``: it is asked
-second, where the determinant changes so much that it may hide a pair.
+last, where the determinant changes so much that it may hide a pair.  Before it the determinant is divided by
+``exp(c s)``, which has no zero either: ``c`` is the rate at which it grew along the branch before, as where all
+stiffnesses grow with the load.
 
 Crossings that are known are taken out, too: a pair in the same step as one, or in the next one, would not show in a
 function that passes zero there.
@@ -20,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from math import exp, log
+from math import exp, isfinite, log
 from typing import NamedTuple
 
 from rodfem.continuation.branch import Point, SpecialPoint
@@ -67,13 +69,29 @@ def steep(rows: Sequence[Point], known: Sequence[Crossing] = ()) -> bool:
     return any(not abs(_difference(whole, b, a, known)) <= STEEP for a, b in pairwise(rows))
 
 
-def functions(solver: BranchSolver, rows: Sequence[Point], known: Sequence[Crossing] = ()) -> Iterator[Logarithm]:
+def without_growth(earlier: Sequence[Point], known: Sequence[Crossing]) -> Logarithm | None:
+    """The determinant over what it grows by along the branch, as it did between ``earlier`` rows; None if unknown.
+
+    Crossings that are ``known`` are no growth.
+    """
+    if len(earlier) < 2:
+        return None
+    first, last = earlier[0], earlier[-1]
+    rate = _difference(whole, last, first, known) / (last.arclength - first.arclength)
+    return (lambda row: row.determinant - rate * row.arclength) if isfinite(rate) else None
+
+
+def functions(
+    solver: BranchSolver, rows: Sequence[Point], known: Sequence[Crossing] = (), earlier: Sequence[Point] = ()
+) -> Iterator[Logarithm]:
     """Yield those that may show a pair beside ``rows`` on the mesh of ``solver``, each when the last one has not.
 
-    Crossings that are ``known`` do not count.
+    Crossings that are ``known`` do not count; ``earlier`` rows on the mesh tell how the determinant grows.
     """
     yield whole
     if steep(rows, known):
+        if (steady := without_growth(earlier, known)) is not None:
+            yield steady
         nearest, usual = BEYOND * max(_nearest(solver, row) for row in rows), solver.inertia.scale
         yield LowModes.without_poles(solver, rows, max(nearest, usual))
         if 0.0 < nearest < FAR * usual:

@@ -20,8 +20,8 @@ LOWER = 0.5
 MULTIPLICITIES = (1, 2)
 FALLING = 0.9
 """A value below this share of the lowest one known is on the way to a zero of a function that is no line."""
-VANISHING = 1e-4
-"""A value below which a zero is believed, relative to that of the row before it."""
+VANISHING, LAST = 1e-4, 1e-2
+"""Values, over that of the row before, below which a zero is believed: at once, and where they fall no more."""
 APART = 1e-7
 """Distance from a known crossing within which indices are its own."""
 TRIES, MISSES = 10, 2
@@ -165,9 +165,11 @@ class PairSearch:
     def _together(self, known: list[Sample], p: Point, q: Point) -> Point | None:
         """State between two rows at which two eigenvalues pass zero, if the ``known`` samples lead to one.
 
-        They are those of the square root, in order: a line but for its sign, which changes at that state.
+        They are those of the square root, in order: a line but for its sign, which changes at that state.  Where it
+        falls no further, the lowest state is the one if an eigenvalue there is within the tolerance of zero.
         """
         missed = tried = 0
+        lowest, nearest = LAST, None
         while missed < MISSES and tried < TRIES:
             tried += 1
             least, i = min((value, i) for i, (_, value) in enumerate(known))
@@ -183,9 +185,11 @@ class PairSearch:
             # one that changes slowly is within the tolerance before the other one is, and its shift moves the zero
             if state.zero > row.zero and size < VANISHING:
                 return state
+            if state.zero > row.zero and size < lowest:
+                lowest, nearest = size, state
             missed = 0 if size < FALLING * least else missed + 1
             known = sorted([*known, (s, size)])
-        return None
+        return nearest
 
     def _differs(self, state: Point, row: Point) -> bool:
         """Whether a state may have another index than follows from a row; small eigenvalues by their quotients."""

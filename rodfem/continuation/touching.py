@@ -97,7 +97,7 @@ class Touching:
         rows, known = [self._rows[-2], a, b], [*self.known, *found]
         # by numbers of the test functions: those that had their lowest value in the step before
         before, self._seen, looked, self._looked = self._seen, set(), self._looked, False
-        for number, function in enumerate(functions(solver, rows, known)):
+        for number, function in enumerate(functions(solver, rows, known, self._earlier)):
             search = PairSearch(solver, function, known)
             new = self._between(search, rows, looked or number in before) or (
                 self._again(search, found[0]) if found else []
@@ -146,16 +146,15 @@ class Touching:
     def ending(self, solver: BranchSolver) -> list[Point]:
         """Last step of a branch that has ended, with a row inserted where an eigenvalue passes zero twice; else none.
 
-        A branch of one step has no third row, and its first one has been compared with none.
+        No third row follows the last two: the state half-way is one.  The first row of a branch of one step has been
+        compared with none.
         """
         if len(self._rows) < 2 or self._blind or self.knows(*self._rows):
             return []
         a, b = self._rows
-        for function in functions(solver, self._rows, self.known):
+        for function in functions(solver, self._rows, self.known, self._earlier):
             search = PairSearch(solver, function, self.known)
-            found = search.beside(b, a)
-            if not found and self._begun:
-                found = search.beside(a, b) or search.halved(a, b)
+            found = search.beside(b, a) or (search.beside(a, b) if self._begun else []) or search.halved(a, b)
             if found:
                 return [a, *found, b]
         return []

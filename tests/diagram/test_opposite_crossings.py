@@ -80,6 +80,8 @@ HARDER = {
     "a slow one within the band of a fast one's zero": (48, 13, 1e-6),
     "two at one load hide a pair": (101, 11, 1e-6),
     "four in the step of a fifth one, beside its end": (34, 5, 1e-6),
+    "a pair where all stiffnesses grow": (131, 8, 1e-6),
+    "two at one load in the last step": (162, 8, 1e-6),
 }
 """Numbers and seeds of random draws of up to five zeros, and what is no shallower."""
 
