@@ -83,19 +83,20 @@ def without_growth(earlier: Sequence[Point], known: Sequence[Crossing]) -> Logar
 
 def functions(
     solver: BranchSolver, rows: Sequence[Point], known: Sequence[Crossing] = (), earlier: Sequence[Point] = ()
-) -> Iterator[Logarithm]:
+) -> Iterator[tuple[str, Logarithm]]:
     """Yield those that may show a pair beside ``rows`` on the mesh of ``solver``, each when the last one has not.
 
-    Crossings that are ``known`` do not count; ``earlier`` rows on the mesh tell how the determinant grows.
+    Each comes with its name, the same from row to row.  Crossings that are ``known`` do not count; ``earlier`` rows on
+    the mesh tell how the determinant grows.
     """
-    yield whole
+    yield "whole", whole
     if steep(rows, known):
         if (steady := without_growth(earlier, known)) is not None:
-            yield steady
+            yield "without growth", steady
         nearest, usual = BEYOND * max(_nearest(solver, row) for row in rows), solver.inertia.scale
-        yield LowModes.without_poles(solver, rows, max(nearest, usual))
+        yield "low modes", LowModes.without_poles(solver, rows, max(nearest, usual))
         if 0.0 < nearest < FAR * usual:
-            yield LowModes.without_poles(solver, rows, nearest)
+            yield "lowest modes", LowModes.without_poles(solver, rows, nearest)
 
 
 def _nearest(solver: BranchSolver, row: Point) -> float:

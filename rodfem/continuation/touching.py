@@ -46,7 +46,7 @@ class Touching:
         self._earlier: list[Point] = []
         self.known: list[Crossing] = []
         self._begun, self._blind, self._looked = True, False, False
-        self._seen: set[int] = set()
+        self._seen: set[str] = set()
 
     def restart(self, rows: Sequence[Point]) -> None:
         """Begin at the last of some rows of one branch; the step before it counts as looked at."""
@@ -95,17 +95,17 @@ class Touching:
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
         rows, known = [self._rows[-2], a, b], [*self.known, *found]
-        # by numbers of the test functions: those that had their lowest value in the step before
+        # by names of the test functions: those that had their lowest value in the step before
         before, self._seen, looked, self._looked = self._seen, set(), self._looked, False
-        for number, function in enumerate(functions(solver, rows, known, self._earlier)):
+        for name, function in functions(solver, rows, known, self._earlier):
             search = PairSearch(solver, function, known)
-            new = self._between(search, rows, looked or number in before) or (
+            new = self._between(search, rows, looked or name in before) or (
                 self._again(search, found[0]) if found else []
             )
             if new:
                 return new
             if search.dips(rows, a, b) and not search.falling:
-                self._seen.add(number)
+                self._seen.add(name)
         return []
 
     def _again(self, search: PairSearch, crossing: Crossing) -> list[Point]:
@@ -152,7 +152,7 @@ class Touching:
         if len(self._rows) < 2 or self._blind or self.knows(*self._rows):
             return []
         a, b = self._rows
-        for function in functions(solver, self._rows, self.known, self._earlier):
+        for _, function in functions(solver, self._rows, self.known, self._earlier):
             search = PairSearch(solver, function, self.known)
             found = search.beside(b, a) or (search.beside(a, b) if self._begun else []) or search.halved(a, b)
             if found:
@@ -165,7 +165,7 @@ def beside_zero(solver: BranchSolver, rows: Sequence[Point], row: Point) -> list
 
     It is one of two or three neighbouring ``rows`` on the mesh of ``solver``, between which no crossing is known.
     """
-    for function in functions(solver, rows):
+    for _, function in functions(solver, rows):
         search = PairSearch(solver, function)
         if row is rows[0] or row is rows[-1]:
             found = search.beside(row, rows[1] if row is rows[0] else rows[-2])
