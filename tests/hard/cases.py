@@ -187,6 +187,11 @@ BIFURCATIONS = (
         "two at one load", SAID, "Euler, pi^2/4, times functions with given zeros", "number of a random draw",
         planes.crossings, (3,), tuple(range(60)),
     ),
+    Case(
+        "two to five branch points in a cluster, at random", "up to five in a step, of which some hide others; pairs "
+        "as shallow as 1e-6", SAID, "Euler, pi^2/4, times functions with given zeros", "number of a random draw",
+        planes.cluster, (3,), tuple(range(100)),
+    ),
 )  # fmt: skip
 ABOVE = (1e-2, 1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-13, -1e-9, -1e-4)
 """Greatest thrust of a sweep, less the critical one."""

@@ -111,3 +111,8 @@ def drawn(number: int, seed: int = 49, most: int = 4, shallow: float = SHALLOW) 
 def crossings(number: int) -> Measured:
     """Random draw of a ``number``."""
     return drawn(number).measured()
+
+
+def cluster(number: int) -> Measured:
+    """Random draw of a ``number`` with up to five zeros, and pairs that are shallower."""
+    return drawn(number, seed=16, most=5, shallow=1e-6).measured()
