@@ -130,7 +130,7 @@ def test_up_to_five_crossings(name: str) -> None:
 
 @pytest.mark.few(1)
 def test_a_search_that_ends_at_a_row_is_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the low modes alone: those of the first three rows fall towards the end of the step, beside which four pass."""
+    """By the low modes alone: those of the first three rows fall to the end of the step, beside which two pass zero."""
     monkeypatch.setattr(determinants, "without_growth", lambda *given: None)
     assert drawn(34, 5, 5, 1e-6).measured().right
 
