@@ -1131,9 +1131,12 @@ FAULTS = {
     ),
     "unresolved-points-are-merged-with-others": Fault(
         f"{CONTINUATION}index_chain.py",
-        "(p.resolved is False) == (q.resolved is False)",
-        "(p.resolved is False) >= (q.resolved is False)",
+        "(p.resolved is False or q.resolved is False)",
+        "(q.resolved is False)",
         CHAIN,
+    ),
+    "two-passages-of-one-load-are-merged": Fault(
+        f"{CONTINUATION}index_chain.py", "for row in between)\n        ):", "for row in ())\n        ):", CHAIN
     ),
     "pair-beside-a-row": Fault(f"{CONTINUATION}pair_search.py", "DEEP = 0.1", "DEEP = 0.0", f"{CHAIN} {HARD}"),
     "breaks-are-not-recorded": Fault(

@@ -90,18 +90,21 @@ def merge_doubles(branch: Branch) -> None:
     """Merge neighbouring branch points that are closer than the error of the discretisation.
 
     A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
-    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.  The wide bar of
-    a point that the mesh does not resolve says nothing of one that it does: these stay two.
+    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.  The bar of a
+    point that the mesh does not resolve says nothing of its neighbour, and a branch that comes back to the load at
+    which it was passes two points there.
     """
     bars = {id(s): s.error_estimate for s in branch.special}
     for p, q in list(pairwise(branch.special)):
-        apart = abs(p.point.load - q.point.load)
+        apart, bar = abs(p.point.load - q.point.load), bars[id(p)] + bars[id(q)]
+        between = [x for x in branch.points if p.point.arclength < x.arclength < q.point.arclength]
         if (
             p.kind == q.kind == BRANCH_POINT
             and p.test_function == q.test_function == "mu"
             and p.point.mesh == q.point.mesh
-            and (p.resolved is False) == (q.resolved is False)
-            and apart <= bars[id(p)] + bars[id(q)] < inf
+            and not (p.resolved is False or q.resolved is False)
+            and apart <= bar < inf
+            and all(abs(row.load - q.point.load) <= bar for row in between)
         ):
             beside = abs(p.point.ordinate - q.point.ordinate)
             q.error_estimate = max(q.error_estimate, apart + p.error_estimate)

@@ -163,6 +163,20 @@ def test_an_unresolved_point_is_no_half_of_a_double_one() -> None:
     assert not breaks(branch.points, branch.special)
 
 
+def test_two_passages_of_one_load_are_no_double_point() -> None:
+    """A branch comes back to the load of a branch point: in between it was elsewhere, by far more than the bars."""
+    scene = column("two", (clamped(), free(push)), (2.0, 3.0), constants={"B2": 1.1})
+    (branch,) = trace(scene, Discretization("reduced", 4, 5), Plan(depth=0))
+    first, second = branch.special[:2]
+    second.point.load = first.point.load
+    merge_doubles(branch)
+    assert branch.special[:2] == [first, second] and second.multiplicity == 1
+    for row in branch.points:
+        row.load = first.point.load
+    merge_doubles(branch)
+    assert branch.special[0] is second and second.multiplicity == 2
+
+
 @pytest.mark.short
 def test_a_family_at_the_first_load() -> None:
     """At P = 0 a ring under a radial dead load may turn freely; its branch leads across that family.
