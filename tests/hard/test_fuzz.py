@@ -67,11 +67,16 @@ def test_a_random_scene(seed: int, number: int) -> None:
 
 
 UNLIKE = [
+    (49, 52, "indices may be the mesh's"),
+    (49, 207, "2 eigenvalues that this mesh does not tell apart"),
+    (49, 313, "the rod has more half-waves than a mesh of 30 nodes can hold"),
     (49, 317, "the branch may have been left for another one beside it"),
     (50, 446, "The last state, at P = 0, is singular, and was not resolved"),
+    (51, 11, "a pair of branch points may be missing there"),
+    (51, 17, "A special point between loads 0.54839661 and 0.54837146 is missing"),
 ]
-"""Seed, number, and words of a scene of which two meshes show different things: a nearly symmetric ring, which on one
-mesh ends on another branch, and a thrust that ends at a singular state."""
+"""Seed, number, and words of a scene of which two meshes show different things: columns of 20 and 30 half-waves that a
+mesh does not resolve, critical loads 1.3e-7 apart, nearly symmetric rings, a thrust that ends at a singular state."""
 
 
 @pytest.mark.long
