@@ -147,10 +147,10 @@ def bracket(
 ) -> tuple[float, float]:
     """Where on a piece of a branch eigenvalue ``order`` changes its sign, to ``width``.
 
-    By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero. The end
+    By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero.  The end
     where it is negative is the first: on the other side it may have changed its number with positive ones that stay
-    near zero (torsion of a taut string, say). Where the counts at both ends agree it is zero next to an end: the
-    one at which it is smaller, twice. ``solver``, ``curve`` and ``still`` are those of :func:`eigenvalue` and
+    near zero (torsion of a taut string, say).  Where the counts at both ends agree it is zero next to an end: the one
+    at which it is smaller, twice.  ``solver``, ``curve`` and ``still`` are those of :func:`eigenvalue` and
     :func:`sample`; ``ends`` are parameters.
     """
     low, high = ends
