@@ -95,6 +95,9 @@ def test_two_points_far_apart_are_no_pair() -> None:
         there, found = replace(here, point=replace(here.point, load=here.point.load + away)), Compared("far")
         check_specials("trunk", [here], [there], found, 1.0)
         assert (len(found.ratios), sum("partner" in sentence for sentence in found.differs)) == (ratios, alone)
+    there, found = replace(there, point=here.point, note="not estimated: a kink in the state"), Compared("no bar")
+    check_specials("trunk", [here], [there], found, 1.0)
+    assert (found.ratios, found.differs, found.unresolved) == ([], [], 1)
 
 
 WIDE = [(1, 31), pytest.param(1, 8, marks=pytest.mark.long)]
