@@ -99,7 +99,8 @@ def singular(branch: Branch) -> list[SpecialPoint]:
 def compare(found: Sequence[SpecialPoint], expected: Sequence[Change], said: tuple[str, ...] = ()) -> Measured:
     """Largest error of the loads, relative to its own bar: infinite where other points were found, or other indices.
 
-    Neighbours nearer to each other than the bars may be one point that has the change of all.
+    Neighbours nearer to each other than the bars may be one point that has the change of all.  Of a point that the mesh
+    does not resolve it is said: its bar may not hold.
     """
     left, ratios = list(expected), []
     for s in found:
@@ -111,7 +112,10 @@ def compare(found: Sequence[SpecialPoint], expected: Sequence[Change], said: tup
             group.append(left.pop(0))
         if not group or (group[0].before, group[-1].after) != (s.negative_before, s.negative_after):
             return Measured(inf, 1.0, said, f"{s!r} where {group} was expected")
-        ratios += [abs(s.point.load - g.load) / bar if s.point.load != g.load else 0.0 for g in group]
+        errors = [abs(s.point.load - g.load) / bar if s.point.load != g.load else 0.0 for g in group]
+        if max(errors) > 1 and s.resolved is False:
+            said = (*said, f"{s!r} is not resolved")
+        ratios += errors
     if left:
         return Measured(inf, 1.0, said, f"{left} missed")
     return Measured(max(ratios, default=0.0), 1.0, said, ratios=tuple(ratios))
