@@ -134,7 +134,7 @@ class Touching:
         if not (self._blind or seen) and search.follows(a, first):
             early = search.inside(rows, first, a) or (search.beside(first, a) if self._begun else [])
             found += [first, *early, a] if early else []
-        if found or self._blind:  # what lies on the other side of the row between the steps is known
+        if found or self._blind:  # the other side of the row between the steps is known, or shows nothing
             near = search.beside(a, b)
         else:
             near = search.around(rows)
