@@ -45,7 +45,7 @@ REAL: Any = np.float64
 """Numbers of states and forms, whatever those of PETSc."""
 _FOR = hashlib.sha1(code_cache.processor().encode()).hexdigest()[:16]
 C_COMPILER = {
-    name: {"cffi_extra_compile_args": ["-O1", "-march=native", "-g0", f"-DPROCESSOR={_FOR}"]}
+    name: {"cffi_extra_compile_args": ["-O1", "-march=native", "-fvisibility=hidden", "-g0", f"-DPROCESSOR={_FOR}"]}
     for name in ("jit_options", "jit_params")  # dolfinx 0.5 calls them parameters
     if name in inspect.signature(fem.form).parameters
 }

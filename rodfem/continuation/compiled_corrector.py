@@ -11,6 +11,7 @@ from petsc4py import PETSc
 from rodfem.fem.compiled_newton import CompiledNewton, Ended, Limits
 from rodfem.fem.state import State
 from rodfem.linalg.chain import Chain
+from rodfem.linalg.compiled import buffer
 from rodfem.stability.inertia import FRESH, Factored, Inertia
 
 
@@ -38,10 +39,10 @@ class CompiledCorrector(CompiledNewton):
         self.tangent = np.zeros(n)
         b = self.block = self.ffi.new("Block *")
         b.block, b.share, b.near_zero = block, FRESH, near_zero
-        b.vectors, b.images = map(self._doubles, self._vectors)
-        b.fresh, b.fresh_images = map(self._doubles, self._fresh)
-        b.right, b.solved = (self._doubles(np.zeros((block + 2) * n)) for _ in range(2))
-        b.tangent, b.step = self._doubles(self.tangent), self._doubles(np.zeros(n))
+        self.point(b, vectors=self._vectors[0], images=self._vectors[1])
+        self.point(b, fresh=self._fresh[0], fresh_images=self._fresh[1])
+        self.point(b, **{name: np.zeros((block + 2) * n) for name in ("right", "solved")})
+        self.point(b, tangent=self.tangent, step=np.zeros(n))
         self.restart()
 
     def restart(self) -> None:
@@ -58,8 +59,7 @@ class CompiledCorrector(CompiledNewton):
     def factor(self, x: PETSc.Vec) -> Factored | None:
         """Factor ``S`` at ``x``, with the phase conditions as they are; None where it is too near singular."""
         self._take()
-        state = x.array_r
-        failed = self.lib.factor_at(self.rod, self.block, self.ffi.cast("double *", state.ctypes.data))
+        failed = self.lib.factor_at(self.rod, self.block, buffer(self.ffi, x.array_r))
         self.factors.adopt(regular=not failed)
         found = self.hold()
         return None if failed else found

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from rodfem.fem.newton import NewtonResult
 from rodfem.fem.phase import Phase
 from rodfem.fem.state import Energies
 from rodfem.fem.symmetries import SYMMETRIC_STATE
-from rodfem.linalg.compiled import module
+from rodfem.linalg.compiled import Memory, buffer, module
 from rodfem.linalg.matrices import EPS, shared
 
 if TYPE_CHECKING:
@@ -33,20 +32,12 @@ if TYPE_CHECKING:
     from rodfem.fem.parameters import Line
     from rodfem.stability.inertia import Factored
 
-FUNCTIONS = """
-int advance(Step *step, int known, const double **states, const double *value, const double *slope, const double *last,
-            const double *before, double low, double high, double same);
-"""
 MOST = 16
 """Symmetries of a scene that the code has room for."""
 MADE = 0
+INDEX = {"starts": "indptr", "indices": "indices"}
+"""Pointers to the pattern of a sparse matrix, and what scipy calls it."""
 
-
-def declarations() -> str:
-    """The structures and functions of the code, for cffi."""
-    code = Path(__file__).with_name("step.c").read_text()
-    begin, end = code.index("typedef struct {"), code.index("enum {")
-    return code[begin:end].replace("MOST * MOST", str(MOST**2)) + FUNCTIONS
 
 
 @dataclass(frozen=True)
@@ -109,8 +100,8 @@ class CompiledStep:
         """Hand all arrays over."""
         self.corrector, self.system = corrector, corrector.system
         system, n = self.system, self.system.fields.unknowns
-        code = module("step", declarations(), Path(__file__).parent)
-        self._lib, self._ffi, self._kept = code.lib, code.ffi, list[Any]()
+        code = module("continuation/step")
+        self._lib, self._ffi, self._memory = code.lib, code.ffi, Memory(code.ffi)
         step = self._step = self._ffi.new("Step *")
         theirs, newton = corrector.ffi, corrector.newton
         self._address(step, "correct", theirs.addressof(corrector.lib, "correct"))
@@ -126,16 +117,16 @@ class CompiledStep:
         metric, saddle = shared(system.metric), shared(corrector.matrix)
         assert metric is not None
         assert saddle is not None
-        self._sparse(step.metric, metric.pattern, metric.values)
-        self._sparse(step.saddle, saddle.pattern, saddle.values)
-        step.sizes = self._ffi.NULL if system.scene.units.ordinary else self._array(system.sizes.array_r.real)
+        self._sparse("metric", metric.pattern, metric.values)
+        self._sparse("saddle", saddle.pattern, saddle.values)
+        if not system.scene.units.ordinary:
+            self._point(sizes=system.sizes.array_r.real.copy())
         quaternions = system.fields.dofs.get("q", np.zeros((0, 4), int)).reshape(-1, 4)
-        step.quaternions, step.quaternion = len(quaternions), self._array(quaternions.astype(np.int32), "int")
+        step.quaternions = len(quaternions)
+        self._point(quaternion=quaternions.astype(np.int32))
         self._symmetries(step)
         self._arrays = {name: np.zeros(n) for name in ("x", "direction", "row", "tangent")}
-        for name, array in self._arrays.items():
-            setattr(step, name, self._array(array))
-        step.right, step.combined = self._array(np.zeros(n)), self._array(np.zeros(n))
+        self._point(**self._arrays, right=np.zeros(n), combined=np.zeros(n))
         self._states = self._ffi.new("double *[]", ROWS)
         self.checked: Checked | None = None
         self._line: Line | None = None
@@ -146,13 +137,13 @@ class CompiledStep:
         count, own = len(system.symmetries), step.drifts
         matrix = system.generators.in_unknowns()
         step.symmetries, step.symmetric = count, SYMMETRIC_STATE
-        self._sparse(step.generator, matrix, matrix.data)
-        step.generic = self._array(verification.generic_weights(count))
+        self._sparse("generator", matrix, matrix.data)
+        self._point(generic=verification.generic_weights(count))
         step.active = self._theirs("int *", rod.active)
         step.conditions, step.offsets = (self._theirs("double *", x) for x in (rod.conditions, rod.offsets))
         step.zero, step.tiny = verification.ZERO * system.stiffness_scale, verification.TINY
         step.round_off, step.residual = verification.ROUND_OFF * EPS, verification.RESIDUAL
-        step.generators, step.images = (self._array(np.zeros(count * own)) for _ in range(2))
+        self._point(generators=np.zeros(count * own), images=np.zeros(count * own))
 
     def _theirs(self, kind: str, pointer: Any) -> Any:
         """Pointer into what another module of compiled code uses."""
@@ -161,15 +152,16 @@ class CompiledStep:
     def _address(self, step: Any, name: str, function: Any) -> None:
         setattr(step, name, int(self.corrector.ffi.cast("uintptr_t", function)))
 
-    def _array(self, values: np.ndarray, kind: str = "double") -> Any:
-        self._kept.append(self._ffi.from_buffer(f"{kind}[]", np.ascontiguousarray(values)))
-        return self._kept[-1]
+    def _point(self, **arrays: np.ndarray) -> None:
+        for name, array in arrays.items():
+            setattr(self._step, name, self._memory.array(name, array))
 
-    def _sparse(self, sparse: Any, pattern: sp.csr_matrix, values: np.ndarray) -> None:
+    def _sparse(self, name: str, pattern: sp.csr_matrix, values: np.ndarray) -> None:
+        sparse = getattr(self._step, name)
         sparse.rows = pattern.shape[0]
-        sparse.starts = self._array(pattern.indptr.astype(np.int32, copy=False), "int")
-        sparse.indices = self._array(pattern.indices.astype(np.int32, copy=False), "int")
-        sparse.values = self._array(values)
+        index = {part: getattr(pattern, of).astype(np.int32, copy=False) for part, of in INDEX.items()}
+        for part, array in {**index, "values": values}.items():
+            setattr(sparse, part, self._memory.array((name, part), array))
 
     def __call__(
         self, known: Sequence[Point], s: float, bounds: tuple[float, float], limits: Limits, same: float
@@ -189,17 +181,17 @@ class CompiledStep:
         """
         if not self._serves():
             return None
-        system, corrector, step, array = self.system, self.corrector, self._step, self._ffi.from_buffer
+        system, corrector, step, ffi = self.system, self.corrector, self._step, self._ffi
         last = known[-1]
         rows, value, slope = weights(known, s)
         corrector.prepare(limits)
         self._energies()
         step.norm = system.verification.norm
-        held = [array("double[]", row.array_r) for row in rows]
+        held = [buffer(ffi, row.array_r) for row in rows]
         for i, row in enumerate(held):
             self._states[i] = row
-        before = self._ffi.NULL if last.tangent is None else array("double[]", last.tangent.array_r)
-        given = (value.tolist(), slope.tolist(), array("double[]", last.x.array_r), before)
+        before = ffi.NULL if last.tangent is None else buffer(ffi, last.tangent.array_r)
+        given = (value.tolist(), slope.tolist(), buffer(ffi, last.x.array_r), before)
         with system.clock("solve"):
             status = self._lib.advance(step, len(rows), self._states, *given, *bounds, same)
         corrector.adopt(regular=status == MADE)
@@ -211,8 +203,8 @@ class CompiledStep:
         step.assemble = equations.energy.function
         for name, form in (("energy", equations.energy), ("potential", equations.potential)):
             if form is not None:
-                setattr(step, name, form.pointer)
-                setattr(step, f"{name}_constants", self._ffi.cast("double *", form.constants.ctypes.data))
+                setattr(step, name, self._memory.keep(name, form).pointer)
+                self._point(**{f"{name}_constants": form.constants})
 
     def _serves(self) -> bool:
         """Whether the code does all that a step of the system asks for now."""
@@ -225,7 +217,7 @@ class CompiledStep:
             self._line, fixed = system.line, system.generators.fixed(system.line)
             self._fixed = fixed is not None
             if fixed is not None:
-                self._step.constants = self._array(fixed)
+                self._point(constants=fixed)
         return self._fixed and system.verification.norm > 0
 
     def _made(self) -> Made | None:

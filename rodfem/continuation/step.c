@@ -9,6 +9,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#define PUBLIC static /* called from Python */
+
 #define MOST 16 /* symmetries */
 
 typedef int correct_state(const void *, void *, void *, double *, const double *);
@@ -225,8 +227,8 @@ static int check(Step *step, const double *x)
 /* A step: prediction by the `known` states with weights of its value and its slope; the last of the rows is at `last`, and
    has the tangent `before` (NULL: none).  The load stays between low and high; a correction smaller than `same` lends its
    factors.  Not MADE: all is to be done step by step.  */
-int advance(Step *step, int known, const double **states, const double *value, const double *slope, const double *last,
-            const double *before, double low, double high, double same)
+PUBLIC int advance(Step *step, int known, const double **states, const double *value, const double *slope,
+                   const double *last, const double *before, double low, double high, double same)
 {
     int n = step->n;
     memset(step->x, 0, n * sizeof(double));

@@ -116,13 +116,9 @@ class Solver:
         if scene.conservative:
             compat.require_real_petsc()
         if form_compiler.ALONE:
-            compile_ahead("chain", chain.DECLARATIONS)
-            compile_ahead("assembly", assembly.DECLARATIONS, Path(assembly.__file__).parent)
-            compile_ahead("newton", compiled_newton.declarations(), Path(compiled_newton.__file__).parent)
-            compile_ahead("shape", compiled_shape.DECLARATIONS, Path(compiled_shape.__file__).parent)
-            compile_ahead("step", compiled_step.declarations(), Path(compiled_step.__file__).parent)
+            compile_ahead("linalg/chain", "fem/assembly", "fem/newton", "fem/shape", "continuation/step")
             if not scene.conservative:
-                compile_ahead("followed", subspaces.declarations(), Path(subspaces.__file__).parent)
+                compile_ahead("stability/followed")
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

@@ -11,6 +11,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#define PUBLIC static /* called from Python */
+
 typedef void kernel(double *, const double *, const double *, const double *, const int *, const uint8_t *);
 typedef void custom_kernel(double *, const double *, const double *, const double *, const int *, const uint8_t *, void *);
 
@@ -40,7 +42,7 @@ typedef struct {
 
 /* Add the form for the values u to out.  Returns 1 where an interior facet couples more than the cell of its first side,
    which no place is for.  */
-int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out)
+PUBLIC int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out)
 {
     const uint8_t permutations[2] = {0, 0};
     int n = form->size;
@@ -88,8 +90,8 @@ int assemble(const Form *form, const Places *places, const double *u, const doub
 
 /* Offsets of columns in the rows of a compressed sparse row matrix with sorted indices: for each of `cells` cells and
    each of `kinds` rows, of which -1 is none, of `size` columns, of which -1 is none.  */
-void offsets(int cells, int kinds, int size, const int *rows, const int *columns, const int *starts, const int *indices,
-             int *out)
+PUBLIC void offsets(int cells, int kinds, int size, const int *rows, const int *columns, const int *starts,
+                    const int *indices, int *out)
 {
     for (int cell = 0; cell < cells; cell++)
         for (int kind = 0; kind < kinds; kind++, rows++)

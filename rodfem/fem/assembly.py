@@ -8,35 +8,23 @@ the same way, and matrices by dolfinx.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from rodfem import compat
-from rodfem.linalg.compiled import module
+from rodfem.linalg.compiled import Memory, buffer, module
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
-
-DECLARATIONS = """
-typedef struct { uintptr_t kernel; int custom; int kind; int count; const int *entities; } Integral;
-typedef struct {
-    int rank, size; int integrals; const Integral *integral; const double *x; const int *dofs; double *tensor, *w;
-} Form;
-typedef struct { int kinds; const int *row; const int *kind; const int *column; } Places;
-int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out);
-void offsets(int cells, int kinds, int size, const int *rows, const int *columns, const int *starts, const int *indices,
-             int *out);
-"""
 
 KERNEL_ARGUMENTS = 6
 """Number of arguments of a kernel of FFCx; since release 0.10 it takes custom data as well."""
 
 
 def _code() -> Any:
-    return module("assembly", DECLARATIONS, Path(__file__).parent)
+    return module("fem/assembly")
 
 
 class Places:
@@ -45,10 +33,11 @@ class Places:
     def __init__(self, rows: np.ndarray, kinds: np.ndarray | None = None, columns: np.ndarray | None = None) -> None:
         """Keep what :func:`vector_places` and :func:`matrix_places` found."""
         ffi = _code().ffi
-        self._kept = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, kinds, columns) if x is not None]
-        given = [ffi.from_buffer("int[]", x) for x in self._kept] + [ffi.NULL] * (3 - len(self._kept))
-        self._kept.extend(given)
-        self.pointer = ffi.new("Places *", [0 if columns is None else columns.shape[1], *given])
+        self._memory = Memory(ffi)
+        self.pointer = ffi.new("Places *", {"kinds": 0 if columns is None else columns.shape[1]})
+        for name, x in (("row", rows), ("kind", kinds), ("column", columns)):
+            if x is not None:
+                setattr(self.pointer, name, self._memory.array(name, np.ascontiguousarray(x, dtype=np.int32)))
 
 
 def vector_places(dofs: np.ndarray, targets: np.ndarray) -> Places:
@@ -75,8 +64,7 @@ def matrix_places(dofs: np.ndarray, rows: np.ndarray, columns: np.ndarray, patte
     np.put_along_axis(of_kind, kinds, row, axis=1)
     found = np.empty((*of_kind.shape, dofs.shape[1]), dtype=np.int32)
     given = (np.ascontiguousarray(x, dtype=np.int32) for x in (of_kind, columns[dofs], pattern.indptr, pattern.indices))
-    arrays = [code.ffi.from_buffer("int[]", x) for x in (*given, found)]
-    code.lib.offsets(*found.shape, *arrays)
+    code.lib.offsets(*found.shape, *(buffer(code.ffi, x) for x in (*given, found)))
     return Places(np.where(free, pattern.indptr[row], -1), kinds, found)
 
 
@@ -113,23 +101,23 @@ class Assembler:
         self.form, self._code = form, _code()
         ffi, size = self._code.ffi, cells.dofs.shape[1]
         integrals = compat.integrals(form)
-        self._kept: list[Any] = [cells.x, cells.dofs, *(x.entities for x in integrals)]
-        self._integrals = ffi.new("Integral[]", len(integrals))
-        for c, x in zip(self._integrals, integrals, strict=True):
+        memory = self._memory = Memory(ffi)
+        held = memory.keep("integrals", ffi.new("Integral[]", len(integrals)))
+        for i, (c, x) in enumerate(zip(held, integrals, strict=True)):
             c.kernel, c.custom = int(ffi.cast("uintptr_t", x.kernel)), len(ffi.typeof(x.kernel).args) > KERNEL_ARGUMENTS
-            c.kind, c.count, c.entities = x.kind, len(x.entities), self._pointer(x.entities, "int")
+            c.kind, c.count, c.entities = x.kind, len(x.entities), memory.array(i, x.entities)
         sides = 1 + any(x.kind == compat.INTERIOR for x in integrals)
-        room = (np.zeros((sides * size) ** form.rank), np.zeros(sides * size))
-        given = [self._pointer(x, kind) for x, kind in ((cells.x, "double"), (cells.dofs, "int"))]
-        spare = [self._pointer(x, "double") for x in room]
-        self._form = ffi.new("Form *", [form.rank, size, len(integrals), self._integrals, *given, *spare])
+        arrays = {
+            "x": cells.x,
+            "dofs": cells.dofs,
+            "tensor": np.zeros((sides * size) ** form.rank),
+            "w": np.zeros(sides * size),
+        }
+        pointers = {name: memory.array(name, array) for name, array in arrays.items()}
+        numbers = {"rank": form.rank, "size": size, "integrals": len(integrals), "integral": held}
+        self.pointer = ffi.new("Form *", numbers | pointers)
+        self.function = int(ffi.cast("uintptr_t", ffi.addressof(self._code.lib, "assemble")))
         self.constants = np.zeros(0)
-        self.pointer, self.function = self._form, int(ffi.cast("uintptr_t", ffi.addressof(self._code.lib, "assemble")))
-
-    def _pointer(self, array: np.ndarray, kind: str) -> Any:
-        found = self._code.ffi.from_buffer(f"{kind}[]", array)
-        self._kept.append(found)
-        return found
 
     def pack_constants(self) -> None:
         """Take the values that the constants of the form have now."""
@@ -138,11 +126,7 @@ class Assembler:
     def add(self, values: np.ndarray, places: Places | None, out: np.ndarray) -> None:
         """Add the form at the local ``values`` of the unknown to ``out``, where ``places`` say (None: a scalar)."""
         ffi = self._code.ffi
-        failed = self._code.lib.assemble(
-            self._form,
-            ffi.NULL if places is None else places.pointer,
-            ffi.from_buffer("double[]", values),
-            ffi.from_buffer("double[]", self.constants),
-            ffi.from_buffer("double[]", out),
-        )
+        target = ffi.NULL if places is None else places.pointer
+        given = (buffer(ffi, x) for x in (values, self.constants, out))
+        failed = self._code.lib.assemble(self.pointer, target, *given)
         assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."

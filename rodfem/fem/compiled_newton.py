@@ -8,34 +8,21 @@ every scene (``tests/continuation/test_compiled_newton.py``).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.linalg.chain import Chain, Elimination
-from rodfem.linalg.compiled import module
+from rodfem.linalg.compiled import Memory, buffer, module
 from rodfem.linalg.matrices import shared
 
 if TYPE_CHECKING:
     from rodfem.fem.system import System
     from rodfem.linalg.factorization import Factors
 
-FUNCTIONS = """
-int assemble_at(const Rod *rod, const double *x);
-int residual_at(const Rod *rod, const double *x, double *out);
-int factor_at(const Rod *rod, Block *b, const double *x);
-int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *row);
-"""
 CONVERGED, FAILED, SINGULAR, BROKEN = range(4)
 """How an iteration ended: it converged, or not; ``S`` was too near singular; there were no factors at all."""
-
-
-def declarations() -> str:
-    """The structures and functions of the code, for cffi."""
-    code = Path(__file__).with_name("newton.c").read_text()
-    return code[code.index("typedef struct {") : code.index("static double dot(")] + FUNCTIONS
 
 
 @dataclass(frozen=True)
@@ -89,9 +76,9 @@ class CompiledNewton:
     def __init__(self, system: System, matrix: PETSc.Mat, factors: Chain) -> None:
         """Hand all arrays over: of the ``system``, of a ``matrix`` of it with all columns, and its ``factors``."""
         self.system, self.matrix, self.factors, n = system, matrix, factors, system.fields.unknowns
-        compiled = module("newton", declarations(), Path(__file__).parent)
+        compiled = module("fem/newton")
         self.lib, self.ffi = compiled.lib, compiled.ffi
-        self._kept: list[Any] = []
+        self.memory = Memory(self.ffi)
         self._given: tuple[Any, ...] = (None, None, None)
         own, metric = shared(matrix), shared(system.metric)
         assert own is not None
@@ -104,38 +91,33 @@ class CompiledNewton:
         starts, load, every = own.pattern.indptr, system.load_index, np.arange(n)
         # scalars are the last columns of each row, and their own rows are dense
         column = {i: starts[1:] - (n - i) for i in (load, *system.drifts)}
-        rod = self.rod = self.ffi.new("Rod *")
+        self.rod, self.newton, self.block = self.ffi.new("Rod *"), self.ffi.new("Newton *"), self.ffi.NULL
+        rod = self.rod
         rod.n, rod.locals, rod.entries = n, len(system.fields.clamps), len(own.values)
-        rod.number, rod.u = self._ints(system.maps(load=True)[1]), self._doubles(system.fields.clamps.copy())
-        rod.values, rod.load, rod.load_diagonal = self._doubles(own.values), load, int(column[load][load])
-        rod.load_column = self._ints(np.where(every == load, -1, column[load]))
-        rod.load_row = self._ints(starts[load] + every)
-        rod.drifts, rod.drift, rod.active = len(drifts), self._ints(drifts), self._ints(self.active)
-        rod.conditions, rod.offsets = self._doubles(self.conditions), self._doubles(self.offsets)
-        rod.forces = self._doubles(self.forces)
-        rod.drift_row = self._ints(np.array([starts[d] + every for d in drifts]))
-        rod.drift_column = self._ints(np.array([column[d] for d in drifts]))
-        rod.starts, rod.indices = self._ints(metric.pattern.indptr), self._ints(metric.pattern.indices)
-        rod.metric, rod.border = self._doubles(metric.values), self._doubles(self.border)
-        rod.sizes = self._doubles(system.sizes.array.copy())
-        self.load_equation = np.zeros(1)
-        rod.load_equation = self._doubles(self.load_equation)
-        self.newton = self.ffi.new("Newton *")
-        self.factored, self.equations = np.zeros(n), np.zeros(n)
-        self.newton.factored, self.newton.factored_equations = map(self._doubles, (self.factored, self.equations))
-        self.newton.step, self.newton.origin, self.newton.equations = (self._doubles(np.zeros(n)) for _ in range(3))
-        self.block = self.ffi.NULL
+        rod.load, rod.load_diagonal, rod.drifts = load, int(column[load][load]), len(drifts)
+        self.load_equation, self.factored, self.equations = np.zeros(1), np.zeros(n), np.zeros(n)
+        integers = {
+            "number": system.maps(load=True)[1],
+            "load_column": np.where(every == load, -1, column[load]),
+            "load_row": starts[load] + every,
+            "drift": drifts,
+            "active": self.active,
+            "drift_row": np.array([starts[d] + every for d in drifts]),
+            "drift_column": np.array([column[d] for d in drifts]),
+            "starts": metric.pattern.indptr,
+            "indices": metric.pattern.indices,
+        }
+        self.point(rod, **{name: np.ascontiguousarray(x, dtype=np.int32) for name, x in integers.items()})
+        self.point(rod, u=system.fields.clamps.copy(), values=own.values, metric=metric.values)
+        self.point(rod, conditions=self.conditions, offsets=self.offsets, forces=self.forces, border=self.border)
+        self.point(rod, sizes=system.sizes.array.copy(), load_equation=self.load_equation)
+        self.point(self.newton, factored=self.factored, factored_equations=self.equations)
+        self.point(self.newton, **{name: np.zeros(n) for name in ("step", "origin", "equations")})
 
-    def _ints(self, array: np.ndarray) -> Any:
-        return self._pointer(np.asarray(array, dtype=np.int32), "int")
-
-    def _doubles(self, array: np.ndarray) -> Any:
-        return self._pointer(array, "double")
-
-    def _pointer(self, array: np.ndarray, kind: str) -> Any:
-        array = np.ascontiguousarray(array)
-        self._kept.append(array)
-        return self.ffi.cast(f"{kind} *", array.ctypes.data)
+    def point(self, structure: Any, **arrays: np.ndarray) -> None:
+        """Let pointers of a structure, by their names, point to ``arrays``."""
+        for name, array in arrays.items():
+            setattr(structure, name, self.memory.array((structure, name), array))
 
     def _take(self) -> None:
         """Use the parameters, the phase conditions and the factors that the system has now."""
@@ -144,7 +126,7 @@ class CompiledNewton:
         self.factors.prepare(self.matrix)
         given = (self.factors.elimination, equations.residual.constants, equations.jacobian.constants)
         if any(mine is not new for mine, new in zip(self._given, given, strict=True)):
-            self._point(rod, given[0])
+            self._use(given[0])
             self._given = given
         self.active[:], self.offsets[:] = 0, system.phase.offsets
         for i, row in system.phase.rows.items():
@@ -162,23 +144,27 @@ class CompiledNewton:
         self.factors.adopt(regular=regular)
         self.matrix.stateIncrease()
 
-    def _point(self, rod: Any, elimination: Elimination) -> None:
-        """Let the ``rod`` point to the forms with their constants, and to the factors."""
-        system, equations = self.system, self.system.equations
-        for name, form in (("residual", equations.residual), ("jacobian", equations.jacobian)):
-            setattr(rod, name, form.pointer)
-            setattr(rod, f"{name}_constants", self.ffi.cast("double *", form.constants.ctypes.data))
-        assert system.equation_places is not None
-        rod.equation_places = system.equation_places.pointer
-        rod.entry_places = system.matrix_places(self._pattern, True).pointer
-        rod.assemble, rod.factors = equations.residual.function, elimination.pointer
+    def _use(self, elimination: Elimination) -> None:
+        """Let the rod point to the forms with their constants, and to the factors."""
+        system, rod, keep = self.system, self.rod, self.memory.keep
+        residual, jacobian = system.equations.residual, system.equations.jacobian
+        self.point(rod, residual_constants=residual.constants, jacobian_constants=jacobian.constants)
+        owners = {
+            "residual": residual,
+            "jacobian": jacobian,
+            "equation_places": system.equation_places,
+            "entry_places": system.matrix_places(self._pattern, True),
+            "factors": elimination,
+        }
+        for name, owner in owners.items():
+            setattr(rod, name, keep((rod, name), owner).pointer)
+        rod.assemble = residual.function
         rod.factor, rod.solve, rod.negative, rod.zero = elimination.functions
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Fill the matrix with ``S`` at ``x`` and a one for the load, and :attr:`border`; phase conditions stay."""
         self._take()
-        state = x.array_r
-        failed = self.lib.assemble_at(self.rod, self.ffi.cast("double *", state.ctypes.data))
+        failed = self.lib.assemble_at(self.rod, buffer(self.ffi, x.array_r))
         assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."
         self.matrix.stateIncrease()
 
@@ -190,9 +176,8 @@ class CompiledNewton:
         self.prepare(limits)
         newton, along = self.newton, row.array_r
         with x as state:
-            begin, arrays = state.copy(), (state, along)
-            pointers = [self.ffi.cast("double *", array.ctypes.data) for array in arrays]
-            status = self.lib.correct(self.rod, self.block, newton, *pointers)
+            begin = state.copy()
+            status = self.lib.correct(self.rod, self.block, newton, *(buffer(self.ffi, a) for a in (state, along)))
             if status >= SINGULAR:
                 state[:] = begin
         if newton.factorisations:

@@ -6,6 +6,7 @@ import errno
 import fcntl
 import inspect
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -22,7 +23,7 @@ from mpi4py import MPI
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
-from rodfem import code_cache, compat
+from rodfem import code_cache, compat, compiler
 from rodfem.beside import Job
 from rodfem.errors import SceneError, SetupError
 
@@ -32,8 +33,8 @@ _SEARCH = jit.get_cached_module
 """How FFCx looks for a module in its cache: it lists that folder, which takes 10 ms where it has thousands of files."""
 PATIENCE = 60.0
 """Seconds after which a module that another program than rodfem has locked, and not written to, counts as abandoned."""
-TOGETHER = "Failed just-in-time compilation"
-"""How the error begins that dolfinx raises on all of several ranks."""
+TOGETHER = re.compile("Failed (just-in-time|JIT) compilation|JIT compilation failed")
+"""How the errors begin that dolfinx raises on all of several ranks, on the first and on the others."""
 PAUSE = 0.05
 """Seconds between looks at what another process compiles."""
 _CLAIMS: dict[str, int] = {}
@@ -134,9 +135,10 @@ def _awaited(module_name: str, object_names: Sequence[str], place: Path, timeout
 
 
 def _compile(*arguments: Any, **options: Any) -> Any:
-    """Compile as FFCx does, and unlock the module."""
+    """Compile as FFCx does, and unlock the module; raises :class:`SetupError` where there is no compiler."""
     given = inspect.signature(_COMPILE).bind(*arguments, **options).arguments
     try:
+        compiler.require()
         return _COMPILE(*arguments, **options)
     finally:
         _release(Path(given["cache_dir"]), given["module_name"])
@@ -176,8 +178,10 @@ def _from_cache(comm: MPI.Comm) -> Iterator[None]:
     except OSError as error:
         raise SetupError(code_cache.refused(error)) from error
     except (AttributeError, RuntimeError) as trouble:
-        together = isinstance(trouble, RuntimeError) and TOGETHER in str(trouble)
+        together = comm.size > 1 and isinstance(trouble, RuntimeError) and TOGETHER.match(str(trouble))
         why = comm.bcast(str(trouble)) if together else str(trouble)
+        if together and (missing := comm.bcast(compiler.missing())):
+            raise SetupError(missing) from trouble
         if "LiteralFloat" not in why:  # FFCx takes a product of nothing but numbers for one with arguments
             raise
         raise SceneError(

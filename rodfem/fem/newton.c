@@ -9,6 +9,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#define PUBLIC static /* called from Python */
+
 #define MOST 8 /* vectors of a block */
 
 typedef int assemble_form(const void *, const void *, const double *, const double *, double *);
@@ -95,7 +97,7 @@ static void gather(const Rod *rod, const double *x)
 }
 
 /* Equations and phase conditions at x; the row of the load is zero.  */
-int residual_at(const Rod *rod, const double *x, double *out)
+PUBLIC int residual_at(const Rod *rod, const double *x, double *out)
 {
     memset(out, 0, rod->n * sizeof(double));
     gather(rod, x);
@@ -141,7 +143,7 @@ static int jacobian_at(const Rod *rod, const double *x, const double *row)
 }
 
 /* S at x into the values of the matrix, a one for the load, and F_lam.  */
-int assemble_at(const Rod *rod, const double *x)
+PUBLIC int assemble_at(const Rod *rod, const double *x)
 {
     if (assemble_bordered(rod, x)) return 1;
     for (int i = 0; i < rod->n; i++) {
@@ -205,14 +207,14 @@ static int solve_at(const Rod *rod, Block *b, const double *r)
 }
 
 /* The same at x. */
-int factor_at(const Rod *rod, Block *b, const double *x)
+PUBLIC int factor_at(const Rod *rod, Block *b, const double *x)
 {
     return assemble_at(rod, x) ? 3 : solve_at(rod, b, NULL);
 }
 
 /* Solve the equations on the plane through x across row, in place; see rodfem.fem.newton.iterate.  With a block the
    factors are those of S, without (NULL) LU factors of the Jacobian; newton->step is the correction.  */
-int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *row)
+PUBLIC int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *row)
 {
     int n = rod->n, fresh = b || !newton->held;
     double previous = INFINITY, size = INFINITY;

@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+#define PUBLIC static /* called from Python */
+
 typedef struct {
     int cells, points, nodes, strain_nodes; /* points of the Gauss rule; nodes of the rotation, and of the strains */
     int normal;                 /* of the plane of an angle, 0 or 1; -1: quaternions */
@@ -27,7 +29,7 @@ static void turned(const double *q, const double *v, double *out)
 }
 
 /* Slopes (cells, points, 3) of the local values u. */
-void slopes(const Shape *shape, const double *u, double *out)
+PUBLIC void slopes(const Shape *shape, const double *u, double *out)
 {
     int size = shape->normal < 0 ? 4 : 1;
     for (int cell = 0; cell < shape->cells; cell++) {
@@ -51,7 +53,7 @@ void slopes(const Shape *shape, const double *u, double *out)
 }
 
 /* Least value of the last strain at the samples of all cells; place: its cell, and the sample there. */
-double least(const Shape *shape, const double *u, int *place)
+PUBLIC double least(const Shape *shape, const double *u, int *place)
 {
     double least = INFINITY;
     for (int cell = 0; cell < shape->cells; cell++) {

@@ -17,6 +17,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define PUBLIC static /* called from Python */
+
 #define THRESHOLD 0.01 /* least pivot over the largest entry of its column: multipliers are bounded by its inverse */
 #define GOOD 10.0      /* growth of a pivot that is taken without looking for a better one */
 #define CANCELLED 1e-8 /* a pair of pivots whose determinant is smaller than this, over its terms, is none */
@@ -87,7 +89,7 @@ static int at_least(double **array, size_t *room, size_t size)
     return *array != NULL;
 }
 
-void chain_free(chain *c)
+PUBLIC void chain_free(chain *c)
 {
     if (!c) return;
     free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices); free(c->places);
@@ -113,8 +115,8 @@ static int close_front(Front *f, Pile *unknowns, const int *active, int count)
    it or to one before.  A group that adds no unknown to the front before it belongs to that front.  The border of an
    `open` chain is not eliminated; rows of a symmetric matrix that belong to the border need not have their entries in
    other columns then.  NULL: out of memory.  */
-chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence, int groups,
-                 const int *begin, int symmetric, int open, int largest)
+PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence,
+                        int groups, const int *begin, int symmetric, int open, int largest)
 {
     chain *c = calloc(1, sizeof(chain));
     int *seen = calloc(n + 1, sizeof(int));
@@ -232,7 +234,7 @@ failed:
 /* Natural sizes of the unknowns, as powers of two: the scale of the next matrix starts from them.  Where a stiffness is
    many orders below the constraints beside it the largest entries of all rows are those of constraints, which tell
    nothing of it.  */
-void chain_sizes(chain *c, const double *sizes)
+PUBLIC void chain_sizes(chain *c, const double *sizes)
 {
     for (int i = 0; i < c->n; i++) c->natural[i] = ldexp(1.0, ilogb(sizes[i]));
     c->scaled = 0;
@@ -460,7 +462,7 @@ static int eliminate_general(chain *c, double *a, int m, int full, int *rows, in
 
 /* Factor the matrix of the given values; an open chain leaves the Schur complement of [delayed | border]: 0, 1 where it is exactly singular, 2 where a front is too large or memory ends,
    3 where a value is no number.  */
-int chain_factor(chain *c, const double *values)
+PUBLIC int chain_factor(chain *c, const double *values)
 {
     double most = 0, sum = 0;
     for (int i = 0; i < c->n; i++)
@@ -629,7 +631,7 @@ static double unscaled(const chain *c, const int *unknowns, int i)
 }
 
 /* Order of the largest front, delayed pivots included.  */
-int chain_largest(const chain *c)
+PUBLIC int chain_largest(const chain *c)
 {
     int most = 0;
     for (int i = 0; i < c->fronts; i++) if (c->front[i].size > most) most = c->front[i].size;
@@ -644,7 +646,7 @@ static int room_for_columns(chain *c, int k)
 
 /* Eliminate from k columns of b, one after the other (n each); what an open chain leaves of them goes to `rest`.
    2: out of memory.  */
-int chain_forward(chain *c, int k, const double *b, double *rest)
+PUBLIC int chain_forward(chain *c, int k, const double *b, double *rest)
 {
     if (!room_for_columns(c, k)) return 2;
     for (int column = 0, w; column < k; column += w) {
@@ -660,7 +662,7 @@ int chain_forward(chain *c, int k, const double *b, double *rest)
 }
 
 /* Substitute back in those columns, into x: `rest` are the solutions of what an open chain left.  */
-void chain_back(chain *c, int k, const double *rest, double *x)
+PUBLIC void chain_back(chain *c, int k, const double *rest, double *x)
 {
     for (int column = 0, w; column < k; column += w) {
         w = strip(k - column);
@@ -674,7 +676,7 @@ void chain_back(chain *c, int k, const double *rest, double *x)
 }
 
 /* Solutions x of a closed chain for k columns of b.  2: out of memory.  */
-int chain_solve(chain *c, int k, const double *b, double *x)
+PUBLIC int chain_solve(chain *c, int k, const double *b, double *x)
 {
     if (chain_forward(c, k, b, NULL)) return 2;
     chain_back(c, k, NULL, x);
@@ -683,7 +685,7 @@ int chain_solve(chain *c, int k, const double *b, double *x)
 
 /* Solutions x of a closed chain without symmetry, transposed, for k columns of b.  Columns that are missing in the last
    strip, of four or of WIDTH, are zero.  2: out of memory.  */
-int chain_solve_transposed(chain *c, int k, const double *b, double *x)
+PUBLIC int chain_solve_transposed(chain *c, int k, const double *b, double *x)
 {
     if (!room_for_columns(c, WIDTH)) return 2;
     double *y = c->forward, *solved = c->back, *z = c->back + (size_t)c->n * WIDTH;
@@ -703,20 +705,20 @@ int chain_solve_transposed(chain *c, int k, const double *b, double *x)
 }
 
 /* The Schur complement that an open chain leaves, dense, column after column; of a symmetric one the lower triangle.  */
-void chain_schur(const chain *c, double *out)
+PUBLIC void chain_schur(const chain *c, double *out)
 {
     for (int j = 0; j < c->rest; j++) for (int i = 0; i < c->rest; i++)
         out[(size_t)j * c->rest + i] = c->schur[(size_t)j * c->rest + i] * unscaled(c, c->left, i) * unscaled(c, c->right, j);
 }
 
-void chain_forget(chain *c) { c->scaled = 0; } /* the scale of the matrix before */
-int chain_rest(const chain *c) { return c->rest; }
-int chain_negative(const chain *c) { return c->negative; }
-int chain_zero(const chain *c) { return c->zero; }
-int chain_fronts(const chain *c) { return c->fronts; }
-double chain_determinant(const chain *c) { return c->determinant; }
-double chain_growth(const chain *c) { return c->growth; }
-int chain_delayed(const chain *c)
+PUBLIC void chain_forget(chain *c) { c->scaled = 0; } /* the scale of the matrix before */
+PUBLIC int chain_rest(const chain *c) { return c->rest; }
+PUBLIC int chain_negative(const chain *c) { return c->negative; }
+PUBLIC int chain_zero(const chain *c) { return c->zero; }
+PUBLIC int chain_fronts(const chain *c) { return c->fronts; }
+PUBLIC double chain_determinant(const chain *c) { return c->determinant; }
+PUBLIC double chain_growth(const chain *c) { return c->growth; }
+PUBLIC int chain_delayed(const chain *c)
 {
     int sum = 0;
     for (int i = 0; i < c->fronts; i++) sum += c->front[i].size - c->front[i].m;

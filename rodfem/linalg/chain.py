@@ -17,32 +17,10 @@ from petsc4py import PETSc
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.compiled import module
+from rodfem.linalg.compiled import buffer, module
 from rodfem.linalg.factorization import AlongRod, GaveUpError, Mumps, Sizes
 from rodfem.linalg.matrices import Entries
 
-DECLARATIONS = """
-typedef struct chain chain;
-chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence, int groups,
-                 const int *begin, int symmetric, int open, int largest);
-void chain_free(chain *c);
-void chain_sizes(chain *c, const double *sizes);
-int chain_factor(chain *c, const double *values);
-int chain_forward(chain *c, int k, const double *b, double *rest);
-void chain_back(chain *c, int k, const double *rest, double *x);
-int chain_solve(chain *c, int k, const double *b, double *x);
-int chain_solve_transposed(chain *c, int k, const double *b, double *x);
-void chain_schur(const chain *c, double *out);
-void chain_forget(chain *c);
-int chain_rest(const chain *c);
-int chain_negative(const chain *c);
-int chain_zero(const chain *c);
-int chain_fronts(const chain *c);
-int chain_largest(const chain *c);
-double chain_determinant(const chain *c);
-double chain_growth(const chain *c);
-int chain_delayed(const chain *c);
-"""
 LARGEST = 2000
 """Delayed pivots that a front may have: with more of them the matrix is no chain."""
 SINGULAR, TOO_LARGE = 1, 2
@@ -111,16 +89,16 @@ class Elimination:
         group, is not eliminated; a symmetric one may lack the entries of its border's rows that are in other columns.
         Raises :class:`MemoryError` where there is no room.
         """
-        compiled = module("chain", DECLARATIONS)
+        compiled = module("linalg/chain")
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self.rows, self.regular = len(starts) - 1, False
         places = np.arange(len(indices), dtype=np.int32) if places is None else places
         pattern = [np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, places, *order)]
         made = self.lib.chain_new(
             self.rows,
-            *(self._pointer(x, "int") for x in pattern[:4]),
+            *(buffer(self.ffi, x) for x in pattern[:4]),
             len(order[1]) - 1,
-            self._pointer(pattern[4], "int"),
+            buffer(self.ffi, pattern[4]),
             kind == "cholesky",
             is_open,
             LARGEST,
@@ -129,12 +107,9 @@ class Elimination:
             raise MemoryError(f"No memory for the factors of {self.rows} unknowns.")
         self._chain = self.ffi.gc(made, self.lib.chain_free)
 
-    def _pointer(self, array: np.ndarray, kind: str = "double") -> Any:
-        return self.ffi.cast(f"{kind} *", array.ctypes.data)
-
     @property
     def pointer(self) -> Any:
-        """The chain, for other compiled code."""
+        """The chain, for other compiled code; whoever keeps it in a structure keeps this object, too."""
         return self._chain
 
     @property
@@ -152,7 +127,7 @@ class Elimination:
         Raises :class:`ConvergenceError` where it holds what is no number.
         """
         values = np.ascontiguousarray(values.real)
-        status = self.lib.chain_factor(self._chain, self._pointer(values))
+        status = self.lib.chain_factor(self._chain, buffer(self.ffi, values))
         self.regular = status == 0
         if status == TOO_LARGE:
             raise GaveUpError("The matrix could not be factored along the rod: its fronts are too large.")
@@ -164,7 +139,7 @@ class Elimination:
     def measure(self, sizes: np.ndarray) -> None:
         """Let the scale of the next matrix start from the natural ``sizes`` (n,) of the unknowns."""
         sizes = np.ascontiguousarray(sizes, dtype=float)
-        self.lib.chain_sizes(self._chain, self._pointer(sizes))
+        self.lib.chain_sizes(self._chain, buffer(self.ffi, sizes))
 
     def forward(self, right: np.ndarray) -> np.ndarray:
         """Eliminate from ``right`` (n, k); the right-hand sides (rest, k) of what an open chain leaves.
@@ -173,7 +148,7 @@ class Elimination:
         """
         right = np.asarray(right, dtype=float, order="F")
         rest = np.empty((self.rest, right.shape[1]), order="F")
-        if self.lib.chain_forward(self._chain, right.shape[1], self._pointer(right), self._pointer(rest)):
+        if self.lib.chain_forward(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, rest)):
             raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
         return rest
 
@@ -181,7 +156,7 @@ class Elimination:
         """Solutions (n, k) for the last right-hand sides, given those (rest, k) of what an open chain leaves."""
         rest = np.asarray(rest, dtype=float, order="F")
         out = np.empty((self.rows, rest.shape[1]), order="F")
-        self.lib.chain_back(self._chain, rest.shape[1], self._pointer(rest), self._pointer(out))
+        self.lib.chain_back(self._chain, rest.shape[1], buffer(self.ffi, rest), buffer(self.ffi, out))
         return out
 
     def solve(self, right: np.ndarray) -> np.ndarray:
@@ -195,14 +170,14 @@ class Elimination:
         """
         right = np.asarray(right, dtype=float, order="F")
         out = np.empty_like(right)
-        if self.lib.chain_solve_transposed(self._chain, right.shape[1], self._pointer(right), self._pointer(out)):
+        if self.lib.chain_solve_transposed(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
             raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
         return out
 
     def schur(self) -> np.ndarray:
         """Schur complement (rest, rest) that an open chain leaves, delayed pivots first; else (0, 0)."""
         out = np.empty((self.rest, self.rest), order="F")
-        self.lib.chain_schur(self._chain, self._pointer(out))
+        self.lib.chain_schur(self._chain, buffer(self.ffi, out))
         return out
 
     def forget(self) -> None:

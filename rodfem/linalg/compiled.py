@@ -1,45 +1,102 @@
-"""C code of the package, compiled once with cffi, by the compiler and beside the kernels of FFCx."""
+"""C code of the package: built with the wheel, or compiled once with cffi beside the kernels of FFCx; and its memory.
+
+A file of C has structures, and functions marked ``PUBLIC``, which Python calls.  They are ``static``, as all others: cffi
+compiles them in one unit with what calls them, so that no module exports a name but the one by which Python loads it.  A
+name that is exported can be taken over: the dynamic linker binds the module's own calls of it to the first library that
+has the name, as it did with a function ``advance``, which the C library has, too.
+
+The code is compiled for any processor of the machine's kind: with the instructions of this one alone whole diagrams take
+98 to 102 % of the time.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import importlib.util
+import platform
+import re
 import sys
 import tempfile
+from collections.abc import Hashable
 from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rodfem import code_cache
+from rodfem import code_cache, compiler
 from rodfem.beside import Job
 from rodfem.errors import SetupError
 
-FLAGS = ["-O3", "-march=native"]
+if TYPE_CHECKING:
+    import numpy as np
+
+FLAGS = ["-O3", "-fvisibility=hidden"]
 """Of the compiler: fast loops, and no -ffast-math, which would hide what is no number."""
-_HERE = Path(__file__).parent
+LINKED = ["-Wl,-Bsymbolic"] if sys.platform == "linux" else []
+"""Of the linker: a module's names are its own."""
+PACKAGE = Path(__file__).parents[1]
+STRUCTURE = re.compile(r"^typedef struct[^{;]*(?:\{.*?^\})?[^;]*;", re.MULTILINE | re.DOTALL)
+FUNCTION = re.compile(r"^PUBLIC (.*?)\s*\{", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"^#define \w+ \d+(?=\s)", re.MULTILINE)
 _JOBS: dict[str, Job] = {}
 """What is compiled beside this process, by name."""
 
 
-def compile_ahead(name: str, declarations: str, beside: Path = _HERE) -> None:
-    """Begin to compile in another process what :func:`module` finds then in the cache, unless that has it."""
-    full, code = _named(name, declarations, beside)
-    if full not in _JOBS and _found(full) is None:
-        _JOBS[full] = Job(lambda: _compile(full, code, declarations))
+class Memory:
+    """What the pointers in a structure of C point to: the only addresses that C keeps from one call to the next.
+
+    C counts no references.  Each array is kept here under the name of the pointer, until another takes its place or the
+    object that has the structure goes, which has this as well.  An array that is handed over for one call alone needs
+    no more than :func:`buffer`.
+    """
+
+    def __init__(self, ffi: Any) -> None:
+        """Keep nothing yet; ``ffi`` is that of the module."""
+        self._ffi = ffi
+        self._kept: dict[Hashable, Any] = {}
+
+    def array(self, name: Hashable, values: np.ndarray) -> Any:
+        """Pointer to ``values``, as for :func:`buffer`, which are kept under ``name``."""
+        return self.keep(name, buffer(self._ffi, values))
+
+    def keep(self, name: Hashable, owner: Any) -> Any:
+        """Keep the ``owner`` of what a pointer points to under ``name``, and return it."""
+        self._kept[name] = owner
+        return owner
+
+
+def buffer(ffi: Any, values: np.ndarray) -> Any:
+    """Pointer to ``values``, numbers of float64 or int32, which live as long as it does.
+
+    They are contiguous, by rows or by columns.  Raises :class:`ValueError` for others, of which C would read something
+    else.
+    """
+    kind = {"d": "double[]", "i": "int[]"}.get(values.dtype.char)
+    if kind is None:
+        raise ValueError(f"C has no numbers of type {values.dtype}: hand over float64 or int32.")
+    return ffi.from_buffer(kind, values if values.flags.c_contiguous else values.T)
+
+
+def compile_ahead(*names: str) -> None:
+    """Begin to compile in other processes what :func:`module` finds then in the cache, unless that has it."""
+    for name in names:
+        full = _full_name(name)
+        if full not in _JOBS and _found(name) is None:
+            compiler.require()
+            _JOBS[full] = Job(lambda name=name: _compile(name))
 
 
 @cache
-def module(name: str, declarations: str, beside: Path = _HERE) -> Any:
-    """The compiled module of ``name.c`` in the folder ``beside``, with ``lib`` and ``ffi`` of cffi.
+def module(name: str) -> Any:
+    """The compiled module of the file ``name.c`` in the package, with ``lib`` and ``ffi`` of cffi.
 
-    ``declarations`` are its functions in C.  Raises what the compiler raises, and :class:`SetupError` where the cache
-    lacks the module and cannot be written.
+    Raises what the compiler raises, and :class:`SetupError` where there is no compiler, or where the cache lacks the
+    module and cannot be written.
     """
-    full, code = _named(name, declarations, beside)
+    full = _full_name(name)
     if full in _JOBS:
         _JOBS.pop(full).wait()
-    found = _found(full) or _compile(full, code, declarations)
+    found = _found(name) or _compile(name)
     spec = importlib.util.spec_from_file_location(full, found)
     assert spec is not None and spec.loader is not None
     out = importlib.util.module_from_spec(spec)
@@ -47,28 +104,45 @@ def module(name: str, declarations: str, beside: Path = _HERE) -> Any:
     return out
 
 
-def _named(name: str, declarations: str, beside: Path) -> tuple[str, str]:
-    """Name in the cache, which tells all that the compiled code depends on, and the code of ``name.c``."""
-    code = (beside / f"{name}.c").read_text()
-    depends = [code, declarations, *FLAGS, sys.version, code_cache.processor()]
+def interface(code: str) -> str:
+    """What Python knows of a file of C: its constants, its structures, and the functions that are marked PUBLIC."""
+    functions = (f"{function};" for function in FUNCTION.findall(code))
+    return "\n".join([*NUMBER.findall(code), *STRUCTURE.findall(code), *functions])
+
+
+def builder(name: str, package: str = "") -> Any:
+    """cffi's builder of the module of ``name.c``, in a ``package``."""
+    from cffi import FFI
+
+    code, ffi = _code(name), FFI()
+    ffi.cdef(interface(code))
+    arguments = {"extra_compile_args": FLAGS, "extra_link_args": LINKED, "libraries": ["m"]}
+    ffi.set_source(f"{package}{_full_name(name)}", code, **arguments)
+    return ffi
+
+
+def _code(name: str) -> str:
+    return (PACKAGE / f"{name}.c").read_text()
+
+
+def _full_name(name: str) -> str:
+    """Name of the module, which tells all that its compiled code depends on."""
+    depends = [_code(name), *FLAGS, *LINKED, sys.version, platform.machine()]
     key = hashlib.sha1("\n".join(depends).encode()).hexdigest()[:16]
-    return f"rodfem_{name}_{key}", code
+    return f"rodfem_{Path(name).name}_{key}"
 
 
-def _found(full: str) -> Path | None:
-    """Compiled module in the cache, by its name: to list that folder takes long where it has thousands of files."""
-    place = code_cache.folder()
-    files = (place / f"{full}{suffix}" for suffix in EXTENSION_SUFFIXES)
+def _found(name: str) -> Path | None:
+    """Compiled module beside its code, from the wheel, or in the cache: to list that takes long, it has many files."""
+    full = _full_name(name)
+    places = ((PACKAGE / name).parent, code_cache.folder())
+    files = (place / f"{full}{suffix}" for place in places for suffix in EXTENSION_SUFFIXES)
     return next((file for file in files if code_cache.is_whole(file)), None)
 
 
-def _compile(full: str, code: str, declarations: str) -> Path:
+def _compile(name: str) -> Path:
     """Compile in a folder of its own; what is moved to the cache is whole, whoever else compiles it meanwhile."""
-    from cffi import FFI
-
-    builder = FFI()
-    builder.cdef(declarations)
-    builder.set_source(full, code, extra_compile_args=FLAGS, libraries=["m"])
+    compiler.require()
     folder = code_cache.folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -76,5 +150,5 @@ def _compile(full: str, code: str, declarations: str) -> Path:
     except OSError as error:
         raise SetupError(code_cache.refused(error)) from error
     with room as inside:
-        made = Path(builder.compile(tmpdir=inside))
+        made = Path(builder(name).compile(tmpdir=inside))
         return made.replace(folder / made.name)

@@ -9,6 +9,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#define PUBLIC static /* called from Python */
+
 #define LANES 8 /* `width` is a multiple of this */
 typedef double lanes __attribute__((vector_size(8 * LANES), aligned(8)));
 
@@ -165,7 +167,7 @@ static void go_on(Spaces *f, int side, const double *t)
 }
 
 /* A step of inverse iteration on one side.  1: a projection is singular; 2: out of memory.  */
-int improve(Spaces *f, int side)
+PUBLIC int improve(Spaces *f, int side)
 {
     int n = f->n, count = f->p + (side == RIGHT ? f->probes : 0);
     size_t square = (size_t)f->width * f->width;
@@ -224,7 +226,7 @@ static void fit(int known, int degree, const double *distances, double *weights)
 
 /* Basis of a side at distance zero by the polynomial of a degree that is fitted to `known` ones (n x p each); what it
    misses of the next power of the distance.  */
-double predict(Spaces *f, int side, int known, int degree, const double *distances, const double *past)
+PUBLIC double predict(Spaces *f, int side, int known, int degree, const double *distances, const double *past)
 {
     size_t size = (size_t)f->n * f->p;
     double weights[SUPPORT], missed = 0;
@@ -241,7 +243,7 @@ double predict(Spaces *f, int side, int known, int degree, const double *distanc
 
 /* Combinations of the right basis with `count` columns of coefficients (p x width, at most as many), and M times them, in
    `block` and in `mapped`; after a step.  */
-void combine(Spaces *f, int count, const double *w)
+PUBLIC void combine(Spaces *f, int count, const double *w)
 {
     turned(f, NULL, f->n, f->basis[RIGHT], w, count, f->block);
     times_mass(f, f->block, f->mapped);

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import scipy.sparse as sp
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.chain import Elimination
-from rodfem.linalg.compiled import module
+from rodfem.linalg.compiled import Memory, buffer, module
 
 RIGHT, LEFT = 0, 1
 """The sides."""
@@ -21,17 +20,6 @@ FRESH = 0.1
 LANES = 8
 """The width of a row of vectors is a multiple of this."""
 SINGULAR, NO_ROOM = 1, 2
-FUNCTIONS = """
-int improve(Spaces *f, int side);
-double predict(Spaces *f, int side, int known, int degree, const double *distances, const double *past);
-void combine(Spaces *f, int count, const double *w);
-"""
-
-
-def declarations() -> str:
-    """The structure and the function of the code, for cffi."""
-    code = Path(__file__).with_name("followed.c").read_text()
-    return code[code.index("typedef struct {") : code.index("#define AT(")] + FUNCTIONS
 
 
 class Subspaces:
@@ -49,18 +37,16 @@ class Subspaces:
 
     def __init__(self, mass: sp.csr_matrix, p: int) -> None:
         """Allocate all arrays; the probes are random, and as large as vectors of the bases in the ``mass``."""
-        compiled = module("followed", declarations(), Path(__file__).parent)
-        self.lib, self.ffi = compiled.lib, compiled.ffi
+        compiled = module("stability/followed")
+        self.lib, self.ffi, self._memory = compiled.lib, compiled.ffi, Memory(compiled.ffi)
         n, width = mass.shape[0], -(-(p + PROBES) // LANES) * LANES
-        self._kept: list[Any] = []
         self._factors: Elimination | None = None
         f = self._spaces = self.ffi.new("Spaces *")
         f.n, f.p, f.probes, f.width, f.share = n, p, PROBES, width, FRESH
-        sides = [self._doubles(f.basis, side, n, width) for side in (RIGHT, LEFT)]
+        sides = self._both("basis", n, width)
         self.bases = [block[:, :p] for block in sides]
-        self.changes = [self._doubles(f.change, side, width, width)[:p, :p] for side in (RIGHT, LEFT)]
-        for side in (RIGHT, LEFT):
-            self._doubles(f.image, side, n, width)
+        self.changes = [block[:p, :p] for block in self._both("change", width, width)]
+        self._both("image", n, width)
         random = np.random.default_rng(1).normal(size=(n, PROBES))
         random /= np.sqrt((random * (mass @ random)).sum(axis=0))
         sides[RIGHT][:, p : p + PROBES] = self._named("fresh", n, PROBES)[:] = random
@@ -70,31 +56,28 @@ class Subspaces:
         for name in ("columns", "solved"):
             self._named(name, n, width)
         self._named("small", 3, width, width)
-        f.heavy = self._pointer(np.zeros(n, dtype=np.int32), "int")
+        f.heavy = self._memory.array("heavy", np.zeros(n, dtype=np.int32))
 
-    def _pointer(self, array: np.ndarray, kind: str = "double") -> Any:
-        self._kept.append(array)
-        return self.ffi.cast(f"{kind} *", array.ctypes.data)
-
-    def _doubles(self, pointers: Any, place: int, *shape: int) -> np.ndarray:
-        array = np.zeros(shape)
-        pointers[place] = self._pointer(array)
-        return array
+    def _both(self, name: str, *shape: int) -> list[np.ndarray]:
+        """Arrays of both sides."""
+        arrays = [np.zeros(shape), np.zeros(shape)]
+        for side, array in enumerate(arrays):
+            getattr(self._spaces, name)[side] = self._memory.array((name, side), array)
+        return arrays
 
     def _named(self, name: str, *shape: int) -> np.ndarray:
         array = np.zeros(shape)
-        setattr(self._spaces, name, self._pointer(array))
+        setattr(self._spaces, name, self._memory.array(name, array))
         return array
 
     def take(self, mass: sp.csr_matrix, factors: Elimination) -> None:
         """Use these factors of ``S - a M`` and this mass from now on."""
         f = self._spaces
-        self._mass = mass
-        f.starts, f.indices = (self.ffi.cast("int *", x.ctypes.data) for x in (mass.indptr, mass.indices))
-        f.mass = self.ffi.cast("double *", mass.data.ctypes.data)
+        for name, array in (("starts", mass.indptr), ("indices", mass.indices), ("mass", mass.data)):
+            setattr(f, name, self._memory.array(name, array))
         if factors is not self._factors:
             f.solve[RIGHT], f.solve[LEFT] = factors.address("solve"), factors.address("solve_transposed")
-            f.factors, self._factors = factors.pointer, factors
+            f.factors, self._factors = factors.pointer, self._memory.keep("factors", factors)
 
     def predict(self, side: int, degree: int, distances: np.ndarray, past: np.ndarray) -> float:
         """Let the basis of a ``side`` be what a polynomial fitted to some others has at distance zero.
@@ -102,7 +85,7 @@ class Subspaces:
         They are the first ones of the ``past`` (any, n, p), at ``distances`` (k,), at most eight, and the polynomial is
         of that ``degree`` at most.  Returns what it misses of the next power of the distance.
         """
-        given = (self.ffi.cast("double *", x.ctypes.data) for x in (distances, past))
+        given = (buffer(self.ffi, x) for x in (distances, past))
         return float(self.lib.predict(self._spaces, side, len(distances), degree, *given))
 
     def combined(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -115,7 +98,7 @@ class Subspaces:
             return real[0] + 1j * imaginary[0], real[1] + 1j * imaginary[1]
         count = w.shape[1]
         self._coefficients[:, :count] = w
-        self.lib.combine(self._spaces, count, self.ffi.cast("double *", self._coefficients.ctypes.data))
+        self.lib.combine(self._spaces, count, buffer(self.ffi, self._coefficients))
         vectors, images = (block[:, :count].copy() for block in self._combined)
         return vectors, images
 

@@ -160,9 +160,9 @@ def test_own_code_that_is_cut_short_is_compiled_again(
     part: float, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    (tmp_path / "seven.c").write_text("int seven(void) { return 7; }\n")
+    (tmp_path / "seven.c").write_text("#define PUBLIC static\nPUBLIC int seven(void) { return 7; }\n")
     monkeypatch.setattr(compiled, "FLAGS", ["-O0"])
-    module, given = compiled.module.__wrapped__, ("seven", "int seven(void);", tmp_path)
+    module, given = compiled.module.__wrapped__, (str(tmp_path / "seven"),)
     assert module(*given).lib.seven() == 7
     (made,) = (tmp_path / "cache" / "fenics").glob("rodfem_seven*")
     assert code_cache.is_whole(made)

@@ -1,0 +1,72 @@
+"""Compiled modules export no name, and what they keep pointers to lives as long."""
+
+from __future__ import annotations
+
+import gc
+import shutil
+import subprocess
+import weakref
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ffcx.codegeneration import jit
+from hard.test_environments import form
+
+from rodfem import compat
+from rodfem.linalg import compiled
+
+pytestmark = [pytest.mark.alone, pytest.mark.versions]
+NAMES = [str(file.relative_to(compiled.PACKAGE).with_suffix("")) for file in compiled.PACKAGE.rglob("*.c")]
+
+
+def exported(file: str | Path) -> list[str]:
+    """Names that the dynamic linker finds in a module, but for those of the linker itself."""
+    if shutil.which("nm") is None:
+        pytest.skip("needs nm")
+    said = subprocess.run(["nm", "-D", "--defined-only", str(file)], capture_output=True, text=True, check=True).stdout
+    names = {line.split()[-1] for line in said.splitlines()}
+    return sorted(names - {"_init", "_fini", "__bss_start", "_edata", "_end"})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_module_exports_its_init_function_alone(name: str) -> None:
+    """Of two functions with one name in a process the dynamic linker would take the first, whoever calls."""
+    module = compiled.module(name)
+    assert exported(module.__file__) == [f"PyInit_{module.__name__}"]
+
+
+def test_so_do_those_of_forms(tmp_path: Path) -> None:
+    jit.compile_forms([form()], cache_dir=tmp_path, **next(iter(compat.C_COMPILER.values())))
+    (made,) = (file for file in tmp_path.iterdir() if file.suffix == ".so")
+    assert exported(made) == [f"PyInit_{made.name.partition('.')[0]}"]
+
+
+def test_memory_keeps_what_a_pointer_points_to() -> None:
+    class Array(np.ndarray):
+        """One that a weak reference can watch."""
+
+    ffi = compiled.module("linalg/chain").ffi
+    memory, first = compiled.Memory(ffi), np.arange(3.0).view(Array)
+    pointer, watched = memory.array("x", first), weakref.ref(first)
+    del first
+    gc.collect()
+    assert watched() is not None and list(pointer[0:3]) == [0.0, 1.0, 2.0]
+    del pointer
+    memory.array("x", np.zeros(2, dtype=np.int32))
+    gc.collect()
+    assert watched() is None
+
+
+@pytest.mark.parametrize("values", [np.zeros(3, dtype=np.float32), np.arange(3, dtype=np.int64), np.zeros((4, 4))[::2]])
+def test_arrays_that_c_would_read_wrongly_are_refused(values: np.ndarray) -> None:
+    with pytest.raises(ValueError):
+        compiled.buffer(compiled.module("linalg/chain").ffi, values)
+
+
+def test_interface_of_a_file() -> None:
+    code = "#define MOST 3\n#define PUBLIC static\ntypedef struct {\n    int a[MOST];\n} Some;\n\nstatic int no(void) { return 1; }\n"
+    code += "PUBLIC int yes(const Some *s,\n               int k)\n{\n    return s->a[k];\n}\n"
+    assert compiled.interface(code).split("\n")[0] == "#define MOST 3"
+    assert "no(" not in compiled.interface(code)
+    assert " ".join(compiled.interface(code).split()).endswith("} Some; int yes(const Some *s, int k);")
