@@ -29,8 +29,8 @@ from math import ceil, isfinite, pi
 
 import rodfem
 import rodfem.app.script as script
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Parameter, Scene, clamped, sliding
+from rodfem.forms.energy import bending_and_twist
 
 MOST = 1e6  # turns beyond which mesh and tension stay as they are: no mesh holds them
 

@@ -29,8 +29,8 @@ from math import hypot, inf
 
 import rodfem
 import rodfem.app.script as script
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, InputError, Ordinate, Parameter, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 
 def pushed_rod(

@@ -30,8 +30,8 @@ from math import hypot, inf
 
 import rodfem
 import rodfem.app.script as script
-from forms.energy import hemitropic
 from rodfem import Ordinate, Parameter, Scene, clamped
+from rodfem.forms.energy import hemitropic
 
 
 def hemitropic_rod(

@@ -25,9 +25,9 @@ from mpi4py import MPI
 
 import rodfem
 import rodfem.app.cli as cli
-from forms.energy import hemitropic
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped
 from rodfem.app.terminal import Report
+from rodfem.forms.energy import hemitropic
 from rodfem.whole_files import draft_of
 
 

@@ -32,8 +32,8 @@ import numpy as np
 
 import rodfem
 import rodfem.app.script as script
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Parameter, Ring, Scene
+from rodfem.forms.energy import bending_and_twist
 
 TWIST = r"twist $\int k_3\,ds/2\pi$"
 

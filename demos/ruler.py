@@ -29,8 +29,8 @@
 # %%
 import rodfem
 import rodfem.app.script as script
-from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem import InputError, Ordinate, Parameter, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist, logarithmic_stretch
 
 DIRECTIONS = {"e1": (1.0, 0.0), "e2": (0.0, 1.0)}
 

@@ -18,7 +18,7 @@ HOME = PAGES.parent
 LINK = re.compile(
     r"(?P<image>!?)\[(?P<text>[^\]\n]*(?:\n[^\]\n]+)?)\]\((?P<file>(?!https?:|#)[^)\s#]+)(?P<anchor>#[^)\s]*)?\)"
 )
-NAME = re.compile(r"`(?:forms|rodfem)(?:\.\w+)+`")
+NAME = re.compile(r"`rodfem(?:\.\w+)+`")
 LESSONS = re.compile(r"```{toctree}\n:hidden:\n:caption: Learn\n.*?\n```\n", re.DOTALL)
 
 project, author = "rodfem", "rodfem authors"

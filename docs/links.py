@@ -1,8 +1,8 @@
 """Links of the pages into the code: the name in the text of a link is defined in the file that it leads to.
 
-A link is written ``[`forms.rotation.product`](../forms/rotation.py#L30)``: its text is a module, or a function, method,
-class or constant of it.  With a line it is that of the definition.  ``python docs/links.py`` writes the lines of today
-into all pages; a test compares.
+A link is written ``[`rodfem.forms.rotation.product`](../forms/rotation.py#L30)``: its text is a module, or a function,
+method, class or constant of it.  With a line it is that of the definition.  ``python docs/links.py`` writes the lines
+of today into all pages; a test compares.
 """
 
 from __future__ import annotations
@@ -23,8 +23,12 @@ def pages() -> list[Path]:
 
 @cache
 def lines(path: Path) -> dict[str, int]:
-    """Line of each function, class, constant and method of a module, and of the module itself, by its full name."""
-    module = ".".join(path.relative_to(HOME).with_suffix("").parts)
+    """Line of each function, class, constant and method of a module, and of the module itself, by its full name.
+
+    The folder ``forms`` is the package ``rodfem.forms``.
+    """
+    inside = Path("rodfem", path.relative_to(HOME)) if path.is_relative_to(HOME / "forms") else path.relative_to(HOME)
+    module = ".".join(inside.with_suffix("").parts)
     found = {module: 1}
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, ast.Assign | ast.AnnAssign):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ufl
 from ufl.core.expr import Expr
 
-from forms.rotation import conjugate, product, vector_part
+from rodfem.forms.rotation import conjugate, product, vector_part
 
 
 def spin(q: Expr, dq: Expr) -> Expr:

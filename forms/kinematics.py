@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import ufl
 from ufl.core.expr import Expr
 
-from forms.rotation import conjugate, product, vector_part
+from rodfem.forms.rotation import conjugate, product, vector_part
 
 UNDEFORMED = (0.0, 0.0, 1.0)
 

@@ -9,7 +9,7 @@ stationarity in ``v`` is the constitutive law ``n_i = dW/dv_i`` (body components
 ``n' = 0``, in ``q`` the balance of moments, in ``n`` the kinematics ``r' = R v``.  Only the strains that a rod leaves
 free are unknowns: all of a flexible rod, the stretch of an unshearable one, none of one that is inextensible too.  Its
 first variation is the weak form (11)-(12) of Kumar & Healey (2010), which they linearise for each of the three in (17),
-(18) and (19); see :mod:`forms.paper`.
+(18) and (19); see :mod:`rodfem.forms.paper`.
 
 Where no force acts along the rod, ``n`` is constant and ``r`` drops out: with ``chord = r(l) - r(0)`` ::
 

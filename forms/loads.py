@@ -16,7 +16,7 @@ from typing import Any
 import ufl
 from ufl.core.expr import Expr
 
-from forms.rotation import IDENTITY, conjugate, product, vector_part
+from rodfem.forms.rotation import IDENTITY, conjugate, product, vector_part
 
 
 def dead(r: Expr, force: Sequence[Any]) -> Expr:

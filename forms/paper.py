@@ -1,7 +1,7 @@
 r"""The second variation and the linearised balance by hand, to be read, and to check automatic derivatives against.
 
-The Lagrangian of :mod:`forms.lagrangian` is a function of rotations.  A perturbation is a *spin* ``theta`` in the space
-frame, together with changes ``dr``, ``dv`` (body components), ``dn``::
+The Lagrangian of :mod:`rodfem.forms.lagrangian` is a function of rotations.  A perturbation is a *spin* ``theta`` in
+the space frame, together with changes ``dr``, ``dv`` (body components), ``dn``::
 
     R_eps = exp(eps [theta x]) R,    q_eps = exp(eps theta / 2) q,    so that   dq = 1/2 theta q
 
@@ -63,7 +63,7 @@ from dataclasses import dataclass
 import ufl
 from ufl.core.expr import Expr
 
-from forms.rotation import product
+from rodfem.forms.rotation import product
 
 
 @dataclass(frozen=True)

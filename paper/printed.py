@@ -11,8 +11,8 @@ from math import hypot, log2, pi
 from pathlib import Path
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, free
+from rodfem.forms.energy import bending_and_twist
 
 DEMOS = Path(__file__).parents[1] / "demos"
 MESHES = (4, 8, 16)

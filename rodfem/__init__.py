@@ -4,7 +4,7 @@ A person states a :class:`Scene` and calls :func:`run`, which traces the equilib
 finds and classifies the points where it is lost, follows what branches off, and writes files and pictures::
 
     from math import hypot
-    from forms.energy import bending_and_twist
+    from rodfem.forms.energy import bending_and_twist
     from rodfem import Ordinate, Parameter, Scene, clamped, free, run, trace
 
     column = Scene(
@@ -22,14 +22,14 @@ finds and classifies the points where it is lost, follows what branches off, and
     diagram = trace(column)       # without
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
-  expression of the strains, the constants and the arclength ``c.s`` (:mod:`forms.energy` has a few).
+  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy` has a few).
 * **Stiffnesses**: :mod:`section <rodfem.problem.section>` has those of circles, tubes, rectangles, strips, ellipses,
   from E, nu and dimensions, in any units.
 * **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`, :func:`free`,
   :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.  Positions and rotations may be functions
   of the constants.
 * **Loads**: forces and moments of an :class:`End`; ``distributed``, ``follower`` and ``potential`` of a :class:`Scene`;
-  an :class:`Attachment` at any point (:mod:`forms.loads` has potentials).  Loads without a potential make
+  an :class:`Attachment` at any point (:mod:`rodfem.forms.loads` has potentials).  Loads without a potential make
   ``Scene.conservative`` False: then frequencies are computed, and flutter.
 * **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
 * **Ordinate**: the number that a diagram shows, at a point or an integral over the rod (its energy, its twist).

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from forms.importing import without_pkg_resources
 from rodfem import code_cache
 from rodfem.errors import SetupError
+from rodfem.forms.importing import without_pkg_resources
 
 try:
     code_cache.have_home()

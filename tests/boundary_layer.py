@@ -7,7 +7,7 @@ of a pendulum), and shortens the rod by ``2 (1 - cos(ANGLE/2)) / sqrt(T)``; the 
 
 from math import cos, pi, sin
 
-from forms.energy import bending_and_twist
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.ends import clamped, sliding
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 

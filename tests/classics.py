@@ -14,8 +14,6 @@ import numpy as np
 import ufl
 from rows import verify
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import (
     Attachment,
     Constraint,
@@ -42,6 +40,8 @@ from rodfem import (
 )
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 
 RIGID = "unshearable and inextensible"
 FORMULATIONS = ("reduced", "pointwise")

@@ -16,7 +16,7 @@ from benchmarks.common import MPIRUN, ROOT, environment
 HEAVY = ("numpy", "scipy.sparse", "mpi4py.MPI", "petsc4py.PETSc", "slepc4py.SLEPc")
 PROCESSES = {"hemitropic": 1.2, "cord": 1.2, "ruler": 1.2, "ring": 1.8}
 """Demos, and the seconds that are aimed at."""
-IMPORTS = (*HEAVY, "forms", "rodfem.compat", "h5py", "rodfem.app.run")
+IMPORTS = (*HEAVY, "rodfem.forms", "rodfem.compat", "h5py", "rodfem.app.run")
 """Modules imported one after the other to see what each adds."""
 
 

@@ -76,8 +76,8 @@ print(f"tip at ({along:.10f}, {across:.10f})")
 # `planar="e2"` the curvature `k[1]` is $\theta'$. `Solver` finds one equilibrium, from a start near the one we want.
 
 # %%
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Parameter, Scene, Solver, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 
 def bent(s):  # quaternions of the rotation by theta(s) about e2

@@ -92,8 +92,8 @@ print(f"the index changes at P = {low:.9f}")
 
 # %%
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 column = Scene(
     name="column",

@@ -94,8 +94,8 @@ print(f"critical: {critical():.6f} without, {euler:.6f} with, {held:.6f} with th
 
 # %%
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Parameter, Plan, Scene, at, clamped, sliding
+from rodfem.forms.energy import bending_and_twist
 
 column = Scene(
     name="held in the middle",

@@ -96,8 +96,8 @@ print(f"P = {fold:.6f}: index {(mu < -1e-3).sum() - 2}, eigenvalue {min(abs(mu))
 
 # %%
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Attachment, Discretization, Ordinate, Plan, Scene, Solver, at, clamped, pinned
+from rodfem.forms.energy import bending_and_twist
 
 TURNED = (np.cos(HALF / 2), 0.0, -np.sin(HALF / 2), 0.0)  # quaternion of the left tangent
 arch = {

@@ -85,8 +85,8 @@ print(f"P = P1 (1 + {curvature:.9f} a^2) {tilt:+.6f} eps/a")
 from dataclasses import replace
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 column = Scene(
     name="column",

@@ -53,9 +53,9 @@ show(ax.figure, "06_quaternion")
 from scipy.linalg import eigvalsh, null_space
 from ufl import as_vector, cos, derivative, dot, dx, sin
 
-from forms.energy import bending_and_twist
-from forms.rotation import conjugate, product, rotation, vector_part
 from rodfem.course.by_hand import arclengths, assemble, fields, spins
+from rodfem.forms.energy import bending_and_twist
+from rodfem.forms.rotation import conjugate, product, rotation, vector_part
 
 
 def energy(q):

@@ -26,9 +26,9 @@
 import numpy as np
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Parameter, Plan, Ring, Scene
 from rodfem.course.pictures import show
+from rodfem.forms.energy import bending_and_twist
 
 
 def circle(s):  # quaternions of a turn by s about e2
@@ -61,8 +61,8 @@ show(diagram.plot(), "07_ring")
 # %%
 from ufl import diff, dot, dx, variable
 
-from forms.rotation import conjugate, product, turn, vector_part
 from rodfem.course.by_hand import arclengths, assemble, constant, fields
+from rodfem.forms.rotation import conjugate, product, turn, vector_part
 
 q, at = fields(4, 0.0, 2 * np.pi)
 s = arclengths(0.0, 2 * np.pi)
@@ -122,7 +122,7 @@ print(f"C t0 = {answer:.10f} (exact {np.sqrt(3):.10f})")
 # A circle of radius 1 and stiffness 1 is pressed in its plane (`planar="e2"`) by a force $p$ per length. At which $p$
 # does it become an oval? It depends on how the force behaves when the ring moves:
 #
-# **7.1** a fluid: the force stays normal to the rod (`forms.loads.pressure`, in `Scene(potential=...)`);
+# **7.1** a fluid: the force stays normal to the rod (`rodfem.forms.loads.pressure`, in `Scene(potential=...)`);
 #
 # **7.2** weights on strings over far pulleys: the force keeps its direction (`Scene(distributed=...)`). Which index has
 # the circle below that load, and why not 0?

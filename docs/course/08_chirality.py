@@ -28,9 +28,9 @@ from math import hypot, inf, pi
 import numpy as np
 
 import rodfem
-from forms.energy import bending_and_twist, hemitropic
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped, sliding
 from rodfem.course.pictures import panels, show
+from rodfem.forms.energy import bending_and_twist, hemitropic
 
 cord = Scene(
     name="cord",

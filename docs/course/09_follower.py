@@ -80,9 +80,9 @@ print(beck(10.0), beck(20.0), beck(20.1), sep="\n")
 from math import hypot
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Inertia, Ordinate, Parameter, Scene, clamped
 from rodfem import free as free_end
+from rodfem.forms.energy import bending_and_twist
 
 column = Scene(
     name="Beck's column",

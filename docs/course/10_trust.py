@@ -74,8 +74,8 @@ for k, (load, strain) in enumerate(orders, start=1):
 
 # %%
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Event, Ordinate, Parameter, Plan, Scene, StepControl, clamped, sliding
+from rodfem.forms.energy import bending_and_twist
 
 C = 0.789 / 1.345
 

@@ -129,7 +129,7 @@ def _there_are(trouble: BaseException) -> str:
     if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):
         return ""
     here = module.__name__
-    if not here.startswith(("rodfem", "forms")):
+    if not here.startswith("rodfem"):
         return ""
     names = [n for n, x in vars(module).items() if not n.startswith("_") and getattr(x, "__module__", "") == here]
     return f": there are {', '.join(sorted(names))}" if names else ""

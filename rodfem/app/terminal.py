@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Self, TextIO
 import numpy as np
 from mpi4py import MPI
 
-from forms.kinematics import RODS
 from rodfem import code_cache
 from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH, Branch, NormalForm, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END, FLUTTER
@@ -23,6 +22,7 @@ from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
+from rodfem.forms.kinematics import RODS
 from rodfem.launcher import RANK
 from rodfem.modes.modes import Modes
 from rodfem.output.digits import NO_ESTIMATE, in_decimals, in_words, index_in_words, number, rounded_up, with_unit

@@ -39,7 +39,6 @@ INDEX = {"starts": "indptr", "indices": "indices"}
 """Pointers to the pattern of a sparse matrix, and what scipy calls it."""
 
 
-
 @dataclass(frozen=True)
 class Made:
     """A step that was made.

@@ -13,7 +13,6 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.soft_states import SoftStates
-from rodfem.continuation import compiled_step
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
@@ -23,18 +22,16 @@ from rodfem.diagram.first_state import first_state
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
-from rodfem.fem import assembly, compiled_newton, compiled_shape, form_compiler
+from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization, check_number
 from rodfem.fem.kinks_at import KinksAt
 from rodfem.fem.system import System
-from rodfem.linalg import chain
 from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
 from rodfem.problem.arguments import Check, a, checked, count, each, number, path, text
 from rodfem.problem.scene import Scene
-from rodfem.stability import subspaces
 from rodfem.stability.assessment import Verdict, assess
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.timing import Clock

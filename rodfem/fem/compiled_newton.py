@@ -121,7 +121,7 @@ class CompiledNewton:
 
     def _take(self) -> None:
         """Use the parameters, the phase conditions and the factors that the system has now."""
-        system, rod, equations = self.system, self.rod, self.system.equations
+        system, equations = self.system, self.system.equations
         equations.take(system.line)
         self.factors.prepare(self.matrix)
         given = (self.factors.elimination, equations.residual.constants, equations.jacobian.constants)

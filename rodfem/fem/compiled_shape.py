@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from forms.kinematics import UNDEFORMED
 from rodfem import compat
+from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.linalg.compiled import Memory, buffer, module
 
 if TYPE_CHECKING:

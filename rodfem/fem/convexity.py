@@ -16,10 +16,10 @@ from ufl.algorithms.analysis import extract_coefficients, extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
-from forms.kinematics import curvature, strain
 from rodfem.fem import form_compiler
 from rodfem.fem.literals import with_constants
 from rodfem.fem.system import System
+from rodfem.forms.kinematics import curvature, strain
 
 GRID = 25
 """Places of an element, at equal distances, at which a material that varies along it is looked at besides."""

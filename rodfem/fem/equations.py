@@ -14,14 +14,14 @@ from dolfinx import fem
 from ufl.algorithms.analysis import extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 
-from forms import inertia, lagrangian
-from forms.kinematics import curvature, strain
-from forms.rotation import rotation
 from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, Places, matrix_places, vector_places
 from rodfem.fem.fields import Fields
 from rodfem.fem.literals import with_constants
 from rodfem.fem.parameters import Line, load_line
+from rodfem.forms import inertia, lagrangian
+from rodfem.forms.kinematics import curvature, strain
+from rodfem.forms.rotation import rotation
 from rodfem.problem.contribution import Site
 from rodfem.problem.local_state import Constants, Place, place
 from rodfem.problem.scene import Part

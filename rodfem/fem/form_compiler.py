@@ -23,9 +23,10 @@ from mpi4py import MPI
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
-from rodfem import code_cache, compat, compiler
+from rodfem import code_cache, compat
 from rodfem.beside import Job
 from rodfem.errors import SceneError, SetupError
+from rodfem.linalg import compiler
 
 _COMPILE = jit._compile_objects
 """What FFCx calls for objects that its cache lacks, once it has locked their place in it."""

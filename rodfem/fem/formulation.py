@@ -58,7 +58,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def integrand(self, equations: Equations, f: Any, c: Constants, W: Any, along: Place) -> Any:
-        """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`forms.lagrangian`.
+        """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`rodfem.forms.lagrangian`.
 
         ``equations`` are those that it is made for, ``f`` their fields and scalars by name, ``c`` the constants,
         ``along`` the place along the rod.

@@ -5,9 +5,9 @@ Both follow from the density ``L(r, r', R, k, ...)`` of the Lagrangian of the ro
     n = dL/dr',        m_i = dL/dk_i.
 
 Of a rod without constraints along it ``n`` is the multiplier of ``r' = R v``, and ``m_i = dW/dk_i``: see
-:mod:`forms.lagrangian`.  A constraint along the rod, or of an integral over it, adds its reactions: ``n`` and ``m`` are
-those of the balances of force and moment, not of the stored energy alone.  Like the strains ``v`` and ``k`` they are
-given along the directors (Antman, Nonlinear Problems of Elasticity, 2005, chapter 8).
+:mod:`rodfem.forms.lagrangian`.  A constraint along the rod, or of an integral over it, adds its reactions: ``n`` and
+``m`` are those of the balances of force and moment, not of the stored energy alone.  Like the strains ``v`` and ``k``
+they are given along the directors (Antman, Nonlinear Problems of Elasticity, 2005, chapter 8).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 import ufl
 from petsc4py import PETSc
 
-from forms.kinematics import curvature, strain
-from forms.rotation import rotation
 from rodfem.fem import form_compiler
 from rodfem.fem.literals import with_constants
 from rodfem.fem.shape import Shape
+from rodfem.forms.kinematics import curvature, strain
+from rodfem.forms.rotation import rotation
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.local_state import place
 

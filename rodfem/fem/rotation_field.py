@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from forms.rotation import IDENTITY, turn, turn_change
+from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.quaternions import of_vector, product
 
 Start = Callable[[np.ndarray], np.ndarray] | None

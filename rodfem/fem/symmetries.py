@@ -1,10 +1,10 @@
 r"""The continuous symmetries of a scene: infinitesimal motions of its state.
 
 A rigid motion of space or of the cross-sections changes each field and group of scalars by one of a few elementary
-generators ``g_j`` (:mod:`forms.symmetry`), linear or constant in its values; the motion of a closed rod along itself
-changes each field by its derivative in arclength.  A symmetry is a combination of them that carries equilibria into
-equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, :mod:`rodfem.fem.verification` verifies them at each
-state).
+generators ``g_j`` (:mod:`rodfem.forms.symmetry`), linear or constant in its values; the motion of a closed rod along
+itself changes each field by its derivative in arclength.  A symmetry is a combination of them that carries equilibria
+into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, :mod:`rodfem.fem.verification` verifies them at
+each state).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.fem.values import NodalValues
+from rodfem.forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.linalg.matrices import times
 from rodfem.problem.contribution import Motion
 from rodfem.problem.scene import Scene

@@ -1,11 +1,11 @@
 """C code of the package: built with the wheel, or compiled once with cffi beside the kernels of FFCx; and its memory.
 
-A file of C has structures, and functions marked ``PUBLIC``, which Python calls.  They are ``static``, as all others: cffi
-compiles them in one unit with what calls them, so that no module exports a name but the one by which Python loads it.  A
-name that is exported can be taken over: the dynamic linker binds the module's own calls of it to the first library that
-has the name, as it did with a function ``advance``, which the C library has, too.
+A file of C has structures, and functions marked ``PUBLIC``, which Python calls.  Like all others they are ``static``:
+cffi compiles them in one unit with what calls them, so that the only name a module exports is its init function.  An
+exported name can be taken over: the dynamic linker binds the module's own calls to the first library that has the name,
+as happened to a function ``advance``, which the C library has, too.
 
-The code is compiled for any processor of the machine's kind: with the instructions of this one alone whole diagrams take
+The code is compiled for every processor of the machine's architecture: compiled for this one alone, whole diagrams take
 98 to 102 % of the time.
 """
 
@@ -18,14 +18,15 @@ import re
 import sys
 import tempfile
 from collections.abc import Hashable
-from functools import cache
+from functools import cache, partial
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rodfem import code_cache, compiler
+from rodfem import code_cache
 from rodfem.beside import Job
 from rodfem.errors import SetupError
+from rodfem.linalg import compiler
 
 if TYPE_CHECKING:
     import numpy as np
@@ -83,7 +84,7 @@ def compile_ahead(*names: str) -> None:
         full = _full_name(name)
         if full not in _JOBS and _found(name) is None:
             compiler.require()
-            _JOBS[full] = Job(lambda name=name: _compile(name))
+            _JOBS[full] = Job(partial(_compile, name))
 
 
 @cache
@@ -111,7 +112,7 @@ def interface(code: str) -> str:
 
 
 def builder(name: str, package: str = "") -> Any:
-    """cffi's builder of the module of ``name.c``, in a ``package``."""
+    """Cffi's builder of the module of ``name.c``, in a ``package``."""
     from cffi import FFI
 
     code, ffi = _code(name), FFI()

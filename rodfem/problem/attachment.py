@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from forms import inertia
+from rodfem.forms import inertia
 from rodfem.problem.contribution import Contribution, Site
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.roles import Role, role_field

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 
-from forms import loads
 from rodfem.errors import SceneError
+from rodfem.forms import loads
 from rodfem.problem.contribution import UNIT, Block, Contribution, Direction, Group, Motion, Site, Unknown
 from rodfem.problem.kinds import check_vector, plain
 from rodfem.problem.load import DEAD_AT_END, FOLLOWER, FOLLOWER_MOMENT, MOMENT, POTENTIAL

@@ -7,7 +7,7 @@ on numbers alike; functions ``f(x, c)`` of a *place* receive the state of the ro
   directors, ``x.s`` the arclength;
 * where the place is the whole rod also ``x.dr`` (3,) ``= r'``, ``x.v`` (3,) and ``x.k`` (3,) the strains.
 
-They return UFL scalars (see :mod:`forms.loads` for a stock of them).
+They return UFL scalars (see :mod:`rodfem.forms.loads` for a stock of them).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from forms import loads
-from forms.rotation import IDENTITY
 from rodfem.errors import InputError
+from rodfem.forms import loads
+from rodfem.forms.rotation import IDENTITY
 from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint, Integral, at, everywhere, integral
 from rodfem.problem.end import End
@@ -113,7 +113,8 @@ def elastic(
     """Return an end held by springs: stiffness in translation and in rotation, each one number or three.
 
     The first three are along e1, e2, e3, from ``anchor``; the second about the directors of ``directors``.  See
-    :func:`forms.loads.spring` and :func:`forms.loads.rotational_spring` (linear in the angle while it is small).
+    :func:`rodfem.forms.loads.spring` and :func:`rodfem.forms.loads.rotational_spring` (linear in the angle while it is
+    small).
 
     ``translation(c)`` is in force per length, ``rotation(c)`` in moment per radian; None is no spring.  ``force(c)``
     (3,) is a dead force.  Raises :class:`InputError` for an anchor or directors that are none, and the scene refuses a

@@ -20,7 +20,7 @@ import ufl
 from ufl.classes import GE, GT, LE, LT, Abs, MaxValue, MinValue
 from ufl.corealg.traversal import unique_pre_traversal
 
-from forms.rotation import rotation
+from rodfem.forms.rotation import rotation
 from rodfem.problem.enclosure import refined
 from rodfem.problem.local_state import STATES, inside, place
 from rodfem.problem.roles import functions_of

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from forms import loads
+from rodfem.forms import loads
 
 if TYPE_CHECKING:
     from rodfem.problem.contribution import Site

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import ufl
 
-from forms.kinematics import UNDEFORMED
-from forms.rotation import IDENTITY, rotation
 from rodfem.errors import POINTWISE, SceneError
+from rodfem.forms.kinematics import UNDEFORMED
+from rodfem.forms.rotation import IDENTITY, rotation
 from rodfem.problem.roles import UnnamedError, functions_of
 
 if TYPE_CHECKING:

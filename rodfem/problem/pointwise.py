@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 
-from forms.kinematics import curvature, strain
-from forms.rotation import rotation
+from rodfem.forms.kinematics import curvature, strain
+from rodfem.forms.rotation import rotation
 from rodfem.problem.local_state import Constants, Place, place
 from rodfem.problem.roles import functions_of
 from rodfem.problem.values import Symbol, Values

@@ -1,4 +1,4 @@
-"""Quaternions (..., 4) as arrays of numbers, scalar first; :mod:`forms.rotation` has the same in UFL."""
+"""Quaternions (..., 4) as arrays of numbers, scalar first; :mod:`rodfem.forms.rotation` has the same in UFL."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.utils.stacks import StackDict
 
-from forms.kinematics import RODS, UNDEFORMED
 from rodfem.errors import SceneError
+from rodfem.forms.kinematics import RODS, UNDEFORMED
 from rodfem.problem.contribution import Contribution
 from rodfem.problem.kinds import plain
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
@@ -189,7 +189,7 @@ class Scene(Contribution):
     interval
         Arclength of the two ends in the reference state.
     rod
-        One of the keys of :data:`forms.kinematics.RODS`: which strains are free.
+        One of the keys of :data:`rodfem.forms.kinematics.RODS`: which strains are free.
     energy
         Stored energy ``W(v, k, c)`` per unit length.  Strains that the kind of rod keeps undeformed count for nothing
         in it, which the terminal says.

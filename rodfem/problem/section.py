@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from math import exp, pi, sqrt
 from typing import Any
 
-from forms.energy import bending_and_twist, shear_and_stretch
-from forms.kinematics import RODS
 from rodfem.errors import InputError
+from rodfem.forms.energy import bending_and_twist, shear_and_stretch
+from rodfem.forms.kinematics import RODS
 from rodfem.problem.arguments import checked
 from rodfem.problem.kinds import finite, reals
 from rodfem.problem.scene import Inertia

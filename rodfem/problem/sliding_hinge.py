@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from forms.rotation import IDENTITY
 from rodfem.errors import SceneError
+from rodfem.forms.rotation import IDENTITY
 from rodfem.problem.contribution import Direction, Group, Motion, Site, Unknown
 from rodfem.problem.end import LETTERS, SIDES, End, across
 from rodfem.problem.kinds import function, reals

@@ -24,9 +24,9 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.utils.stacks import StackDict
 
-from forms.kinematics import UNDEFORMED
-from forms.rotation import IDENTITY, product, rotation
 from rodfem.errors import SceneError
+from rodfem.forms.kinematics import UNDEFORMED
+from rodfem.forms.rotation import IDENTITY, product, rotation
 from rodfem.problem import quaternions
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End

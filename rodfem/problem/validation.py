@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 
-from forms.kinematics import UNDEFORMED
 from rodfem.errors import InputError, SceneError
+from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End

@@ -9,7 +9,7 @@ multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinet
   the full coordinates and fulfils the collocated norm conditions, ``C_eta^t T = 0``, so that ``eta`` goes with them.
   The blocks are ``T^t K T``, ``T^t C``, ``T^t M T``.  ``K`` contains ``eta`` times the second derivative of the norm
   condition: at an equilibrium ``T^t K T`` is then the second derivative of the energy along
-  ``exp(eps theta / 2) q`` (see :mod:`forms.paper`), without it, it is not;
+  ``exp(eps theta / 2) q`` (see :mod:`rodfem.forms.paper`), without it, it is not;
 * ``compatible``: tangent coordinates, and the free strains follow from the motion through the kinematics ``r' = R v``
   (pointwise formulation only).  In each cell the gradients of its constraints in its own strains are a block ``C_v`` of
   full column rank; ``dv = -(C_v^t)^+ C_u^t (theta, dr)`` and an orthonormal ``N`` with ``C_v N = 0`` leave ``C_u N``.

@@ -21,7 +21,6 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from forms.energy import bending_and_twist
 from rodfem.app.run import run
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
@@ -31,6 +30,7 @@ from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, Fields
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.files import load_state
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Scene

@@ -13,10 +13,10 @@ from scipy.integrate import quad, simpson, solve_ivp, trapezoid
 from scipy.optimize import brentq, minimize_scalar, root
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Event, Ordinate, Plan, Scene, clamped, pinned
 from rodfem.adaptivity.event_sampling import finer, where_places_matter
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.forms.energy import bending_and_twist
 
 Curve = Callable[[float], np.ndarray]
 MESHES = [(5, 3), *(pytest.param(mesh, marks=pytest.mark.alone) for mesh in [(8, 6), (3, 4), (7, 2)])]

@@ -9,10 +9,10 @@ import pytest
 import ufl
 from classics import SUPPORTS, WIDE, column
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Plan, StepControl, elastic, pinned, trace
 from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.continuation.static_solver import StaticSolver
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

@@ -14,11 +14,11 @@ import pytest
 from demo_cases import scene
 from mpi4py import MPI
 
-from forms.energy import bending_and_twist
 from rodfem import Attachment, Ordinate, at, clamped, free
 from rodfem.app.code_digest import digest_of
 from rodfem.app.many import many
 from rodfem.errors import InputError, SceneError
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.scene import Scene
 
 COMM = MPI.COMM_WORLD

@@ -21,7 +21,7 @@ from rodfem.errors import InputError
 pytestmark = pytest.mark.alone
 
 SCENE = """
-from forms.energy import bending_and_twist
+from rodfem.forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Parameter, Scene, clamped, free
 
 column = Scene(

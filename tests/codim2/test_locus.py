@@ -24,8 +24,6 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from shooting_solver import Problem, Rod
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem.app.run import run
 from rodfem.codim2.follow import STEPS, locus
 from rodfem.codim2.locus import Locus
@@ -37,6 +35,8 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_locus import _footer, draw_locus
 from rodfem.output.stable_region import stable_region
 from rodfem.problem.ends import clamped, free, pinned

@@ -10,10 +10,10 @@ import classics
 import numpy as np
 import pytest
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, InputError, Ordinate, Parameter, Plan, Scene, clamped, free, trace
 from rodfem.codim2.locus import COARSE, Locus
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.files import save_json
 from rodfem.output.stable_region import in_words, stable_region
 from rodfem.report.loci import _readings

@@ -11,10 +11,10 @@ import pytest
 import rescaled
 from hard.two_freedoms import scene
 
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Scene, clamped, free, trace
 from rodfem.codim2.locus import Locus
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

@@ -9,11 +9,11 @@ import pytest
 import ufl
 from classics import SUPPORTS, column
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, StepControl, clamped, free, trace
 from rodfem.codim2.follow import locus
 from rodfem.continuation.convexity_between import lost_between
 from rodfem.errors import SceneError
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.local_state import Constants
 
 MESH = Discretization("auto", 4, 4)

@@ -9,9 +9,9 @@ import demo_cases
 import pytest
 from classics import deep_arch
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Plan, Scene, trace
 from rodfem.continuation.kinds import BRANCH_POINT
+from rodfem.forms.energy import bending_and_twist
 
 
 def stiff(strains: float) -> Scene:

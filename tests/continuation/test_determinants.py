@@ -10,11 +10,11 @@ import ufl
 from classics import column
 from scipy.linalg import eig
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Plan, clamped, free, trace
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.determinants import LowModes, steep
+from rodfem.forms.energy import bending_and_twist
 from rodfem.linalg.matrices import local_rows
 
 pytestmark = pytest.mark.alone

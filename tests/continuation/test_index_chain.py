@@ -20,8 +20,6 @@ from mpi4py import MPI
 from rows import verify
 from scipy.optimize import brentq
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import (
     Discretization,
     End,
@@ -50,6 +48,8 @@ from rodfem.diagram import explorer
 from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.two_sides import are_images
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.files import _branch_data
 from rodfem.stability.assessment import assess
 

@@ -12,7 +12,6 @@ import pytest
 from classics import column, euler
 from petsc4py import PETSc
 
-from forms.symmetry import AXES, cross, left
 from rodfem import Discretization, Plan, Solver, clamped, free, trace
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver, Step
@@ -20,6 +19,7 @@ from rodfem.continuation.invariants import Invariants
 from rodfem.errors import ConvergenceError
 from rodfem.fem.symmetries import add_change
 from rodfem.fem.system import System
+from rodfem.forms.symmetry import AXES, cross, left
 
 SMALL = 1e-6
 """Size of the mutations, in the units of a rod of unit length and stiffness."""

@@ -13,9 +13,9 @@ import pytest
 from classics import ON_AXIS, column, push
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Plan, clamped, free, pinned
 from rodfem.continuation.branch import NormalForm
+from rodfem.forms.energy import bending_and_twist
 
 
 def law_of(of: Any, s: float = 1.0, span: tuple[float, float] = (9.0, 10.5), cubic: float = 0.0) -> NormalForm:

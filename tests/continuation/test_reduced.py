@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, End, Ordinate, Plan, Scene, clamped, trace
+from rodfem.forms.energy import bending_and_twist
 
 FORMS = {
     "square": ((5.0, 0.0, 0.0, 0.0, 5.0), 90),  # by symmetry one branch stands for those at right angles, too

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 from classics import column, push
 
-from forms import loads
 from rodfem import Discretization, End, Plan, Scene, elastic, free, pinned, trace
+from rodfem.forms import loads
 
 WEAK = 1e-7
 """Stiffness of a spring; that of the rod in bending, and its length, are one."""

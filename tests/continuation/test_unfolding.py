@@ -11,7 +11,6 @@ from classics import ON_AXIS, SUPPORTS, Found, column, push, turned
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
-from forms.energy import bending_and_twist
 from rodfem import (
     Discretization,
     Ordinate,
@@ -29,6 +28,7 @@ from rodfem import (
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.unfolding import unfold
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

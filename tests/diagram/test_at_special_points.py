@@ -14,8 +14,8 @@ import pytest
 from classics import pressed_ring
 from demo_cases import scene
 
-from forms.energy import bending_and_twist
 from rodfem import ConvergenceError, Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, load, pinned, trace
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

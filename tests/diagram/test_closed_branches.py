@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hard.isolas import scene
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, trace
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

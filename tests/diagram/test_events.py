@@ -13,8 +13,8 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipe, ellipk
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Event, InputError, Plan, clamped, sliding
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

@@ -13,9 +13,9 @@ import ufl
 from scipy.optimize import brentq
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
 from rodfem.continuation.kinds import FLUTTER
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.fast_load import FastLoad
 
 

@@ -14,10 +14,10 @@ import ufl
 from classics import column
 from scipy.optimize import brentq
 
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Plan, clamped, free, trace
 from rodfem.continuation.kinds import FLUTTER
 from rodfem.continuation.pair_search import PairSearch
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.fast_load import FastLoad
 from rodfem.problem.scene import Scene
 

@@ -12,10 +12,10 @@ import ufl
 from classics import column
 from mpi4py import MPI
 
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene, clamped, free, load, trace
 from rodfem.app.terminal import Report
 from rodfem.errors import SceneError
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_pieces import pieces_of
 from rodfem.output.typical import typical_state
 from rodfem.report.words import words_of

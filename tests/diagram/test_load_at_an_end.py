@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, pinned, trace
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

@@ -14,10 +14,10 @@ import pytest
 from hard.thrusts import AT_ROW, BETWEEN, loads, peaked
 from test_close_critical_loads import DIVERGES, FLUTTERS, SHARE
 
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Plan, clamped, free
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
+from rodfem.forms.energy import bending_and_twist
 
 FINE, COARSE = Discretization("pointwise", 4, 6), Discretization("pointwise", 2, 4)
 

@@ -12,12 +12,12 @@ from classics import column, push
 from hard.thrusts import THIN, on_soft_springs
 from scipy.linalg import eigvals
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, End, Inertia, Plan, Scene, clamped, free, trace
 from rodfem.codim2.others import NEAREST
 from rodfem.continuation.branch import Point
 from rodfem.diagram.unfollowed import Unfollowed
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

@@ -6,8 +6,8 @@ from math import pi
 
 import pytest
 
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Plan, Scene, pinned, trace
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

@@ -18,7 +18,6 @@ from mpi4py import MPI
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
-from forms.energy import bending_and_twist
 from rodfem import Inertia, Ordinate, Plan, clamped, compat, everywhere, free
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
@@ -26,6 +25,7 @@ from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.fields import Discretization
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.frequency_curves import curves, ranges_of
 from rodfem.output.plot_frequencies import draw_frequencies
 from rodfem.problem.end import End

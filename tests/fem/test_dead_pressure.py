@@ -13,12 +13,12 @@ import pytest
 import ufl
 
 import rodfem.fem.system
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, StepControl, trace
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.newton import relax
 from rodfem.fem.symmetries import Symmetry, elementary_generators
 from rodfem.fem.system import System
+from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.assessment import assess
 
 

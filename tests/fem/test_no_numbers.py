@@ -8,9 +8,9 @@ import pytest
 import ufl
 from classics import SUPPORTS, column
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Solver
 from rodfem.errors import SceneError
+from rodfem.forms.energy import bending_and_twist
 
 
 @pytest.mark.long

@@ -10,9 +10,9 @@ import pytest
 from problem.test_docs import scenes
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.profiles import Profiles
 from rodfem.problem.quaternions import directors
 from rodfem.problem.scene import Parameter, Scene

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from small_states import plain
 
-from forms.energy import bending_and_twist
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.parameters import line
 from rodfem.fem.state import State
 from rodfem.fem.system import System
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.ends import clamped
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 from rodfem.stability.inertia import Inertia

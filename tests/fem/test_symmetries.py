@@ -11,7 +11,6 @@ from demo_cases import scene
 from hemitropic_cases import DEFAULT
 from hemitropic_cases import scene as hemitropic
 
-from forms.energy import bending_and_twist
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
@@ -19,6 +18,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
 from rodfem.fem.newton import relax
 from rodfem.fem.system import FEW, System
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.ends import Constants, End, Ring, clamped, free, pinned
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 

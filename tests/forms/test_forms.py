@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
-from forms.energy import hemitropic
-from forms.inertia import rotary
-from forms.kinematics import RODS, curvature, strain
-from forms.lagrangian import pointwise, reduced
-from forms.rotation import product, rotation
-from forms.symmetry import cross, left, right
+from rodfem.forms.energy import hemitropic
+from rodfem.forms.inertia import rotary
+from rodfem.forms.kinematics import RODS, curvature, strain
+from rodfem.forms.lagrangian import pointwise, reduced
+from rodfem.forms.rotation import product, rotation
+from rodfem.forms.symmetry import cross, left, right
 from rodfem.problem import quaternions
 from rodfem.problem.quaternions import CONJUGATE, directors, of_vector
 

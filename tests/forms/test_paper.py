@@ -15,13 +15,13 @@ from petsc4py import PETSc
 from small_states import buckled
 from test_forms import value
 
-from forms import paper
-from forms.kinematics import RODS, UNDEFORMED, curvature, strain
-from forms.lagrangian import pointwise, reduced
-from forms.rotation import product, rotation
 from rodfem import compat
 from rodfem.fem import form_compiler
 from rodfem.fem.system import System
+from rodfem.forms import paper
+from rodfem.forms.kinematics import RODS, UNDEFORMED, curvature, strain
+from rodfem.forms.lagrangian import pointwise, reduced
+from rodfem.forms.rotation import product, rotation
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Blocks
 

@@ -23,8 +23,8 @@ from hard import writhing
 from hard.case import Change, Measured, compare, run, said, singular
 from hard.shooting_space import FINE, Branch, Misfit, R, Rod, about_e3, times
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Scene
+from rodfem.forms.energy import bending_and_twist
 
 C = 2 / 3
 """Twisting stiffness over bending stiffness of a round rod whose Poisson ratio is 1/2."""

@@ -14,11 +14,11 @@ from diagram.test_close_critical_loads import BECK
 from hard.case import Measured, run
 from hard.two_freedoms import scene as two_freedoms
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Parameter, StepControl, clamped, free
 from rodfem.codim2.locus import Locus
 from rodfem.continuation.kinds import CROSSES
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.stable_region import stable_region
 
 MESH = Discretization("auto", 4, 6)

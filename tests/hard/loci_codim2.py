@@ -13,10 +13,10 @@ from hard.loci import UNIFORM, words
 from hard.two_freedoms import scene as two_freedoms
 from scipy.linalg import eigh
 
-from forms import loads
 from rodfem import Discretization, Plan, Ring, trace
 from rodfem.codim2.codim2_points import PASSES
 from rodfem.codim2.locus import COARSE, Locus
+from rodfem.forms import loads
 
 WAVES, MODES = 3, 40
 """Waves of a stiffness around a ring, and of the modes by which its critical pressure is known."""

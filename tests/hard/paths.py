@@ -14,8 +14,8 @@ import ufl
 from hard.case import Change, Measured, compare, run, said
 from hard.snapping import RANGE, extremes, turning
 
-from forms import loads
 from rodfem import Diagram, Discretization, Ordinate, Ring, Scene, clamped, free
+from rodfem.forms import loads
 
 MESH = Discretization("auto", 6, 5)
 NEAR = 1e-5

@@ -19,8 +19,8 @@ from classics import column
 from hard.case import Change, Measured, compare, run, said, singular
 from hard.stiffness import EULER
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 RANGE = (0.25, 2.3)
 MESH = Discretization("auto", 6, 6)

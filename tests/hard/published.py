@@ -14,9 +14,9 @@ import ufl
 from classics import SUPPORTS, column
 from hard.case import Change, Measured, compare, run, said, singular
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Event, Ordinate, Parameter, Ring, Scene, Solver, clamped, sliding
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 
 # --- Haringx' helical springs ---------------------------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ from hard.case import Change, Measured, compare, run, said, singular
 from hard.stiffness import EULER
 from hard.two_freedoms import scene
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 LOADS = (EULER, 2 * EULER)
 """Branch points of a cantilever of bending stiffnesses 1 and 2."""

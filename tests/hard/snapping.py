@@ -23,8 +23,8 @@ from hard.shooting_plane import ANGLE, MOMENT, STEP, Misfit, X, Z, determinant, 
 from hard.shooting_space import Branch
 from scipy.optimize import brentq
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 SHALLOW = 0.9
 """Distance at which moment and force of the shallow arch are a first guess."""

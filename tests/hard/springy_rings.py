@@ -22,8 +22,8 @@ from hard.case import Change, Measured, compare, run, said, singular
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from forms import loads
 from rodfem import Discretization, Ring
+from rodfem.forms import loads
 
 WAVES, MOST = 40, 14.0
 """Fourier modes of the reference; greatest pressure."""

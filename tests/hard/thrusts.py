@@ -13,8 +13,8 @@ import classics
 from diagram.test_close_critical_loads import BECK, DIVERGES, FLUTTERS, SHARE
 from hard.case import Change, Measured, compare, run, said
 
-from forms import loads as springs
 from rodfem import Diagram, Discretization, End, Inertia, Scene, clamped, free
+from rodfem.forms import loads as springs
 
 MESH = Discretization("pointwise", 4, 6)
 AT_ROW, BETWEEN = 5.0, 5.0371

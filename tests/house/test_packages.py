@@ -24,7 +24,7 @@ LEFT = shutil.ignore_patterns(
 )
 """What tools leave in a working copy: the patterns of ``.gitignore``, and the repository itself."""
 SUFFIXES = {".py", ".pyi", ".c", ".js", ".css", ".html", ".typed", ""}
-"""Ends of the names of the files of both packages; licences of what the report contains have none."""
+"""Ends of the names of the files of the package; licences of what the report contains have none."""
 
 pytestmark = pytest.mark.alone
 
@@ -42,10 +42,11 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A wheel and a source distribution, made from a copy without what tools left, and that copy."""
     pytest.importorskip("setuptools", minversion="77", reason="`make setup` installs a setuptools that builds wheels")
     folder = tmp_path_factory.mktemp("built")
-    tree = Path(shutil.copytree(HOME, folder / "tree", ignore=LEFT))
+    tree = Path(shutil.copytree(HOME, folder / "tree", symlinks=True, ignore=LEFT))
     for name in files(tree) - tracked() if tracked() else ():
-        (tree / name).unlink()  # a person's own
-    clean = Path(shutil.copytree(tree, folder / "clean"))
+        if not name.startswith("rodfem/forms/"):
+            (tree / name).unlink()  # a person's own
+    clean = Path(shutil.copytree(tree, folder / "clean", symlinks=True))
     make = "from setuptools import build_meta as b; print(b.build_sdist({0!r})); print(b.build_wheel({0!r}))"
     made = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", make.format(str(folder))],
@@ -60,22 +61,28 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def files(folder: Path) -> set[str]:
-    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    """Files of a tree; those of ``forms`` also by the link to it in ``rodfem``."""
+    found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    return found | {f"rodfem/{name}" for name in found if name.startswith("forms/")}
 
 
 @pytest.mark.long
-def test_wheel_is_both_packages_and_their_licence(built: dict[str, Path]) -> None:
+def test_wheel_is_the_package_and_its_licence(built: dict[str, Path]) -> None:
     with zipfile.ZipFile(built["wheel"]) as wheel:
         found = {name for name in wheel.namelist() if not name.endswith("/")}
         about = {name for name in found if ".dist-info/" in name}
         metadata = wheel.read(next(name for name in about if name.endswith("/METADATA"))).decode()
         points = wheel.read(next(name for name in about if name.endswith("/entry_points.txt"))).decode()
     tree = built["tree"]
-    assert found - about == {name for name in files(tree) if name.startswith(("rodfem/", "forms/"))}
-    assert {Path(name).suffix for name in found - about if "/vendor/" not in name} <= SUFFIXES
+    compiled = {name for name in found if name.endswith(".so")}
+    assert found - about - compiled == {name for name in files(tree) if name.startswith("rodfem/")}
+    assert sorted(re.sub(r"rodfem_(\w+)_\w+[.].*", r"\1.c", name) for name in compiled) == sorted(
+        name for name in found if name.endswith(".c")
+    )
+    assert {Path(name).suffix for name in found - about - compiled if "/vendor/" not in name} <= SUFFIXES
     # One of each kind that setuptools leaves out unless it is told.
     assert found >= {
-        *("rodfem/py.typed", "forms/py.typed", "rodfem/__init__.pyi", "rodfem/linalg/chain.c", "rodfem/fem/newton.c"),
+        *("rodfem/py.typed", "rodfem/__init__.pyi", "rodfem/linalg/chain.c", "rodfem/forms/rotation.py"),
         *("rodfem/report/static/template.html", "rodfem/report/static/js/main.js"),
         *("rodfem/report/static/vendor/LICENSE-plotly", "rodfem/report/static/vendor/LICENSE-three"),
     }

@@ -56,10 +56,10 @@ def test_a_wrong_line_and_a_wrong_name_are_found(tmp_path: Path) -> None:
     page = HOME / "docs" / "theory" / "rod.md"
     text = links["refreshed"](page)
     assert len(links["LINK"].findall(text)) > 10
-    name = "[`forms.rotation.product`](../../forms/rotation.py#L30)"
+    name = "[`rodfem.forms.rotation.product`](../../forms/rotation.py#L30)"
     assert name in text
     wrong = type("Page", (), {"parent": page.parent, "read_text": lambda self: name.replace("L30", "L31")})()
     assert links["refreshed"](wrong) == name
     wrong = type("Page", (), {"parent": page.parent, "read_text": lambda self: name.replace("product", "sum")})()
-    with pytest.raises(KeyError, match=r"forms\.rotation\.sum"):
+    with pytest.raises(KeyError, match=r"rodfem\.forms\.rotation\.sum"):
         links["refreshed"](wrong)

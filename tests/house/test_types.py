@@ -44,11 +44,10 @@ def test_no_public_name_is_a_module() -> None:
 
 
 def installed(folder: Path) -> Path:
-    """Python of a new virtual environment in which the packages are installed: it has links to them."""
+    """Python of a new virtual environment in which the package is installed: it has a link to it."""
     venv.create(folder, system_site_packages=True, symlinks=True)
     (packages,) = folder.glob("lib/python*/site-packages")
-    for name in ("rodfem", "forms"):
-        (packages / name).symlink_to(HOME / name)
+    (packages / "rodfem").symlink_to(HOME / "rodfem")
     return folder / "bin" / "python"
 
 
@@ -112,13 +111,13 @@ def test_a_run_without_pictures_loads_nothing_else(tmp_path: Path) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("order", ["rodfem.Discretization", "rodfem.trace", "forms", "rodfem.compat"])
+@pytest.mark.parametrize("order", ["rodfem.Discretization", "rodfem.trace", "rodfem.forms", "rodfem.compat"])
 def test_versions_are_known_without_the_package_manager(order: str) -> None:
     """Whatever is loaded first; and any other name of ``pkg_resources`` is that of the real one."""
     first, _, name = order.rpartition(".")
     program = (
         f"import sys; {f'from {first} import {name}' if first else f'import {name}'}; "
-        "assert 'pkg_resources' not in sys.modules; from forms.importing import without_pkg_resources as w\n"
+        "assert 'pkg_resources' not in sys.modules; from rodfem.forms.importing import without_pkg_resources as w\n"
         "with w():\n    from pkg_resources import parse_version\nimport pkg_resources\n"
         "assert pkg_resources.parse_version is parse_version"
     )

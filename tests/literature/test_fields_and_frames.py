@@ -15,8 +15,6 @@ from scipy.linalg import eigvalsh, expm
 from scipy.optimize import brentq, root
 
 import rodfem
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import (
     Attachment,
     Discretization,
@@ -31,6 +29,8 @@ from rodfem import (
     pinned,
     sliding,
 )
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

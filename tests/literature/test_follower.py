@@ -19,12 +19,12 @@ from demo_cases import scene
 from hemitropic_cases import specials
 from mpi4py import MPI
 
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, clamped, free
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
+from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 
 pytestmark = pytest.mark.alone

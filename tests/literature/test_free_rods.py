@@ -12,8 +12,6 @@ from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
 import rodfem
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import (
     Attachment,
     Discretization,
@@ -28,6 +26,8 @@ from rodfem import (
     Solver,
     free,
 )
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 from rodfem.modes.eigenmotions import Eigenmotions
 from rodfem.modes.modes import RIGID
 

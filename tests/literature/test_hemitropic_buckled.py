@@ -12,13 +12,13 @@ from hemitropic_cases import DEFAULT, Constants, explored, specials, user_points
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.ends import pinned
 from rodfem.problem.scene import Ordinate, Scene
 

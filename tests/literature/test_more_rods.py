@@ -16,7 +16,6 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipj, ellipk
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import (
     Discretization,
     Ordinate,
@@ -31,6 +30,7 @@ from rodfem import (
     pinned,
     sliding,
 )
+from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.methods import METHODS
 
 pytestmark = pytest.mark.alone

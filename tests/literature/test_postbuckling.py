@@ -12,8 +12,8 @@ import pytest
 from classics import ON_AXIS, RIGID, circle, column, push
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Ring, Scene, clamped, pinned, sliding
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 ACROSS = Ordinate("middle", s=0.5, of=lambda r, q: float(r[0]))

@@ -15,9 +15,9 @@ from scipy.optimize import brentq, root
 from scipy.special import fresnel
 
 import rodfem
-from forms import loads
-from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem import Discretization, Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem.output.digits import number, rounded_up
 
 pytestmark = pytest.mark.alone

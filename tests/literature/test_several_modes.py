@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
 import rodfem
-from forms import loads
 from rodfem import Attachment, Ordinate, Plan, Scene, pinned
+from rodfem.forms import loads
 
 pytestmark = pytest.mark.alone
 

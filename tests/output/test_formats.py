@@ -17,7 +17,6 @@ from mpi4py import MPI
 from problem.test_docs import page, scenes
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem.app.many import many
 from rodfem.app.run import run
 from rodfem.continuation.branch import Unexplained
@@ -26,6 +25,7 @@ from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM, FORMATS, LOCUS, MODES, PROGRAM, RESULT, STATES
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output import plot_diagram as plot
 from rodfem.output import plot_modes, render
 from rodfem.output.files import load_state

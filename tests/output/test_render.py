@@ -14,9 +14,9 @@ import pytest
 import ufl
 from matplotlib.image import imread
 
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem.errors import InputError
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
 from rodfem.output.render import _read, draw_shape_safely, triad
 from rodfem.output.solids import FLATTEST, SIDES, profile_of, round_arrow

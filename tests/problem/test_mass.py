@@ -6,8 +6,8 @@ from math import pi, sqrt
 
 import pytest
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Ordinate, Scene, SceneError, Solver, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

@@ -16,8 +16,6 @@ import pytest
 import ufl
 
 import rodfem
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import (
     Attachment,
     Discretization,
@@ -43,6 +41,8 @@ from rodfem import (
 )
 from rodfem.diagram import solver
 from rodfem.errors import InputError, SceneError
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

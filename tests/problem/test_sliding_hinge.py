@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, hinged, run, sliding_hinge, trace
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import STEEL
 from rodfem.output.render import _read
 from rodfem.problem.end import End

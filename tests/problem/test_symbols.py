@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import ufl
 
-from forms.energy import bending_and_twist
 from rodfem import Attachment, Inertia, Ordinate, Scene, clamped, free
 from rodfem.errors import SceneError
+from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 

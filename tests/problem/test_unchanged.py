@@ -10,10 +10,10 @@ import classics
 import numpy as np
 import pytest
 
-from forms.energy import bending_and_twist
 from rodfem import Attachment, Discretization, Ordinate, Plan, at, clamped, free
 from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
+from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.scene import Scene
 
 EULER = np.pi**2 / 4

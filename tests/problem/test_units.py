@@ -13,9 +13,9 @@ from rescaled import DNA as METRES_AND_NEWTONS
 from rescaled import STEEL, differences, rescaled
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, sliding
 from rodfem.continuation.special_points import coupling_of
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output import digits
 from rodfem.problem.local_state import Constants
 from rodfem.stability.nonsymmetric import NonsymmetricSolver

@@ -8,8 +8,8 @@ import pytest
 from closed_forms import tip
 from scipy.optimize import brentq
 
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, hinged, trace
+from rodfem.forms.energy import bending_and_twist
 
 UNITS = [(1e4, 1e9, 1e3), (100.0, 1e7, 100.0), (300.0, 1e14, 3e5), (100.0, 1.0, 1.0), (1e-8, 2e-28, 1e-18)]
 """Length, bending stiffness and mass per length."""

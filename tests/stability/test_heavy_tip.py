@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from forms.energy import bending_and_twist
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
+from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.finite_pairs import SHIFT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 

@@ -15,11 +15,11 @@ from classics import ROUND, SUPPORTS, circle, column, push
 from continuation.test_index_chain import localised
 from mpi4py import MPI
 
-from forms import loads
 from rodfem import Diagram, Discretization, Plan, Ring, Scene, Solver, free, load, pinned, trace
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Point
+from rodfem.forms import loads
 from rodfem.output.plot_pieces import UNDECIDED, UNSTABLE, pieces_of
 from rodfem.output.typical import typical_state
 from rodfem.stability.sliding import AMPLE

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from forms.energy import bending_and_twist
 from rodfem import End, Ordinate, Scene, Solver, clamped
+from rodfem.forms.energy import bending_and_twist
 
 rod = Scene(
     name="moment",

@@ -1,7 +1,7 @@
 """A critical load by counts alone."""
 
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Scene, Solver, pinned
+from rodfem.forms.energy import bending_and_twist
 
 rod = Scene(
     name="pinned",

@@ -1,7 +1,7 @@
 """In space each plane of bending counts for itself."""
 
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Scene, Solver, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 rod = Scene(
     name="column in space",

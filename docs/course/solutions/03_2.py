@@ -1,8 +1,8 @@
 """The middle of a pinned column is held."""
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Plan, Scene, at, pinned
+from rodfem.forms.energy import bending_and_twist
 
 column = Scene(
     name="pinned and held in the middle",

@@ -1,8 +1,8 @@
 """The distance of the clamps is the load; its multiplier is the thrust."""
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Plan, Scene, clamped
+from rodfem.forms.energy import bending_and_twist
 
 rod = Scene(
     name="machine",

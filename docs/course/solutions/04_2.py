@@ -3,8 +3,8 @@
 import numpy as np
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Plan, Scene, at, clamped, pinned
+from rodfem.forms.energy import bending_and_twist
 
 HALF = np.radians(107.5)
 FOOT, DEPTH = np.sin(HALF), 1 - np.cos(HALF)

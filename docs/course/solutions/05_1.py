@@ -3,8 +3,8 @@
 import numpy as np
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 
 def bent(s):

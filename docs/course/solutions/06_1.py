@@ -3,8 +3,8 @@
 import ufl
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Plan, Scene, clamped, sliding
+from rodfem.forms.energy import bending_and_twist
 
 shaft = Scene(
     name="stiff shaft",

@@ -5,8 +5,8 @@ import ufl
 from scipy.optimize import brentq
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Plan, Scene, clamped, sliding
+from rodfem.forms.energy import bending_and_twist
 
 shaft = Scene(
     name="pulled shaft",

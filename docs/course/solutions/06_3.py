@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Scene, Solver, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 E, GA, radius = 1e7, 5e6, 100.0
 EI = E / 12

@@ -3,9 +3,9 @@
 import numpy as np
 
 import rodfem
-from forms import loads
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Plan, Ring, Scene
+from rodfem.forms import loads
+from rodfem.forms.energy import bending_and_twist
 
 ring = Scene(
     name="ring under a fluid",

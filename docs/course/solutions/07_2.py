@@ -4,8 +4,8 @@ import numpy as np
 import ufl
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Plan, Ring, Scene
+from rodfem.forms.energy import bending_and_twist
 
 ring = Scene(
     name="ring under weights",

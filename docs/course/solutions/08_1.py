@@ -3,8 +3,8 @@
 from math import inf, pi
 
 import rodfem
-from forms.energy import hemitropic
 from rodfem import Ordinate, Parameter, Plan, Scene, clamped
+from rodfem.forms.energy import hemitropic
 
 rod = Scene(
     name="hemitropic",

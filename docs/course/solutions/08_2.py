@@ -3,8 +3,8 @@
 from math import pi
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Ordinate, Parameter, Plan, Scene, clamped, sliding
+from rodfem.forms.energy import bending_and_twist
 
 cord = Scene(
     name="cord",

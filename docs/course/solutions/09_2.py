@@ -3,8 +3,8 @@
 from math import acos, hypot
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Inertia, Ordinate, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 column = Scene(
     name="partly following",

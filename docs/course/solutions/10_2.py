@@ -7,8 +7,8 @@ import ufl
 from scipy.optimize import brentq
 
 import rodfem
-from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
 
 
 def stepped(breaks: tuple[float, ...]) -> rodfem.SpecialPoint:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from forms import lagrangian
 from rodfem.fem.formulation import CONTACT_FORCE, Formulation
+from rodfem.forms import lagrangian
 from rodfem.problem.contribution import Block
 
 if TYPE_CHECKING:

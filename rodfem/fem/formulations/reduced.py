@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 
-from forms import lagrangian
 from rodfem.fem.formulation import CONTACT_FORCE, Formulation
+from rodfem.forms import lagrangian
 from rodfem.problem.contribution import UNIT, Group, Motion, Unknown
 from rodfem.problem.end import LETTERS, SIDES
 from rodfem.problem.local_state import needs_centreline

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import ufl
 
-from forms import loads
 from rodfem import Attachment, End, clamped, elastic, free, hinged, pinned, sliding, sliding_hinge
+from rodfem.forms import loads
 
 if TYPE_CHECKING:
     from .scenes import Draw

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import ufl
 
-from forms import loads
 from rodfem import Attachment, Constraint, Inertia, Ordinate, Parameter, Ring, Scene, at, everywhere, integral
+from rodfem.forms import loads
 
 from .ends import supported
 

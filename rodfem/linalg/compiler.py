@@ -1,4 +1,4 @@
-"""The C compiler: forms are compiled when a scene runs for the first time, and rodfem's own code where no wheel had it."""
+"""The C compiler: it compiles forms when a scene first runs, and rodfem's own code unless that came with a wheel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,12 @@ OTHERS = ("cc", "gcc", "clang")
 """Programs that serve if the compiler of this Python is not there."""
 NO_COMPILER = (
     "There is no C compiler, which the equations of a rod are compiled with: install one with 'apt install gcc' (as "
-    'root), or with \'pip install "rodfem[cc]"\' (ziglang, without root), or name yours in the variable CC.'
+    "root), or with 'pip install \"rodfem[cc]\"' (ziglang, without root), or name yours in the variable CC."
+)
+
+NO_HEADERS = (
+    "This Python has no header files ({} is missing), which compiled code needs: install them with 'apt install "
+    "python3-dev' (as root), or use a Python that has them, as those of uv, pyenv and conda do."
 )
 
 
