@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from rodfem import code_cache
+from rodfem import code_cache, libraries  # noqa: F401, the libraries before all that computes
 from rodfem.errors import SetupError
 from rodfem.forms.importing import without_pkg_resources
 
@@ -36,8 +36,8 @@ try:
     from petsc4py import PETSc
 except ModuleNotFoundError as missing:
     raise SetupError(
-        f"This Python has no module {missing.name!r}: install Debian's python3-dolfinx and run with a virtual "
-        "environment made by '/usr/bin/python3 -m venv --system-site-packages .venv' ('make setup' does both)."
+        f"This Python has no module {missing.name!r}: install what computes with 'pip install \"rodfem[pip]\"' (Python "
+        "3.12 or newer), or use the Python of 'make setup' (.venv/bin/python), which sees Debian's python3-dolfinx."
     ) from missing
 
 

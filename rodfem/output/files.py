@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, SpecialPoint, not_followed
 from rodfem.continuation.static_solver import StaticSolver
@@ -37,6 +36,7 @@ from rodfem.whole_files import with_added, write_whole
 
 if TYPE_CHECKING:
     import h5py
+    from petsc4py import PETSc
 
 COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
 

@@ -9,10 +9,9 @@ import sys
 from datetime import UTC, datetime
 from typing import Any
 
-import dolfinx
 import numpy as np
-from petsc4py import PETSc
-from slepc4py import SLEPc
+
+from rodfem import compat
 
 
 def origin() -> dict[str, Any]:
@@ -29,10 +28,12 @@ def versions() -> dict[str, str]:
 
     That of MUMPS is absent where PETSc has it in another form than a shared library.
     """
+    from slepc4py import SLEPc  # after what compat loads first
+
     found = {
         "python": platform.python_version(),
-        "dolfinx": dolfinx.__version__,
-        "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "dolfinx": compat.dolfinx.__version__,
+        "petsc": ".".join(map(str, compat.PETSc.Sys.getVersion())),
         "slepc": ".".join(map(str, SLEPc.Sys.getVersion())),
         "mumps": _mumps(),
         "numpy": np.__version__,
@@ -47,7 +48,7 @@ def _mumps() -> str:
     hidden last argument.
     """
     try:
-        ask = ctypes.CDLL(PETSc.__file__).mumps_set_version_
+        ask = ctypes.CDLL(compat.PETSc.__file__).mumps_set_version_
     except (AttributeError, OSError):
         return ""
     text = ctypes.create_string_buffer(b" " * 31, 32)

@@ -1,0 +1,44 @@
+"""The libraries that compute, of one build: what has to be loaded before any of them.
+
+PyPI's dolfinx-solver-real has dolfinx, PETSc, SLEPc and their bindings in one wheel, and takes MPI from another one,
+which has to be loaded first: importing ``dolfinx_solver`` does that.  Debian's packages need nothing of the kind.  Each
+package of rodfem that computes imports this module before anything else.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, distribution
+from importlib.util import find_spec
+
+from rodfem.errors import SetupError
+
+COMPLEX = "dolfinx-solver-complex"
+"""Name on PyPI of the dolfinx with a PETSc for complex numbers."""
+BEGIN_ANEW = (
+    "install rodfem in a new virtual environment, by 'pip install \"rodfem[pip]\"', which brings dolfinx-solver-real."
+)
+
+
+def _load() -> None:
+    """Load MPI first if the libraries come from PyPI; raises :class:`SetupError` if they are of a wrong build."""
+    if find_spec("dolfinx_solver") is None:
+        return
+    if _is_installed(COMPLEX):
+        raise SetupError(f"The PETSc of {COMPLEX} has complex numbers, which rodfem does not count with: {BEGIN_ANEW}")
+    try:
+        import_module("dolfinx_solver")
+    except ImportError as mixed:
+        reason = str(mixed).partition(". ")[0]
+        raise SetupError(f"The libraries here are of several builds ({reason}): {BEGIN_ANEW}") from mixed
+
+
+def _is_installed(name: str) -> bool:
+    try:
+        distribution(name)
+    except PackageNotFoundError:
+        return False
+    return True
+
+
+_load()
