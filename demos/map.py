@@ -8,7 +8,7 @@
 # $\lambda$: the colour is the displacement of the middle of the stable state, and lines are where the straight rod's
 # index changes.
 #
-# Rods are independent, so that ranks share them: `mpirun -n 2 .venv/bin/python demos/map.py`. What is finished is kept:
+# Rods are independent, so that ranks share them: `mpirun -n 2 python demos/map.py`. What is finished is kept:
 # started again, it goes on.
 
 # %% [markdown]

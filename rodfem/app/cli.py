@@ -30,8 +30,8 @@ def check_installation() -> None:
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         sys.stderr.write(
-            f"error: {sys.executable} has no module {', '.join(missing)}: run 'make setup', which installs what is "
-            "missing, and use .venv/bin/python (or any Python that sees Debian's python3-dolfinx).\n"
+            f"error: {sys.executable} has no module {', '.join(missing)}: install what is missing by 'pip install "
+            "\"rodfem[pip]\"' (Python 3.12 or newer), or on Debian by 'make setup', and use .venv/bin/python.\n"
         )
         sys.exit(2)
 

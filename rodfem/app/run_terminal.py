@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shlex
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +13,7 @@ from uuid import uuid4
 
 from mpi4py import MPI
 
-from rodfem.app.earlier import Earlier
+from rodfem.app.earlier import DIAGRAM_FILE, Earlier
 from rodfem.app.interrupts import held
 from rodfem.app.terminal import Report
 from rodfem.diagram.asked import check_asked
@@ -28,6 +31,20 @@ from rodfem.ranks import on_first
 def branches_in_words(number: int) -> str:
     """Number of branches."""
     return f"{number} branch{'es' if number != 1 else ''}"
+
+
+def _other_run(folder: Path) -> str:
+    """Date and command of the run that a folder holds; empty if it holds none, or one of the same command."""
+    try:
+        origin = json.loads((folder / DIAGRAM_FILE).read_text())["origin"]
+        command, date = shlex.split(origin["command"]), str(origin["date"])[:10]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return ""
+    if command == sys.orig_argv:
+        return ""
+    at = next((i for i, word in enumerate(command) if Path(word).name == "rodfem"), 0)
+    said = shlex.join(["rodfem", *command[at + 1 :]] if at else command)
+    return f"run of {date}, {''.join(c for c in said if c.isprintable())}"
 
 
 class Terminal(Report):
@@ -92,6 +109,8 @@ class Terminal(Report):
         super().system(system, accuracy)
         if self.goes_on:
             self.say(f"  goes on in {self.output}{os.sep} after {branches_in_words(self._known)}")
+        elif other := self.comm.bcast(_other_run(self.output) if self.comm.rank == 0 else ""):
+            self.say(f"  replaces in {self.output}{os.sep} the {other} (--output FOLDER keeps both)")
         if self.plan.method or self.plan.modes:
             from rodfem.app.assess_all import check_method
 

@@ -16,12 +16,14 @@ import pytest
 from rodfem.app import console
 
 HOME = Path(__file__).parents[2]
-PROGRAMS = {".venv/bin/rodfem": [sys.executable, "-m", "rodfem"], "rodfem": [sys.executable, "-m", "rodfem"]}
-PROGRAMS |= {".venv/bin/python": [sys.executable], "mpirun": [shutil.which("mpirun.openmpi") or "mpirun"]}
+PROGRAMS = {"rodfem": [sys.executable, "-m", "rodfem"], "python": [sys.executable]}
+PROGRAMS |= {"mpirun": [shutil.which("mpirun.openmpi") or "mpirun"]}
 DEMO = "rodfem run demos/hemitropic.py"
 """What ``make demo`` runs."""
-ELSEWHERE = ("make", "docker", "tools/image.py")
+ELSEWHERE = ("make", "docker", "tools/image.py", "python3 -m venv")
 """What continuous integration runs, or a machine with containers."""
+BY_HAND = re.compile(r"\.venv/bin/(?!activate)")
+"""Programs by the path of one installation: a reader has their folder on the path."""
 HERE = ("run", "info", "convert")
 """Commands of rodfem that are run in this process, once one of them was run in its own."""
 PATIENCE = 300
@@ -45,9 +47,12 @@ def own_rod() -> str:
 
 def test_all_commands_are_found() -> None:
     text = re.sub(r"```.*?```", "", (HOME / "README.md").read_text(), flags=re.DOTALL)
-    lines = re.findall(r"^    ((?:\.venv/|rodfem|mpirun|make|docker|tools/).*)", text, flags=re.MULTILINE)
+    lines = re.findall(r"^    ((?:rodfem|python|mpirun|make|docker|tools/).*)", text, flags=re.MULTILINE)
     here = [line for line in lines if not line.startswith(ELSEWHERE)]
     assert len(here) == len(commands()) - 1 > 20
+    pages = [HOME / "README.md", *(HOME / "docs" / "course").glob("*.md"), *(HOME / "demos").glob("*.py")]
+    named = [page.name for page in pages if BY_HAND.search(page.read_text())]
+    assert not named, "one way to call a program: without a path"
 
 
 @pytest.fixture(scope="module")
