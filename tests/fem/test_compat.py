@@ -29,7 +29,7 @@ DEGREES = pytest.mark.parametrize("degree", [1, 2, 3, 6, 8])
 
 def lobatto(degree: int) -> np.ndarray:
     """Gauss-Lobatto-Legendre points in [0, 1]."""
-    inner = legendre.legroots(legendre.legder(np.eye(degree + 1)[-1])) if degree > 1 else []
+    inner = np.real(legendre.legroots(legendre.legder(np.eye(degree + 1)[-1]))) if degree > 1 else []
     return (np.array([-1.0, *np.sort(inner), 1.0]) + 1) / 2
 
 

@@ -1,0 +1,138 @@
+"""Whatever is installed, Debian's libraries or those of PyPI, and on any ranks: the special points of the record.
+
+``tests/diagram/test_golden.py`` has those of the five demos.  Here a whole run does all that a run can.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from golden_cases import numbers
+from hemitropic_cases import scene
+from mpi4py import MPI
+
+import rodfem
+from rodfem import Discretization, Plan, libraries
+from rodfem.app.console import main
+from rodfem.errors import SetupError
+from rodfem.linalg import compiler
+
+COMM = MPI.COMM_WORLD
+HOME = Path(__file__).parents[2]
+RECORDED = {b["name"]: b["special"] for b in numbers()["demo hemitropic"]}
+
+pytestmark = pytest.mark.versions
+
+
+def loads_of(scene: rodfem.Scene) -> dict[str, Any]:
+    """Loads of the special points of the first branch, on this rank alone."""
+    mesh = Discretization("reduced", elements=8, degree=6)
+    diagram = rodfem.trace(scene, mesh, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
+    return {"loads": [s.point.load for s in diagram.branches[0].special]}
+
+
+def test_a_run_with_all_that_it_can_do(folder: Path) -> None:
+    """Special points, loci, a search, modes and the page."""
+    words = ["--locus", "A", "-3.02", "-2.98", "--at", "0.5", "--search", "2", "--modes", "2"]
+    main(["run", str(HOME / "demos" / "hemitropic.py"), "--no-figures", *words, "--output", str(folder / "run")])
+    COMM.barrier()
+    saved = rodfem.load_json(folder / "run" / "diagram.json")
+    for branch in saved["branches"]:
+        found = [(t["kind"], [t["negative_before"], t["negative_after"]], t["load"]) for t in branch["special"]]
+        for s in RECORDED.get(branch["name"], []):
+            near = [load for kind, index, load in found if (kind, index) == (s["kind"], s["index"])]
+            assert min(abs(load - s["load"]) for load in near) <= max(s["bar"], 1e-10)
+    assert RECORDED.keys() <= {branch["name"] for branch in saved["branches"]}
+    locus = json.loads((folder / "run" / "locus-1.json").read_text())
+    first = RECORDED["straight"][0]
+    (at_three,) = (lam for lam, A in zip(*(locus["columns"][name] for name in ("lam", "A")), strict=True) if A == -3)
+    assert at_three == pytest.approx(first["load"], abs=first["bar"])
+    (row,) = (s["row"] for s in saved["branches"][1]["special"] if s["load"] == 0.5)
+    modes = rodfem.load_modes(folder / "run" / "modes.h5", "branch 1", row)
+    assert len(modes.value) >= 2 and modes.load == 0.5
+    if COMM.rank == 0:
+        main(["view", str(folder / "run"), "--no-open"])
+        assert str(first["load"])[:11] in (folder / "run" / "report.html").read_text()
+
+
+def test_many_rods(folder: Path) -> None:
+    found = rodfem.many([scene(), scene()], loads_of, folder / "map")
+    expected = [s["load"] for s in RECORDED["straight"]]
+    for rod in found:
+        assert rod["loads"] == pytest.approx(expected, abs=1e-10)
+
+
+# --- what must not be installed, what must be there -----------------------------------------------------------------
+
+
+@pytest.mark.alone
+def test_wrong_builds_are_refused_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(libraries, "find_spec", lambda name: name)
+    monkeypatch.setattr(libraries, "_is_installed", lambda name: True)
+    with pytest.raises(SetupError, match=r"^The PETSc of dolfinx-solver-complex has complex numbers.*\.$"):
+        libraries._load()
+    monkeypatch.setattr(libraries, "_is_installed", lambda name: False)
+
+    def mixed(name: str) -> None:
+        raise ImportError("petsc4py is installed in this environment. More of it.")
+
+    monkeypatch.setattr(libraries, "import_module", mixed)
+    with pytest.raises(SetupError, match=r"several builds \(petsc4py is installed in this environment\): install"):
+        libraries._load()
+
+
+@pytest.mark.alone
+def test_every_package_that_computes_loads_the_libraries_first() -> None:
+    """PyPI's PETSc finds no MPI otherwise."""
+    uses = re.compile(r"^(?:from|import) (?:basix|dolfinx|ffcx|petsc4py|slepc4py)\b", flags=re.MULTILINE)
+    for package in (HOME / "rodfem").glob("*/__init__.py"):
+        files = [file for file in package.parent.rglob("*.py") if uses.search(file.read_text())]
+        assert not files or "from rodfem import libraries" in package.read_text(), files
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("given", ["", "no-such-compiler"])
+def test_without_a_compiler(given: str, folder: Path) -> None:
+    """One sentence, before anything is compiled; what the cache has is not compiled."""
+    code = "import sys; from rodfem.app.console import main; main(sys.argv[1:])"
+    words = [
+        "run",
+        str(HOME / "demos" / "ruler.py"),
+        "--elements",
+        "2",
+        "--degree",
+        "2",
+        "--output",
+        str(folder / "no"),
+    ]
+    env = os.environ | {"PATH": str(folder), "PYTHONPATH": str(HOME), "XDG_CACHE_HOME": str(folder / "cache")}
+    env |= {"CC": given} if given else {}
+    hidden = "import sys; sys.modules['ziglang'] = None; "
+    done = subprocess.run([sys.executable, "-c", hidden + code, *words], env=env, capture_output=True, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    if given:
+        assert "no C compiler 'no-such-compiler'" in done.stderr
+    else:
+        assert "apt install gcc" in done.stderr and 'pip install "rodfem[cc]"' in done.stderr
+
+
+@pytest.mark.alone
+def test_another_compiler_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = compiler.missing.__wrapped__
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
+    monkeypatch.setattr(compiler, "find_spec", lambda name: name == "ziglang")
+    assert found() == ""
+    assert os.environ["CC"] == f"{sys.executable} -m ziglang cc" and os.environ["LDSHARED"].endswith(" cc -shared")
+    monkeypatch.setattr(os, "environ", {"CC": sys.executable})
+    monkeypatch.setattr(compiler.shutil, "which", lambda name: name)
+    monkeypatch.setattr(compiler.sysconfig, "get_path", lambda name: "/nowhere")
+    assert re.search(r"no header files .*'apt install python3-dev'", found())
