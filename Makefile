@@ -58,10 +58,7 @@ docs: setup ## build the site in build/site; LESSONS=off does not execute the co
 
 notebooks: setup ## the lessons of the course as notebooks, in results/notebooks
 	@tools/setup.sh docs
-	@mkdir -p results/notebooks
-	@set -e; for lesson in docs/course/[0-9]*.py; do \
-		$(PYTHON) -m jupytext --quiet --to ipynb --output "results/notebooks/$$(basename "$$lesson" .py).ipynb" "$$lesson"; \
-	done; ls results/notebooks
+	@$(PYTHON) tools/notebooks.py results/notebooks
 
 bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (80 minutes)
 	$(PYTHON) -m benchmarks.speed

@@ -117,6 +117,12 @@ def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
         return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
 
 
+def collapsed(space: Any) -> tuple[Any, np.ndarray]:
+    """A subspace as a space of its own, and the numbers in its parent of its degrees of freedom, (n,)."""
+    alone, numbers = space.collapse()
+    return alone, np.ravel(numbers).astype(np.int32)  # in newer releases a list of one array
+
+
 def nodes(degree: int) -> np.ndarray:
     """Reference coordinates in [0, 1] of the nodes of a Lagrange element, in the order of its degrees of freedom."""
     return np.array([0.5]) if degree == 0 else np.array(_lagrange(degree).points)[:, 0]

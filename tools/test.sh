@@ -18,8 +18,8 @@ logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 export logs
 
-# What each rank does: rank 0 prints, the others write into a file, shown below if the run fails.
-rank='[ "$OMPI_COMM_WORLD_RANK" = 0 ] || exec >"$logs/rank-$OMPI_COMM_WORLD_RANK" 2>&1; exec "$@"'
+# What each rank of Open MPI or MPICH does: rank 0 prints, the others write into a file, shown below if the run fails.
+rank='rank=${OMPI_COMM_WORLD_RANK-$PMI_RANK}; [ "$rank" = 0 ] || exec >"$logs/rank-$rank" 2>&1; exec "$@"'
 
 run() {
     title=$1

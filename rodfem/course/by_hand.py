@@ -67,9 +67,9 @@ def fields(number: int, a: float = 0.0, b: float = 1.0) -> tuple[fem.Function, N
     space = compat.mixed_space(mesh, [(True, DEGREE, number)])
     at = []
     for i in range(number):
-        part, inside = space.sub(0).sub(i).collapse()
+        part, inside = compat.collapsed(space.sub(0).sub(i))
         s = np.asarray(part.tabulate_dof_coordinates())[:, 0]
-        at.append(np.asarray(inside, dtype=np.int32)[np.argsort(s)])
+        at.append(inside[np.argsort(s)])
     return fem.Function(space, dtype=compat.REAL), np.array(at)
 
 
