@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The lessons of the course as notebooks, which run where rodfem is not installed yet: the first cell installs it.
 
-python tools/notebooks.py FOLDER        needs jupytext: pip install ".[notebooks]"
+Run it as ``python tools/notebooks.py FOLDER``, with jupytext: ``pip install ".[notebooks]"``.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class Terminal(Report):
         if self.goes_on:
             self.say(f"  goes on in {self.output}{os.sep} after {branches_in_words(self._known)}")
         elif other := self.comm.bcast(_other_run(self.output) if self.comm.rank == 0 else ""):
-            self.say(f"  replaces in {self.output}{os.sep} the {other} (--output FOLDER keeps both)")
+            self.say(f"  replaces in {self.output}{os.sep} the {other} (run(output=...) keeps both)")
         if self.plan.method or self.plan.modes:
             from rodfem.app.assess_all import check_method
 
