@@ -11,8 +11,6 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
 
-from rodfem.errors import SetupError
-
 COMPLEX = "dolfinx-solver-complex"
 """Name on PyPI of the dolfinx with a PETSc for complex numbers."""
 BEGIN_ANEW = (
@@ -24,6 +22,8 @@ def _load() -> None:
     """Load MPI first if the libraries come from PyPI; raises :class:`SetupError` if they are of a wrong build."""
     if find_spec("dolfinx_solver") is None:
         return
+    from rodfem.errors import SetupError  # the first of all modules needs no other until then
+
     if _is_installed(COMPLEX):
         raise SetupError(f"The PETSc of {COMPLEX} has complex numbers, which rodfem does not count with: {BEGIN_ANEW}")
     try:
