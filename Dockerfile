@@ -11,8 +11,8 @@
 #
 # tools/image.py builds the image, runs demos/cord.py in it, and compares each number with the recorded ones.
 
-# Tried: this base, by buildah (tools/image.py), not by Docker itself. Another base may bring a dolfinx of its own, as the
-# project's images do; none of them has been tried. Without a container there is `pip install ".[pip,viz]"` (README):
+# Another base may bring a dolfinx of its own, as the
+# project's images do; none of them has been tried. What was tried without a container is `pip install ".[pip,viz]"` (README):
 # docker build --build-arg BASE=dolfinx/dolfinx:v0.9.0 .
 ARG BASE=debian:trixie-slim
 FROM ${BASE}

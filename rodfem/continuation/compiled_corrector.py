@@ -39,10 +39,10 @@ class CompiledCorrector(CompiledNewton):
         self.tangent = np.zeros(n)
         b = self.block = self.ffi.new("Block *")
         b.block, b.share, b.near_zero = block, FRESH, near_zero
-        self.point(b, vectors=self._vectors[0], images=self._vectors[1])
-        self.point(b, fresh=self._fresh[0], fresh_images=self._fresh[1])
-        self.point(b, **{name: np.zeros((block + 2) * n) for name in ("right", "solved")})
-        self.point(b, tangent=self.tangent, step=np.zeros(n))
+        self.memory.point(b, vectors=self._vectors[0], images=self._vectors[1])
+        self.memory.point(b, fresh=self._fresh[0], fresh_images=self._fresh[1])
+        self.memory.point(b, **{name: np.zeros((block + 2) * n) for name in ("right", "solved")})
+        self.memory.point(b, tangent=self.tangent, step=np.zeros(n))
         self.restart()
 
     def restart(self) -> None:

@@ -119,13 +119,13 @@ class CompiledStep:
         self._sparse("metric", metric.pattern, metric.values)
         self._sparse("saddle", saddle.pattern, saddle.values)
         if not system.scene.units.ordinary:
-            self._point(sizes=system.sizes.array_r.real.copy())
+            self._memory.point(step, sizes=system.sizes.array_r.real.copy())
         quaternions = system.fields.dofs.get("q", np.zeros((0, 4), int)).reshape(-1, 4)
         step.quaternions = len(quaternions)
-        self._point(quaternion=quaternions.astype(np.int32))
+        self._memory.point(step, quaternion=quaternions.astype(np.int32))
         self._symmetries(step)
         self._arrays = {name: np.zeros(n) for name in ("x", "direction", "row", "tangent")}
-        self._point(**self._arrays, right=np.zeros(n), combined=np.zeros(n))
+        self._memory.point(step, **self._arrays, right=np.zeros(n), combined=np.zeros(n))
         self._states = self._ffi.new("double *[]", ROWS)
         self.checked: Checked | None = None
         self._line: Line | None = None
@@ -137,12 +137,12 @@ class CompiledStep:
         matrix = system.generators.in_unknowns()
         step.symmetries, step.symmetric = count, SYMMETRIC_STATE
         self._sparse("generator", matrix, matrix.data)
-        self._point(generic=verification.generic_weights(count))
+        self._memory.point(step, generic=verification.generic_weights(count))
         step.active = self._theirs("int *", rod.active)
         step.conditions, step.offsets = (self._theirs("double *", x) for x in (rod.conditions, rod.offsets))
         step.zero, step.tiny = verification.ZERO * system.stiffness_scale, verification.TINY
         step.round_off, step.residual = verification.ROUND_OFF * EPS, verification.RESIDUAL
-        self._point(generators=np.zeros(count * own), images=np.zeros(count * own))
+        self._memory.point(step, generators=np.zeros(count * own), images=np.zeros(count * own))
 
     def _theirs(self, kind: str, pointer: Any) -> Any:
         """Pointer into what another module of compiled code uses."""
@@ -151,16 +151,11 @@ class CompiledStep:
     def _address(self, step: Any, name: str, function: Any) -> None:
         setattr(step, name, int(self.corrector.ffi.cast("uintptr_t", function)))
 
-    def _point(self, **arrays: np.ndarray) -> None:
-        for name, array in arrays.items():
-            setattr(self._step, name, self._memory.array(name, array))
-
     def _sparse(self, name: str, pattern: sp.csr_matrix, values: np.ndarray) -> None:
         sparse = getattr(self._step, name)
         sparse.rows = pattern.shape[0]
         index = {part: getattr(pattern, of).astype(np.int32, copy=False) for part, of in INDEX.items()}
-        for part, array in {**index, "values": values}.items():
-            setattr(sparse, part, self._memory.array((name, part), array))
+        self._memory.point(sparse, **index, values=values)
 
     def __call__(
         self, known: Sequence[Point], s: float, bounds: tuple[float, float], limits: Limits, same: float
@@ -203,7 +198,7 @@ class CompiledStep:
         for name, form in (("energy", equations.energy), ("potential", equations.potential)):
             if form is not None:
                 setattr(step, name, self._memory.keep(name, form).pointer)
-                self._point(**{f"{name}_constants": form.constants})
+                self._memory.point(step, **{f"{name}_constants": form.constants})
 
     def _serves(self) -> bool:
         """Whether the code does all that a step of the system asks for now."""
@@ -216,7 +211,7 @@ class CompiledStep:
             self._line, fixed = system.line, system.generators.fixed(system.line)
             self._fixed = fixed is not None
             if fixed is not None:
-                self._point(constants=fixed)
+                self._memory.point(self._step, constants=fixed)
         return self._fixed and system.verification.norm > 0
 
     def _made(self) -> Made | None:

@@ -35,9 +35,9 @@ class Places:
         ffi = _code().ffi
         self._memory = Memory(ffi)
         self.pointer = ffi.new("Places *", {"kinds": 0 if columns is None else columns.shape[1]})
-        for name, x in (("row", rows), ("kind", kinds), ("column", columns)):
-            if x is not None:
-                setattr(self.pointer, name, self._memory.array(name, np.ascontiguousarray(x, dtype=np.int32)))
+        given = {"row": rows, "kind": kinds, "column": columns}
+        arrays = {name: np.ascontiguousarray(x, dtype=np.int32) for name, x in given.items() if x is not None}
+        self._memory.point(self.pointer, **arrays)
 
 
 def vector_places(dofs: np.ndarray, targets: np.ndarray) -> Places:

@@ -107,17 +107,12 @@ class CompiledNewton:
             "starts": metric.pattern.indptr,
             "indices": metric.pattern.indices,
         }
-        self.point(rod, **{name: np.ascontiguousarray(x, dtype=np.int32) for name, x in integers.items()})
-        self.point(rod, u=system.fields.clamps.copy(), values=own.values, metric=metric.values)
-        self.point(rod, conditions=self.conditions, offsets=self.offsets, forces=self.forces, border=self.border)
-        self.point(rod, sizes=system.sizes.array.copy(), load_equation=self.load_equation)
-        self.point(self.newton, factored=self.factored, factored_equations=self.equations)
-        self.point(self.newton, **{name: np.zeros(n) for name in ("step", "origin", "equations")})
-
-    def point(self, structure: Any, **arrays: np.ndarray) -> None:
-        """Let pointers of a structure, by their names, point to ``arrays``."""
-        for name, array in arrays.items():
-            setattr(structure, name, self.memory.array((structure, name), array))
+        self.memory.point(rod, **{name: np.ascontiguousarray(x, dtype=np.int32) for name, x in integers.items()})
+        self.memory.point(rod, u=system.fields.clamps.copy(), values=own.values, metric=metric.values)
+        self.memory.point(rod, conditions=self.conditions, offsets=self.offsets, forces=self.forces, border=self.border)
+        self.memory.point(rod, sizes=system.sizes.array.copy(), load_equation=self.load_equation)
+        self.memory.point(self.newton, factored=self.factored, factored_equations=self.equations)
+        self.memory.point(self.newton, **{name: np.zeros(n) for name in ("step", "origin", "equations")})
 
     def _take(self) -> None:
         """Use the parameters, the phase conditions and the factors that the system has now."""
@@ -148,7 +143,7 @@ class CompiledNewton:
         """Let the rod point to the forms with their constants, and to the factors."""
         system, rod, keep = self.system, self.rod, self.memory.keep
         residual, jacobian = system.equations.residual, system.equations.jacobian
-        self.point(rod, residual_constants=residual.constants, jacobian_constants=jacobian.constants)
+        self.memory.point(rod, residual_constants=residual.constants, jacobian_constants=jacobian.constants)
         owners = {
             "residual": residual,
             "jacobian": jacobian,

@@ -45,9 +45,8 @@ class CompiledShape:
             "sample_basis": compat.lagrange_basis(k - 1, np.linspace(0, 1, shape.samples)),
         }
         for kind, arrays in ((np.int32, integers), (float, doubles)):
-            for name, values in arrays.items():
-                array = np.ascontiguousarray(values, dtype=kind)
-                setattr(shape, name, self._memory.array(name, array))
+            given = {name: np.ascontiguousarray(values, dtype=kind) for name, values in arrays.items()}
+            self._memory.point(shape, **given)
 
     def slopes(self, local: np.ndarray) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3), of ``local`` values."""

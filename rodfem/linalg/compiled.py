@@ -2,8 +2,8 @@
 
 A file of C has structures, and functions marked ``PUBLIC``, which Python calls.  Like all others they are ``static``:
 cffi compiles them in one unit with what calls them, so that the only name a module exports is its init function.  An
-exported name can be taken over: the dynamic linker binds the module's own calls to the first library that has the name,
-as happened to a function ``advance``, which the C library has, too.
+exported name can be taken over: the dynamic linker binds the module's own calls to the first library that has the name
+(the C library has an ``advance``, for one).
 
 The code is compiled for every processor of the machine's architecture: compiled for this one alone, whole diagrams take
 98 to 102 % of the time.
@@ -60,6 +60,11 @@ class Memory:
         """Pointer to ``values``, as for :func:`buffer`, which are kept under ``name``."""
         return self.keep(name, buffer(self._ffi, values))
 
+    def point(self, structure: Any, **arrays: np.ndarray) -> None:
+        """Let pointers of a ``structure``, by their names, point to ``arrays``, which are kept."""
+        for name, array in arrays.items():
+            setattr(structure, name, self.array((structure, name), array))
+
     def keep(self, name: Hashable, owner: Any) -> Any:
         """Keep the ``owner`` of what a pointer points to under ``name``, and return it."""
         self._kept[name] = owner
@@ -83,7 +88,6 @@ def compile_ahead(*names: str) -> None:
     for name in names:
         full = _full_name(name)
         if full not in _JOBS and _found(name) is None:
-            compiler.require()
             _JOBS[full] = Job(partial(_compile, name))
 
 

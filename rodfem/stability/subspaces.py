@@ -54,7 +54,7 @@ class Subspaces:
         for name in ("columns", "solved"):
             self._named(name, n, width)
         self._named("small", 3, width, width)
-        f.heavy = self._memory.array("heavy", np.zeros(n, dtype=np.int32))
+        self._memory.point(f, heavy=np.zeros(n, dtype=np.int32))
 
     def _both(self, name: str, *shape: int) -> list[np.ndarray]:
         """Arrays of both sides."""
@@ -65,14 +65,13 @@ class Subspaces:
 
     def _named(self, name: str, *shape: int) -> np.ndarray:
         array = np.zeros(shape)
-        setattr(self._spaces, name, self._memory.array(name, array))
+        self._memory.point(self._spaces, **{name: array})
         return array
 
     def take(self, mass: sp.csr_matrix, factors: Elimination) -> None:
         """Use these factors of ``S - a M`` and this mass from now on."""
         f = self._spaces
-        for name, array in (("starts", mass.indptr), ("indices", mass.indices), ("mass", mass.data)):
-            setattr(f, name, self._memory.array(name, array))
+        self._memory.point(f, starts=mass.indptr, indices=mass.indices, mass=mass.data)
         if factors is not self._factors:
             f.solve[RIGHT], f.solve[LEFT] = factors.address("solve"), factors.address("solve_transposed")
             f.factors, self._factors = factors.pointer, self._memory.keep("factors", factors)
