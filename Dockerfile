@@ -11,8 +11,8 @@
 #
 # tools/image.py builds the image, runs demos/cord.py in it, and compares each number with the recorded ones.
 
-# Another base may bring a dolfinx of its own, as the
-# project's images do; none of them has been tried. What was tried without a container is `pip install ".[pip,viz]"` (README):
+# Tried without a container: `pip install ".[pip,viz]"` (README). Not tried: another base, with a dolfinx of its own, as
+# the project's images are:
 # docker build --build-arg BASE=dolfinx/dolfinx:v0.9.0 .
 ARG BASE=debian:trixie-slim
 FROM ${BASE}
