@@ -99,7 +99,7 @@ def cable(length):
     )
 
 
-found, steps = {}, StepControl(first=0.2, largest=0.6, aim=0.05)
+found, steps = {}, StepControl(first=0.2, largest=0.6, aim=0.1)
 for length, elements in ((1.0, 40), (1.0, 60), (0.75, 30)):
     slack = Event("slack", of=lambda state, length=length: length - 0.03 - state.r[-1, 2])
     plan = Plan(depth=1, events=(slack,), steps=steps)
