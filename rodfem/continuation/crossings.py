@@ -1,0 +1,134 @@
+r"""Where eigenvalues pass zero between two states of a branch: roots of the reduced stiffness matrix.
+
+Between two states with the same border the cubic Hermite interpolant of ``H`` (:mod:`rodfem.stability.reduced_stiffness`)
+
+    H(t) = A0 + A1 t + A2 t^2 + A3 t^3,      0 <= t <= 1,
+
+is singular at the eigenvalues of a pencil of order 3k: all of them at once.  A real one is a crossing, of whatever kind:
+several at one place, opposite ones, pairs that cancel, folds.  A complex one near the axis is a pair that the
+interpolant does not tell from a near miss, and asks for one state more, as do several in one piece, and a change of the
+index across the border, by which the piece is too long for it.
+
+Most pieces have none, and one test says so: in the eigenvectors of ``H(0) + H(1)`` all four control matrices of Bernstein
+have a positive definite block, and a negative definite one.  Then so has each of their means, and a matrix of this shape
+is regular.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg
+
+from rodfem.stability.reduced_stiffness import ReducedStiffness, negative
+
+AXIS = 0.15
+"""Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
+DEEPEST = 8
+"""Divisions of a piece."""
+CLOSE = 1e-8
+"""Length of a piece, in the metric, within which crossings are one point."""
+REAL = 1e-6
+"""Imaginary part of a root that is real."""
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A state at a place ``s``, with its reduced stiffness, and the derivative of that in s."""
+
+    s: float
+    H: np.ndarray
+    slope: np.ndarray
+    far: int
+    kept: object = None
+
+    @property
+    def index(self) -> int:
+        return self.far + negative(self.H)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Eigenvalues that pass zero at ``s``: vectors (k, m) of H, the index before and after, and the piece."""
+
+    s: float
+    vectors: np.ndarray
+    before: int
+    after: int
+    piece: tuple[Node, Node]
+
+
+def coefficients(a: Node, b: Node) -> list[np.ndarray]:
+    """Of the cubic in t from 0 to 1."""
+    h = b.s - a.s
+    d = b.H - a.H
+    return [a.H, h * a.slope, 3 * d - h * (2 * a.slope + b.slope), h * (a.slope + b.slope) - 2 * d]
+
+
+def clear(a: Node, b: Node) -> bool:
+    """Whether the cubic between two nodes is regular for a reason that costs little to see."""
+    h = (b.s - a.s) / 3
+    control = np.stack([a.H, a.H + h * a.slope, b.H - h * b.slope, b.H])
+    values, vectors = np.linalg.eigh(a.H + b.H)
+    n = int((values < 0).sum())
+    turned = vectors.T @ control @ vectors
+    return bool(
+        (n == 0 or np.linalg.eigvalsh(turned[:, :n, :n])[:, -1].max() < 0)
+        and (n == len(values) or np.linalg.eigvalsh(turned[:, n:, n:])[:, 0].min() > 0)
+    )
+
+
+def roots(a: Node, b: Node) -> np.ndarray:
+    """All places t at which the cubic is singular, (3k,) complex."""
+    A = coefficients(a, b)
+    # congruence: units in which the largest of the matrices is of size one in each direction
+    size = np.sqrt(sum(abs(np.diagonal(X)) for X in A)) + 1e-300
+    A = [X / np.outer(size, size) for X in A]
+    k = len(A[0])
+    one, zero = np.eye(k), np.zeros((k, k))
+    left = np.block([[zero, one, zero], [zero, zero, one], [-A[0], -A[1], -A[2]]])
+    right = np.eye(3 * k)
+    right[2 * k :, 2 * k :] = A[3]
+    p, q = scipy.linalg.eig(left, right, right=False, homogeneous_eigvals=True)
+    keep = abs(q) > 1e-13 * abs(p)
+    return p[keep] / q[keep]
+
+
+def at(a: Node, b: Node, t: float) -> np.ndarray:
+    A = coefficients(a, b)
+    return A[0] + t * (A[1] + t * (A[2] + t * A[3]))
+
+
+def crossings(a: Node, b: Node, solve: Callable[[Node, Node, float], Node | None], depth: int = 0) -> list[Crossing]:
+    """All crossings between two nodes; ``solve`` makes a node between two others."""
+    h = b.s - a.s
+    if a.far == b.far and clear(a, b):
+        return []
+    found = roots(a, b)
+    real = np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)])
+    near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0.02) & (found.real < 0.98)]
+    ask = None
+    if a.far != b.far:
+        ask = 0.47
+    elif len(real) > 1 and (gaps := np.diff(real)).max() * h > CLOSE:
+        i = int(gaps.argmax())
+        ask = float(np.clip((real[i] + real[i + 1]) / 2, 0.01, 0.99))
+    elif len(near):
+        ask = float(near[abs(near.imag).argmin()].real)
+    if ask is not None and depth < DEEPEST and h > CLOSE:
+        middle = solve(a, b, a.s + ask * h)
+        if middle is not None:
+            return crossings(a, middle, solve, depth + 1) + crossings(middle, b, solve, depth + 1)
+    out, index = [], a.index
+    for group in np.split(real, np.flatnonzero(np.diff(real) * h > CLOSE) + 1) if len(real) else []:
+        t = float(group.mean())
+        values, vectors = np.linalg.eigh(at(a, b, t))
+        own = vectors[:, np.argsort(abs(values))[: len(group)]]
+        H1 = sum(j * c * t ** (j - 1) for j, c in enumerate(coefficients(a, b)) if j)
+        change = -int(np.sign(np.linalg.eigvalsh(own.T @ H1 @ own)).sum())
+        out.append(Crossing(a.s + t * h, own, index, index + change, (a, b)))
+        index += change
+    return out

@@ -1,0 +1,231 @@
+r"""The singular system: folds and branch points, perfect or not, as regular solutions of one set of equations.
+
+Near a singular state ``m`` modes ``psi = M V`` of the saddle matrix S vanish, or nearly.  With them as a border,
+
+    ( S       psi )  ( V   w   s )     ( 0   -F_lam   -F )
+    ( psi^t   0   )  ( G   b   c )  =  ( I    0        0 ),      so that   b_i = -V_i . F_lam,
+
+G (m, m) is minus the reduced stiffness matrix of :mod:`rodfem.stability.reduced_stiffness`.  Columns Z (m, k) span the k
+modes that are to vanish together, and N the others, which are near by.  What is solved for is
+
+    tr Z^t G Z = 0        an eigenvalue is zero, or k of them are,
+    N^t beta = 0          the state is an equilibrium but for forces beta_i psi_i,
+    Z^t beta = 0          at a fold,
+    Z^t b = 0             at a branch point, where the load does no work on the null vectors, and beta is left over.
+
+An imperfection, however small, takes a branch point apart: of ``A xi^3 + B lam xi + eps = 0`` no point is singular *and*
+has a derivative in the load that vanishes.  With the unfolding parameters ``beta`` (Moore, SIAM J. Numer. Anal. 17 (1980)
+567-576) it is regular again, and they measure the imperfection: ``-eps`` above, round-off at a branch point.
+
+Newton's step is ``dx = s + dlam w + sum_j xi_j V_j``, which changes
+
+    beta = c + dlam b + G xi,
+    b_z      by    -(s.r_z + dlam q_z + sum_j xi_j V_j.r_z),
+    G_zz     by    -(s.y_z + dlam V_z.r_z + sum_j xi_j V_j.y_z),
+
+    r_z = d/dt S(x + t w, lam + t) V_z,   y_z = d/dt S(x + t V_z, lam) V_z,   q_z = V_z . d^2/dt^2 F(x + t w, lam + t),
+
+the derivatives by central differences, whose errors do not enter the converged result.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import TOLERANCE
+from rodfem.linalg.matrices import rounding
+from rodfem.linalg.orthogonal import combine, orthonormalize
+from rodfem.stability.bordered import Bordered
+from rodfem.tolerances import TINY
+
+DIFFERENCE = 1e-4
+"""Step of the differences, in the metric."""
+ITERATIONS = 10
+"""Newton steps."""
+STALLED = 1e-7
+"""Below this, in the metric, a step that no longer shrinks is round-off."""
+FARTHEST = 0.5
+"""A point farther than this from where it is expected, in the metric, is another one."""
+NOISE = 100.0
+"""Times the rounding errors of ``phi . F``, independent and as large as those of ``phi . S x``, up to which ``beta`` is
+round-off."""
+LEAST = 1e-15
+"""Round-off of ``beta`` where all of these vanish, over the lowest bending eigenvalue."""
+FREE = 1e-9
+"""Part of the equations, relative to the largest, below which they do not determine an unknown: a family moves freely."""
+
+
+@dataclass(frozen=True)
+class SingularState:
+    """A solution of the singular system: state ``x``, ``load``, and the null ``vectors``, of metric norm 1.
+
+    Relative to the metric, as eigenvalues are: the unfolding parameters ``beta`` (k,) are an eigenvalue times an
+    amplitude in radian, ``noise`` is the round-off of their size.  ``directions`` are those of the two branches that
+    cross at a branch point with one null vector, unit vectors; ``rate`` is the derivative of the eigenvalue, the mean
+    of several, with the load along the response to it, and ``moved`` the last change of the load.
+    """
+
+    x: PETSc.Vec
+    load: float
+    vectors: list[PETSc.Vec]
+    response: PETSc.Vec
+    beta: np.ndarray
+    noise: float
+    directions: list[PETSc.Vec]
+    rate: float
+    moved: float
+
+    @property
+    def size(self) -> float:
+        """Size of the unfolding parameters."""
+        return float(np.linalg.norm(self.beta))
+
+
+class SingularSystem:
+    """The singular system of one mesh, with a border of so many modes."""
+
+    def __init__(self, solver: BranchSolver, modes: list[PETSc.Vec], critical: np.ndarray, *, fold: bool) -> None:
+        """Border with M-orthonormal ``modes``, of which the combinations ``critical`` (m, k) are to vanish."""
+        self.solver, self.system, self.inertia = solver, solver.system, solver.inertia
+        self.fold, self.Z = fold, critical
+        self.psi = [self.inertia.metric * v for v in modes]
+        self._bordered: Bordered | None = None
+
+    def solve(self, x: PETSc.Vec) -> SingularState | None:
+        """Newton's method from a state; None where there is no solution near by."""
+        system, x = self.system, x.copy()
+        moved, before = 0.0, np.inf
+        for _ in range(ITERATIONS):
+            load = system.scalar(x)
+            try:
+                step, made = self._step(x)
+            except (ConvergenceError, np.linalg.LinAlgError):
+                return None
+            size = system.norm(step)
+            moved += size
+            if not np.isfinite(size) or moved > FARTHEST:
+                return None
+            x.axpy(1.0, step)
+            if size < TOLERANCE or (size < STALLED and size > 0.5 * before):
+                return self._state(x, abs(system.scalar(x) - load), *made)
+            before = size
+        return None
+
+    def _step(self, x: PETSc.Vec) -> tuple[PETSc.Vec, tuple[np.ndarray, list[PETSc.Vec], PETSc.Vec, np.ndarray]]:
+        """Newton's step; beta, null vectors, response to the load and the small table after it."""
+        system, m = self.system, len(self.psi)
+        found = self.inertia.at(x)
+        if self._bordered is None:
+            self._bordered = Bordered(system, found.matrix, m, self.inertia.constraints)
+        bordered = self._bordered
+        bordered.factor(found.matrix, self.psi)
+        border = found.border.copy()
+        equations = system.new_vector()
+        system.at(x).residual(equations)
+        s, c = bordered.solve(-equations, np.zeros(m))
+        w, b = bordered.solve(-border, np.zeros(m))
+        solved = [bordered.solve(None, e) for e in np.eye(m)]
+        V, G = [vector for vector, _ in solved], np.array([row for _, row in solved])
+        system.set_load(w, 1.0)
+        Z, N = self._split(G)
+        null = [combine(V, z) for z in Z.T]
+        r, bend = self._differences(x, w, DIFFERENCE / system.norm(w), null, equations)
+        y = [self._differences(x, v, DIFFERENCE, [v])[0][0] for v in null]
+        k = Z.shape[1]
+        along = [[w, *V]] * 1  # the vectors that the unknowns multiply
+        by = along[0]
+        rows, right = [], []
+        for n in (np.eye(m) if self.fold else N.T):
+            rows.append([n @ b, *(n @ G)])
+            right.append(-(n @ c))
+        for i in range(0 if self.fold else k):
+            rows.append([bend.dot(null[i]), *(u.dot(r[i]) for u in V)])
+            right.append(Z[:, i] @ b - s.dot(r[i]))
+        trace = [sum(v.dot(image) for v, image in zip(null, r, strict=True)), *(sum(u.dot(z) for z in y) for u in V)]
+        rows.append(trace)
+        right.append(np.trace(Z.T @ G @ Z) - sum(s.dot(image) for image in y))
+        table, known = np.array(rows), np.array(right)
+        size = np.maximum(abs(table).max(axis=1), TINY)
+        share = np.linalg.lstsq(table / size[:, None], known / size, rcond=FREE)[0]
+        step = combine([s, *by], np.array([1.0, *share]))
+        beta = Z.T @ (c + share[0] * b + G @ share[1:])
+        # the response to the load with the modes near by relaxed, and what the null vectors do with it
+        relaxed = w
+        if N.shape[1]:
+            xi = N @ np.linalg.lstsq(N.T @ G @ N, -(N.T @ b), rcond=FREE)[0]
+            relaxed = combine([w, *V], np.array([1.0, *xi]))
+        self.Z = Z
+        small = np.zeros((2, 2))
+        if k == 1 and not self.fold:
+            cross = relaxed.dot(r[0]) if N.shape[1] else None
+            slope = null[0].dot(r[0])
+            small = np.array([[bend.dot(null[0]), slope], [slope, null[0].dot(y[0])]])
+            del cross
+        rate = trace[0] / k
+        return step, (beta, null, relaxed, small, rate)
+
+    def _split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The modes that are to vanish, and the others: eigenvectors of G, by what they have of the last ones."""
+        m, k = self.Z.shape
+        if k == m:
+            return np.eye(m), np.zeros((m, 0))
+        _, vectors = np.linalg.eigh((G + G.T) / 2)
+        order = np.argsort(-np.linalg.norm(self.Z.T @ vectors, axis=0))
+        return vectors[:, order[:k]], vectors[:, order[k:]]
+
+    def _state(
+        self,
+        x: PETSc.Vec,
+        moved: float,
+        beta: np.ndarray,
+        null: list[PETSc.Vec],
+        response: PETSc.Vec,
+        table: np.ndarray,
+        rate: float,
+    ) -> SingularState:
+        matrix = self.inertia.at(x).matrix
+        noise = NOISE * max(rounding(matrix, v, x) for v in null) + LEAST * self.inertia.scale
+        directions = self._directions(response, null[0], table) if table.any() else []
+        null = [v.copy() for v in null]
+        orthonormalize(null, self.inertia.metric)
+        return SingularState(x, self.system.scalar(x), null, response, beta, noise, directions, rate, moved)
+
+    def _directions(self, w: PETSc.Vec, v: PETSc.Vec, table: np.ndarray) -> list[PETSc.Vec]:
+        """Unit directions ``xi V + dlam (w, 1)`` with ``a xi^2 + 2 b xi dlam + c dlam^2 = 0``, the reduced equation."""
+        (c, b), (_, a) = table
+        root = np.sqrt(max(b * b - a * c, 0.0))
+        pivot = -(b + np.copysign(root, b))
+        out = []
+        for xi, dlam in ((pivot, a), (c, pivot)):  # no cancellation: the two roots xi/dlam have the product c/a
+            if xi or dlam:
+                d = combine([v, w], np.array([xi, dlam]))
+                out.append(d / self.system.norm(d))
+        return out
+
+    def _differences(
+        self,
+        x: PETSc.Vec,
+        direction: PETSc.Vec,
+        h: float,
+        vectors: list[PETSc.Vec],
+        equations: PETSc.Vec | None = None,
+    ) -> tuple[list[PETSc.Vec], PETSc.Vec]:
+        """Derivatives of ``S v`` along a direction at ``x``, and the second one of ``F`` (from ``F``, if given)."""
+        system, inertia = self.system, self.inertia
+        out, bend = [system.new_vector() for _ in vectors], system.new_vector()
+        there = system.new_vector()
+        for sign in (1.0, -1.0):
+            beside = x + direction * (sign * h)
+            matrix = inertia.at(beside).matrix
+            for image, v in zip(out, vectors, strict=True):
+                image.axpy(sign / (2 * h), matrix * v)
+            if equations is not None:
+                system.at(beside).residual(there)
+                bend.axpy(1.0 / h**2, there)
+                bend.axpy(-1.0 / h**2, equations)
+        return out, bend

@@ -1,0 +1,159 @@
+r"""The reduced stiffness matrix H of a state: its second variation on a few amplitudes, with all else relaxed.
+
+Of k vectors ``Phi`` (n, k), orthonormal in the metric ``M`` and near the modes nearest zero, ``B = M Phi`` is the border
+of the saddle matrix ``S``.  With
+
+    S W = B H,    B^t W = 1,    that is    H = W^t S W = (B^t S^-1 B)^-1,
+
+H (k, k) is the Schur complement of S on the amplitudes ``B^t x``: static condensation.  S and H are singular together,
+with null vectors ``W v``.  By Haynsworth's identity
+
+    index(S) = far + negative(H),
+
+where ``far`` is the index on ``B^t x = 0``: it changes only where the bordered matrix ``(S B; B^t 0)`` is singular.
+Along a branch
+
+    H' = W^t S' W,
+
+and H is smooth whatever the eigenvalues near zero do, avoided crossings and double ones included.  A phase condition
+``c . x``, a row and column of S with a drift scalar as its multiplier, moves with the state, and belongs to ``S'``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.errors import ConvergenceError
+from rodfem.linalg.matrices import shared
+from rodfem.stability.bordered import Bordered
+
+NEAR = 1e-3
+"""Eigenvalue of H, over the lowest bending one, below which S is too near singular to be solved with."""
+DIFFERENCE = 1e-4
+"""Distance of the states whose matrices are differenced, in the metric."""
+ROTATED = 1.0
+"""Size of ``W^t M W - 1`` above which a border has become that of other modes."""
+MODES = 6
+"""Columns of a border."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedStiffness:
+    """H of a state with a border, ``rate`` its derivative along the unit tangent, both (k, k), and W (n, k).
+
+    ``far`` is the index across the border, ``rotated`` how far the amplitudes are from those of the border's modes.
+    """
+
+    H: np.ndarray
+    rate: np.ndarray
+    far: int
+    W: np.ndarray
+    rotated: float
+
+    @property
+    def index(self) -> int:
+        """Number of negative eigenvalues of S."""
+        return self.far + negative(self.H)
+
+
+def negative(H: np.ndarray) -> int:
+    """Number of negative eigenvalues of a symmetric matrix."""
+    return int((np.linalg.eigvalsh(H) < 0).sum())
+
+
+class Condensation:
+    """Reduced stiffness matrices of states on the mesh of a solver."""
+
+    def __init__(self, solver: BranchSolver) -> None:
+        """Begin without a border."""
+        self.solver, self.system, self.inertia = solver, solver.system, solver.inertia
+        self.made = 0
+        self._bordered: dict[int, Bordered] = {}
+
+    def border(self, x: PETSc.Vec, count: int = MODES) -> np.ndarray:
+        """Modes nearest zero at a state, (own rows, count)."""
+        found = self.inertia.at(x)
+        found.count()
+        count = min(count, self.system.fields.unknowns - self.inertia.constraints - 2)
+        with self.inertia.afresh():
+            vectors = found.nearest(count, 1e-3)[1]
+        return np.stack([v.array_r for v in vectors], axis=1)
+
+    def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
+        """Reduced stiffness matrix at an equilibrium with its unit tangent, for a border."""
+        self.made += 1
+        inertia, B = self.inertia, self.inertia.weighed(phi)
+        found = inertia.at(x)
+        try:
+            below = found.below(0.0)
+            Z = found.factors.solve_columns(B) if hasattr(found.factors, "solve_columns") else self._columns(B)
+            H = np.linalg.inv(_symmetric(inertia.sum(B.T @ Z)))
+            near = not abs(np.linalg.eigvalsh(_symmetric(H))).min() > NEAR * inertia.scale
+        except (ConvergenceError, np.linalg.LinAlgError):
+            near = True
+        if near:
+            far, H, W = self._by_the_bordered_matrix(x, B)
+        else:
+            H = _symmetric(H)
+            far, W = below - negative(H), Z @ H
+        rotated = float(np.linalg.norm(inertia.sum(W.T @ inertia.weighed(W)) - np.eye(W.shape[1]), 2))
+        return ReducedStiffness(H, self._rate(x, tangent, W), far, W, rotated)
+
+    def _by_the_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
+        """``far``, H and W where S is nearly singular, or is."""
+        k = B.shape[1]
+        matrix = self.inertia.at(x).matrix
+        if k not in self._bordered:
+            self._bordered[k] = Bordered(self.system, matrix, k, self.inertia.constraints)
+        bordered = self._bordered[k]
+        far = bordered.factor(matrix, [self._vector(B[:, j]) for j in range(k)])
+        solved = [bordered.solve(None, e) for e in np.eye(k)]
+        H = -np.array([g for _, g in solved])
+        return far, _symmetric(H), np.stack([w.array_r for w, _ in solved], axis=1)
+
+    def _rate(self, x: PETSc.Vec, tangent: PETSc.Vec, W: np.ndarray) -> np.ndarray:
+        """``W^t S' W`` along a tangent by a central difference, which the phase conditions of ``x`` are added to."""
+        system, inertia, out = self.system, self.inertia, np.zeros((W.shape[1],) * 2)
+        system.set_phase(x)
+        beside = [x + tangent * (sign * DIFFERENCE) for sign in (1.0, -1.0)]
+        for state, sign in zip(beside, (1.0, -1.0), strict=True):
+            inertia._assemble(state, system.at(state))
+            out += sign / (2 * DIFFERENCE) * inertia.sum(W.T @ self._times(W))
+        inertia.filled += 1
+        phase = system.phase
+        if phase.rows:
+            there = [system.at(state).generators for state in beside]
+            rates = (there[0] - there[1]) / (2 * DIFFERENCE)
+            for i, weights in phase.broken.items():
+                rate = system.generators.vector(weights @ rates).array_r
+                term = np.outer(inertia.sum(W.T @ inertia.weighed(rate[:, None])[:, 0]), W[system.drifts[i]])
+                out += term + term.T
+        return _symmetric(out)
+
+    def _times(self, columns: np.ndarray) -> np.ndarray:
+        """The matrix that is held now times columns."""
+        known = shared(self.inertia.matrix)
+        if known is not None:
+            return np.asarray(known.matrix @ columns)
+        return np.stack([(self.inertia.matrix * self._vector(c)).array_r for c in columns.T], axis=1)
+
+    def _columns(self, B: np.ndarray) -> np.ndarray:
+        out = []
+        for column in B.T:
+            y = self.system.new_vector()
+            self.inertia.factors.solve(self._vector(column), y)
+            out.append(y.array_r.copy())
+        return np.stack(out, axis=1)
+
+    def _vector(self, own: np.ndarray) -> PETSc.Vec:
+        out = self.system.new_vector()
+        out.array[:] = own
+        return out
+
+
+def _symmetric(A: np.ndarray) -> np.ndarray:
+    return np.asarray((A + A.T) / 2)
