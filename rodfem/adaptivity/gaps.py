@@ -1,7 +1,7 @@
 """Gaps: branch points that an imperfection has taken apart, and how continuation resolves them.
 
 Near such a point two branches, that would cross without the imperfection, bend away from each other.  The state and the
-load at which they would cross are known from :mod:`rodfem.continuation.unfolding`.  Steps in proportion to the distance
+load at which they would cross are known from :mod:`rodfem.continuation.singular`.  Steps in proportion to the distance
 from there follow the bend of either branch, however sharp it is.
 """
 
@@ -11,10 +11,13 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.unfolding import Unfolded, unfold
+from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.fem.newton import correct
+from rodfem.linalg.orthogonal import orthonormalize
 
 if TYPE_CHECKING:
     from rodfem.adaptivity.mesh_sequence import Meshes
@@ -32,7 +35,7 @@ DIFFERS = 0.5
 class Gap(Exception):
     """A step of continuation has jumped from one branch to another, across the gap at this special point."""
 
-    def __init__(self, special: SpecialPoint, unfolded: Unfolded) -> None:
+    def __init__(self, special: SpecialPoint, unfolded: SingularState) -> None:
         """Keep what was found."""
         super().__init__(f"imperfect, unfolding {unfolded.size:.0e}")
         self.special, self.unfolded = special, unfolded
@@ -47,29 +50,19 @@ class Gaps:
         self.meshes = meshes
         self.known: list[Gap] = []
 
-    def examine(self, solver: BranchSolver, special: SpecialPoint) -> Gap | None:
-        """Solve for a branch point with unfolding parameters, and record their size; the gap, if it is taken apart.
+    def examine(self, solver: BranchSolver, special: SpecialPoint, found: SingularState) -> Gap | None:
+        """The gap at a singular state whose unfolding parameters are not round-off; None where the mesh makes them.
 
-        The load and the state of a branch point are then those that solve its equations.
+        A mesh need not have a symmetry of the scene: on a richer one its own unfolding is smaller.
         """
-        found = unfold(solver, special)
-        if found is None:
-            return None
-        special.unfolding = found.size
-        if found.size <= found.noise:
-            sharpen(solver, special, found)
-            return None
-        return None if self._of_the_mesh(special, found) else Gap(special, found)
-
-    def _of_the_mesh(self, special: SpecialPoint, found: Unfolded) -> bool:
-        """Whether the mesh takes the branch point apart, not the rod: a mesh need not have a symmetry of the scene."""
         richer = self.meshes.richer(special.point.mesh)
-        point = replace(special.point, x=richer.transfer(found.x, state=True))
+        x = richer.transfer(found.x, state=True)
         modes = [richer.transfer(v, state=False) for v in special.null_vectors]
-        for mode in modes:
-            mode.scale(1.0 / richer.system.norm(mode))
-        again = unfold(richer.solver, replace(special, point=point, null_vectors=modes))
-        return again is not None and again.size < DIFFERS * found.size + again.noise
+        orthonormalize(modes, richer.system.metric)
+        again = SingularSystem(richer.solver, modes, np.eye(len(modes)), fold=False).solve(x)
+        if again is not None and again.size < DIFFERS * found.size + again.noise:
+            return None
+        return Gap(special, found)
 
     def open(self, gap: Gap, solver: BranchSolver) -> bool:
         """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
@@ -83,27 +76,6 @@ class Gaps:
         """Largest step from a point: in proportion to the distance from the nearest gap."""
         apart = (solver.system.distance(point.x, self.meshes.here(gap.point, solver).x) for gap in self.known)
         return max(SHARE * min(apart, default=inf), LEAST)
-
-
-def sharpen(solver: BranchSolver, special: SpecialPoint, found: Unfolded) -> None:
-    """Give a branch point the state and the load that solve its equations, where they are those that were located.
-
-    Of several eigenvalues that vanish near each other, and not at one load, the equations have no solution of their
-    own: what they lead to is not nearer to any of them.  They do not all pass zero there in one direction.
-    """
-    change = abs(special.negative_after - special.negative_before)
-    together = special.multiplicity in (1, change)
-    within = 10 * special.located_to if together else 0.1 * special.located_to
-    if abs(found.load - special.point.load) > within:
-        return
-    special.point = replace(
-        special.point,
-        x=found.x,
-        load=found.load,
-        ordinate=solver.shape.ordinate(found.x),
-        **solver.energies(found.x)._asdict(),
-        stretch=solver.shape.stretch(found.x),
-    )
 
 
 def arms(solver: BranchSolver, gap: Gap) -> list[Point]:

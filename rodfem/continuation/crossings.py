@@ -16,14 +16,14 @@ is regular.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 
-from rodfem.stability.reduced_stiffness import ReducedStiffness, negative
+from rodfem.stability.reduced_stiffness import negative
 
 AXIS = 0.15
 """Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
@@ -43,7 +43,7 @@ class Node:
     H: np.ndarray
     slope: np.ndarray
     far: int
-    kept: object = None
+    kept: Any = None
 
     @property
     def index(self) -> int:
@@ -102,8 +102,13 @@ def at(a: Node, b: Node, t: float) -> np.ndarray:
     return A[0] + t * (A[1] + t * (A[2] + t * A[3]))
 
 
-def crossings(a: Node, b: Node, solve: Callable[[Node, Node, float], Node | None], depth: int = 0) -> list[Crossing]:
-    """All crossings between two nodes; ``solve`` makes a node between two others."""
+def crossings(
+    a: Node, b: Node, solve: Callable[[Node, Node, float], Node | None], misses: list[Node], depth: int = 0
+) -> list[Crossing]:
+    """All crossings between two nodes; ``solve`` makes a node between two others.
+
+    ``misses`` gets nodes at which an eigenvalue is nearly zero, and does not pass it.
+    """
     h = b.s - a.s
     if a.far == b.far and clear(a, b):
         return []
@@ -121,7 +126,11 @@ def crossings(a: Node, b: Node, solve: Callable[[Node, Node, float], Node | None
     if ask is not None and depth < DEEPEST and h > CLOSE:
         middle = solve(a, b, a.s + ask * h)
         if middle is not None:
-            return crossings(a, middle, solve, depth + 1) + crossings(middle, b, solve, depth + 1)
+            known = len(misses)
+            out = crossings(a, middle, solve, misses, depth + 1) + crossings(middle, b, solve, misses, depth + 1)
+            if not out and a.far == b.far and len(misses) == known:
+                misses.append(middle)
+            return out
     out, index = [], a.index
     for group in np.split(real, np.flatnonzero(np.diff(real) * h > CLOSE) + 1) if len(real) else []:
         t = float(group.mean())

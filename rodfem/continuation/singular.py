@@ -66,8 +66,9 @@ class SingularState:
 
     Relative to the metric, as eigenvalues are: the unfolding parameters ``beta`` (k,) are an eigenvalue times an
     amplitude in radian, ``noise`` is the round-off of their size.  ``directions`` are those of the two branches that
-    cross at a branch point with one null vector, unit vectors; ``rate`` is the derivative of the eigenvalue, the mean
-    of several, with the load along the response to it, and ``moved`` the last change of the load.
+    cross at a branch point with one null vector, unit vectors.  ``response`` is the change of state with the load, the
+    null vectors left out, ``rate`` the derivative of the eigenvalue along it, and ``spread`` what several eigenvalues,
+    whose mean vanishes, differ from that; ``moved`` is the last change of the load.
     """
 
     x: PETSc.Vec
@@ -78,12 +79,25 @@ class SingularState:
     noise: float
     directions: list[PETSc.Vec]
     rate: float
+    spread: float
     moved: float
 
     @property
     def size(self) -> float:
         """Size of the unfolding parameters."""
         return float(np.linalg.norm(self.beta))
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What a Newton step finds on its way: as in :class:`SingularState`, and the ``table`` of the reduced equation."""
+
+    null: list[PETSc.Vec]
+    response: PETSc.Vec
+    beta: np.ndarray
+    table: np.ndarray
+    rate: float
+    spread: float
 
 
 class SingularSystem:
@@ -112,12 +126,12 @@ class SingularSystem:
                 return None
             x.axpy(1.0, step)
             if size < TOLERANCE or (size < STALLED and size > 0.5 * before):
-                return self._state(x, abs(system.scalar(x) - load), *made)
+                return self._state(x, abs(system.scalar(x) - load), made)
             before = size
         return None
 
-    def _step(self, x: PETSc.Vec) -> tuple[PETSc.Vec, tuple[np.ndarray, list[PETSc.Vec], PETSc.Vec, np.ndarray]]:
-        """Newton's step; beta, null vectors, response to the load and the small table after it."""
+    def _step(self, x: PETSc.Vec) -> tuple[PETSc.Vec, _Made]:
+        """Newton's step, and what else is known then."""
         system, m = self.system, len(self.psi)
         found = self.inertia.at(x)
         if self._bordered is None:
@@ -136,38 +150,31 @@ class SingularSystem:
         null = [combine(V, z) for z in Z.T]
         r, bend = self._differences(x, w, DIFFERENCE / system.norm(w), null, equations)
         y = [self._differences(x, v, DIFFERENCE, [v])[0][0] for v in null]
-        k = Z.shape[1]
-        along = [[w, *V]] * 1  # the vectors that the unknowns multiply
-        by = along[0]
         rows, right = [], []
-        for n in (np.eye(m) if self.fold else N.T):
+        for n in np.eye(m) if self.fold else N.T:
             rows.append([n @ b, *(n @ G)])
             right.append(-(n @ c))
-        for i in range(0 if self.fold else k):
-            rows.append([bend.dot(null[i]), *(u.dot(r[i]) for u in V)])
-            right.append(Z[:, i] @ b - s.dot(r[i]))
-        trace = [sum(v.dot(image) for v, image in zip(null, r, strict=True)), *(sum(u.dot(z) for z in y) for u in V)]
-        rows.append(trace)
+        for z, v, image in () if self.fold else zip(Z.T, null, r, strict=True):
+            rows.append([bend.dot(v), *(u.dot(image) for u in V)])
+            right.append(z @ b - s.dot(image))
+        rate = sum(v.dot(image) for v, image in zip(null, r, strict=True))
+        rows.append([rate, *(sum(u.dot(image) for image in y) for u in V)])
         right.append(np.trace(Z.T @ G @ Z) - sum(s.dot(image) for image in y))
         table, known = np.array(rows), np.array(right)
         size = np.maximum(abs(table).max(axis=1), TINY)
         share = np.linalg.lstsq(table / size[:, None], known / size, rcond=FREE)[0]
-        step = combine([s, *by], np.array([1.0, *share]))
-        beta = Z.T @ (c + share[0] * b + G @ share[1:])
-        # the response to the load with the modes near by relaxed, and what the null vectors do with it
-        relaxed = w
-        if N.shape[1]:
-            xi = N @ np.linalg.lstsq(N.T @ G @ N, -(N.T @ b), rcond=FREE)[0]
-            relaxed = combine([w, *V], np.array([1.0, *xi]))
+        step = combine([s, w, *V], np.array([1.0, *share]))
+        inner = Z.T @ G @ Z
+        made = _Made(
+            null,
+            combine([w, *V], np.array([1.0, *(N @ _relaxed(N.T @ G @ N, -(N.T @ b)))])),
+            Z.T @ (c + share[0] * b + G @ share[1:]),
+            np.array([[bend.dot(null[0]), null[0].dot(r[0])], [null[0].dot(r[0]), null[0].dot(y[0])]]),
+            rate / len(null),
+            float(np.linalg.norm(inner - np.trace(inner) / len(null) * np.eye(len(null)), 2)),
+        )
         self.Z = Z
-        small = np.zeros((2, 2))
-        if k == 1 and not self.fold:
-            cross = relaxed.dot(r[0]) if N.shape[1] else None
-            slope = null[0].dot(r[0])
-            small = np.array([[bend.dot(null[0]), slope], [slope, null[0].dot(y[0])]])
-            del cross
-        rate = trace[0] / k
-        return step, (beta, null, relaxed, small, rate)
+        return step, made
 
     def _split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The modes that are to vanish, and the others: eigenvectors of G, by what they have of the last ones."""
@@ -178,22 +185,14 @@ class SingularSystem:
         order = np.argsort(-np.linalg.norm(self.Z.T @ vectors, axis=0))
         return vectors[:, order[:k]], vectors[:, order[k:]]
 
-    def _state(
-        self,
-        x: PETSc.Vec,
-        moved: float,
-        beta: np.ndarray,
-        null: list[PETSc.Vec],
-        response: PETSc.Vec,
-        table: np.ndarray,
-        rate: float,
-    ) -> SingularState:
-        matrix = self.inertia.at(x).matrix
+    def _state(self, x: PETSc.Vec, moved: float, made: _Made) -> SingularState:
+        matrix, null = self.inertia.at(x).matrix, [v.copy() for v in made.null]
         noise = NOISE * max(rounding(matrix, v, x) for v in null) + LEAST * self.inertia.scale
-        directions = self._directions(response, null[0], table) if table.any() else []
-        null = [v.copy() for v in null]
+        simple = len(null) == 1 and not self.fold
+        directions = self._directions(made.response, null[0], made.table) if simple else []
         orthonormalize(null, self.inertia.metric)
-        return SingularState(x, self.system.scalar(x), null, response, beta, noise, directions, rate, moved)
+        load = self.system.scalar(x)
+        return SingularState(x, load, null, made.response, made.beta, noise, directions, made.rate, made.spread, moved)
 
     def _directions(self, w: PETSc.Vec, v: PETSc.Vec, table: np.ndarray) -> list[PETSc.Vec]:
         """Unit directions ``xi V + dlam (w, 1)`` with ``a xi^2 + 2 b xi dlam + c dlam^2 = 0``, the reduced equation."""
@@ -229,3 +228,8 @@ class SingularSystem:
                 bend.axpy(1.0 / h**2, there)
                 bend.axpy(-1.0 / h**2, equations)
         return out, bend
+
+
+def _relaxed(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Amplitudes of modes near by under forces, those that nothing holds left at rest."""
+    return np.linalg.lstsq(matrix, right, rcond=FREE)[0] if len(right) else right

@@ -28,11 +28,15 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.matrices import shared
 from rodfem.stability.bordered import Bordered
+from rodfem.stability.round_off import quotient_error
 
 NEAR = 1e-3
 """Eigenvalue of H, over the lowest bending one, below which S is too near singular to be solved with."""
+SOFT = 1e-6
+"""Eigenvalue of H, over the lowest bending one, below which it may be round-off."""
 DIFFERENCE = 1e-4
 """Distance of the states whose matrices are differenced, in the metric."""
 ROTATED = 1.0
@@ -45,7 +49,8 @@ MODES = 6
 class ReducedStiffness:
     """H of a state with a border, ``rate`` its derivative along the unit tangent, both (k, k), and W (n, k).
 
-    ``far`` is the index across the border, ``rotated`` how far the amplitudes are from those of the border's modes.
+    ``far`` is the index across the border, ``rotated`` how far the amplitudes are from those of the border's modes, and
+    eigenvalues within the ``doubt`` are zero to what round-off and Newton's method leave of them.
     """
 
     H: np.ndarray
@@ -53,6 +58,12 @@ class ReducedStiffness:
     far: int
     W: np.ndarray
     rotated: float
+    doubt: float
+
+    @property
+    def zero(self) -> int:
+        """Number of eigenvalues that are zero to working accuracy."""
+        return int((abs(np.linalg.eigvalsh(self.H)) <= self.doubt).sum())
 
     @property
     def index(self) -> int:
@@ -100,8 +111,13 @@ class Condensation:
         else:
             H = _symmetric(H)
             far, W = below - negative(H), Z @ H
+        values, vectors = np.linalg.eigh(H)
+        soft = int(abs(values).argmin())
+        doubt = TOLERANCE * inertia.scale
+        if abs(values[soft]) < SOFT * inertia.scale:
+            doubt = max(doubt, quotient_error(inertia.at(x).matrix, self.vector(W @ vectors[:, soft])))
         rotated = float(np.linalg.norm(inertia.sum(W.T @ inertia.weighed(W)) - np.eye(W.shape[1]), 2))
-        return ReducedStiffness(H, self._rate(x, tangent, W), far, W, rotated)
+        return ReducedStiffness(H, self._rate(x, tangent, W), far, W, rotated, doubt)
 
     def _by_the_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
         """``far``, H and W where S is nearly singular, or is."""
@@ -110,7 +126,7 @@ class Condensation:
         if k not in self._bordered:
             self._bordered[k] = Bordered(self.system, matrix, k, self.inertia.constraints)
         bordered = self._bordered[k]
-        far = bordered.factor(matrix, [self._vector(B[:, j]) for j in range(k)])
+        far = bordered.factor(matrix, [self.vector(B[:, j]) for j in range(k)])
         solved = [bordered.solve(None, e) for e in np.eye(k)]
         H = -np.array([g for _, g in solved])
         return far, _symmetric(H), np.stack([w.array_r for w, _ in solved], axis=1)
@@ -139,17 +155,17 @@ class Condensation:
         known = shared(self.inertia.matrix)
         if known is not None:
             return np.asarray(known.matrix @ columns)
-        return np.stack([(self.inertia.matrix * self._vector(c)).array_r for c in columns.T], axis=1)
+        return np.stack([(self.inertia.matrix * self.vector(c)).array_r for c in columns.T], axis=1)
 
     def _columns(self, B: np.ndarray) -> np.ndarray:
         out = []
         for column in B.T:
             y = self.system.new_vector()
-            self.inertia.factors.solve(self._vector(column), y)
+            self.inertia.factors.solve(self.vector(column), y)
             out.append(y.array_r.copy())
         return np.stack(out, axis=1)
 
-    def _vector(self, own: np.ndarray) -> PETSc.Vec:
+    def vector(self, own: np.ndarray) -> PETSc.Vec:
         out = self.system.new_vector()
         out.array[:] = own
         return out
