@@ -32,15 +32,15 @@ from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import Found, nearest_event, noise_of
-from rodfem.continuation.interpolant import Node
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import NEAREST, WINDOW, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
+from rodfem.continuation.singular import SingularSystem
+from rodfem.continuation.singular_points import load_uncertainty
 from rodfem.continuation.states_between import STEADY, Curve, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, halved, richer_system
-from rodfem.linalg.orthogonal import combine
+from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event
 from rodfem.tolerances import ROUND_OFF, round_off
 
@@ -52,8 +52,8 @@ RESOLVED_TO = 0.1
 order of which errors of loads are, is one per cent."""
 RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
-NARROW = 1 / 128
-"""Part of the usual window on which a special point is located again."""
+WINDOW = 0.02
+"""Half length, in the metric, of the piece of a branch on which an event is expected again."""
 REACH = 0.2
 """Distance along the branch, in the metric, to which an event is sought whose function receives more places."""
 
@@ -214,53 +214,29 @@ class Enriched:
             ) from trouble
 
     def _located(self, special: SpecialPoint) -> Again:
-        """The fold or branch point on the richer discretisation, and its ordinate."""
-        solver, point = self.solver, special.point
-        if point.tangent is None:
-            raise ConvergenceError("the branch has no tangent there")
-        x = self.transfer(point.x, state=True)
-        tangent = self.transfer(point.tangent, state=False)
-        mode = self.transfer(special.null_vectors[0], state=False)
-        mode.scale(1.0 / self.system.norm(mode))
-        curve = _straight(x, tangent)
-        # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
-        test_function = "mu" if special.kind == FOLD and point.arclength > NEAREST else special.test_function
-        # a pitchfork on one of its sides is passed where the bordered matrix is singular: the nearer the nodes lie to
-        # it, the fewer digits their loads have
-        narrow = NARROW if test_function == "mu" else 1.0
-        try:
-            found = refine(solver, curve, 0.0, narrow * WINDOW, mode, test_function, beside=point.load)
-        except ConvergenceError:  # it lies farther away
-            found = refine(solver, curve, 0.0, WINDOW, mode, test_function, beside=point.load)
-        settled, moved = self._settled(found.nodes, curve)
-        ordinate = solver.shape.ordinate(settled)
-        slope = ordinate_along(solver, found.x, found.tangent)
-        left = abs(slope) * found.along + STEADY * moved + round_off(ordinate, self.solver.units.ordinate)
-        sharp, indicator = solver.inertia.held.sharpened(mode), self._indicators[1]  # by the factors of a state nearby
+        """The fold or branch point on the richer discretisation, and its ordinate: the same singular system."""
+        solver, point, metric = self.solver, special.point, self.solver.inertia.metric
+        x, k = self.transfer(point.x, state=True), special.multiplicity
+        modes = [self.transfer(v, state=False) for v in (*special.null_vectors, *special.nearby)]
+        orthonormalize(modes, metric)
+        opposite = special.test_function == "mu" and special.negative_before == special.negative_after
+        critical = np.eye(len(modes))[:, : 1 if opposite else k]
+        found = SingularSystem(solver, modes, critical, fold=special.kind == FOLD).solve(x)
+        if found is None:
+            raise ConvergenceError(f"the richer discretisation has no such point near load {point.load:.8g}")
+        ordinate, units = solver.shape.ordinate(found.x), solver.units
+        moved = max(abs(solver.shape.ordinate(found.x + found.last * sign) - ordinate) for sign in (-1.0, 1.0))
+        uncertain = 0.0 if special.kind == FOLD else load_uncertainty(solver, found)
+        load_left = uncertain + round_off(found.load, units.load)
+        left = STEADY * moved + round_off(ordinate, units.ordinate)
+        relaxed, indicator = [v.copy() for v in found.modes], self._indicators[1]
+        orthonormalize(relaxed, metric)
+        sharp = combine(relaxed, np.array([(metric * v).dot(modes[0]) for v in relaxed]))
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
-        changed = max(indicator.changed(x, found.x, state=True), indicator.changed(mode, sharp, state=False))
-        self.origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
-        ordinate_error = self._ordinate(point.x, settled, left, rho)
-        return Again(found.x, found.load, ordinate, found.uncertainty, left, ordinate_error, rho, changed)
-
-    def _settled(self, nodes: Sequence[Node], curve: Curve) -> tuple[PETSc.Vec, float]:
-        """A state between ``nodes`` on a curve after more steps of Newton's method at each.
-
-        Also the size of what yet more of them, which are round-off, move its ordinate by.  An ordinate may have its
-        least value there: both directions are tried.
-        """
-        solver, weights, states, left = self.solver, [node.weight for node in nodes], [], []
-        for node in nodes:
-            row = solver.row(curve(node.s)[1])
-            states.append(stepped(solver, node.x, row))
-            left.append(stepped(solver, states[-1], row) - states[-1])
-        x = combine(states, np.array(weights))
-        here = solver.shape.ordinate(x)
-        moved = [
-            max(abs(solver.shape.ordinate(x + step * (sign * weight)) - here) for sign in (-1.0, 1.0))
-            for step, weight in zip(left, weights, strict=True)
-        ]
-        return x, float(sum(moved))
+        changed = max(indicator.changed(x, found.x, state=True), indicator.changed(modes[0], sharp, state=False))
+        self.origins.append((special, Origin(found.x, found.load, ordinate, load_left, left), rho))
+        ordinate_error = self._ordinate(point.x, found.x, left, rho)
+        return Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed)
 
 
 def _noise_beside(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec) -> float:

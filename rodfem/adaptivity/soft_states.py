@@ -24,11 +24,11 @@ from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.corrector import NEAR
-from rodfem.continuation.locate import across
 from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
+from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL
 from rodfem.stability.motion_names import SHARE, MotionNames
 from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
@@ -96,7 +96,7 @@ class SoftStates:
         """Soft modes at a special point that are none of its null vectors, with their round-off on this mesh alone."""
         x, system = special.point.x, self.solver.system
         near = near_zero(self.solver.inertia.at(x))
-        kept = [i for i, v in enumerate(near.vectors) if across(system, [v], special.null_vectors)]
+        kept = [i for i, v in enumerate(near.vectors) if across(system.metric, [v], special.null_vectors)]
         names = self.names(x, [near.vectors[i] for i in kept])
         return [
             SoftMode(name, float(near.values[i]), float(near.uncertainty[i]))
@@ -169,7 +169,7 @@ class SoftStates:
 
     def _zero(self, near: NearZero, vanishing: Sequence[PETSc.Vec]) -> list[bool]:
         """Whether each of some eigenvalues is one of the null vectors that are ``vanishing``."""
-        return [not across(self.solver.system, [v], vanishing) for v in near.vectors]
+        return [not across(self.solver.system.metric, [v], vanishing) for v in near.vectors]
 
     def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
         """Eigenvalues without that of the branch itself, a family of equilibria at one load."""
@@ -288,7 +288,7 @@ def _nearest(
     found.count()
     with solver.inertia.afresh():
         nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
-    vectors = [v for v in nearest if across(solver.system, [v], still)][:number]
+    vectors = [v for v in nearest if across(solver.system.metric, [v], still)][:number]
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale
     rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])

@@ -173,8 +173,8 @@ class SpecialPoint:
         Index on either side, in order of arclength.
     located_to
         Uncertainty of the load for the given mesh.
-    null_vectors
-        Vectors of metric norm 1, one for each eigenvalue that vanishes.
+    null_vectors, nearby
+        Vectors of metric norm 1, one for each eigenvalue that vanishes; and those of others that are nearly zero there.
     coupling
         Cosine between the null vector and the derivative of the equations in the load: zero at a branch point, not at a
         fold.
@@ -211,6 +211,7 @@ class SpecialPoint:
     negative_after: int
     located_to: float
     null_vectors: list[PETSc.Vec] = field(default_factory=list)
+    nearby: list[PETSc.Vec] = field(default_factory=list)
     coupling: float = 0.0
     error_estimate: float = float("nan")
     ordinate_error: float = float("nan")

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,8 +30,10 @@ AXIS = 0.15
 """Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
 DEEPEST = 8
 """Divisions of a piece."""
-CLOSE = 1e-8
-"""Length of a piece, in the metric, within which crossings are one point."""
+SHORTEST = 1e-8
+"""Length of a piece, in the metric, that is not divided."""
+SAME, ALIKE = 1e-12, 0.9
+"""Distance of crossings, in the metric, that are one; cosine of the modes of different ones, at most."""
 REAL = 1e-6
 """Imaginary part of a root that is real."""
 
@@ -98,16 +101,28 @@ def roots(a: Node, b: Node) -> np.ndarray:
 
 
 def at(a: Node, b: Node, t: float) -> np.ndarray:
+    """The cubic at t."""
     A = coefficients(a, b)
-    return A[0] + t * (A[1] + t * (A[2] + t * A[3]))
+    return np.asarray(A[0] + t * (A[1] + t * (A[2] + t * A[3])))
+
+
+def rate(a: Node, b: Node, t: float) -> np.ndarray:
+    """Its derivative in t."""
+    A = coefficients(a, b)
+    return np.asarray(A[1] + t * (2 * A[2] + 3 * t * A[3]))
 
 
 def crossings(
-    a: Node, b: Node, solve: Callable[[Node, Node, float], Node | None], misses: list[Node], depth: int = 0
+    a: Node,
+    b: Node,
+    solve: Callable[[Node, Node, float], Node | None],
+    tolerance: float,
+    misses: list[Node],
+    depth: int = 0,
 ) -> list[Crossing]:
     """All crossings between two nodes; ``solve`` makes a node between two others.
 
-    ``misses`` gets nodes at which an eigenvalue is nearly zero, and does not pass it.
+    Eigenvalues of several modes that are within the ``tolerance`` of zero at one place pass it there.  ``misses`` gets nodes at which an eigenvalue is nearly zero, and does not pass it.
     """
     h = b.s - a.s
     if a.far == b.far and clear(a, b):
@@ -115,29 +130,47 @@ def crossings(
     found = roots(a, b)
     real = np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)])
     near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0.02) & (found.real < 0.98)]
+    groups = together(a, b, real, tolerance)
     ask = None
     if a.far != b.far:
         ask = 0.47
-    elif len(real) > 1 and (gaps := np.diff(real)).max() * h > CLOSE:
-        i = int(gaps.argmax())
-        ask = float(np.clip((real[i] + real[i + 1]) / 2, 0.01, 0.99))
+    elif len(groups) > 1:
+        gaps = [q[0] - p[-1] for p, q in pairwise(groups)]
+        i = int(np.argmax(gaps))
+        ask = float(np.clip((groups[i][-1] + groups[i + 1][0]) / 2, 0.01, 0.99))
     elif len(near):
         ask = float(near[abs(near.imag).argmin()].real)
-    if ask is not None and depth < DEEPEST and h > CLOSE:
+    if ask is not None and depth < DEEPEST and h > SHORTEST:
         middle = solve(a, b, a.s + ask * h)
         if middle is not None:
             known = len(misses)
-            out = crossings(a, middle, solve, misses, depth + 1) + crossings(middle, b, solve, misses, depth + 1)
+            out = sum((crossings(*ends, solve, tolerance, misses, depth + 1) for ends in ((a, middle), (middle, b))), [])
             if not out and a.far == b.far and len(misses) == known:
                 misses.append(middle)
             return out
     out, index = [], a.index
-    for group in np.split(real, np.flatnonzero(np.diff(real) * h > CLOSE) + 1) if len(real) else []:
-        t = float(group.mean())
+    for group in groups:
+        t = float(np.mean(group))
         values, vectors = np.linalg.eigh(at(a, b, t))
         own = vectors[:, np.argsort(abs(values))[: len(group)]]
-        H1 = sum(j * c * t ** (j - 1) for j, c in enumerate(coefficients(a, b)) if j)
-        change = -int(np.sign(np.linalg.eigvalsh(own.T @ H1 @ own)).sum())
+        change = -int(np.sign(np.linalg.eigvalsh(own.T @ rate(a, b, t) @ own)).sum())
         out.append(Crossing(a.s + t * h, own, index, index + change, (a, b)))
         index += change
+    return out
+
+
+def together(a: Node, b: Node, places: np.ndarray, tolerance: float) -> list[list[float]]:
+    """Places of crossings in order, those of different modes grouped that are one point within the ``tolerance``."""
+    out: list[list[float]] = []
+    last: tuple[np.ndarray, float] | None = None
+    for t in places.tolist():
+        values, vectors = np.linalg.eigh(at(a, b, t))
+        v = vectors[:, abs(values).argmin()]
+        speed = abs(float(v @ rate(a, b, t) @ v))
+        near = last is not None and (t - out[-1][-1]) * max(speed, last[1]) <= tolerance
+        if near and (abs(v @ last[0]) < ALIKE or (t - out[-1][-1]) * (b.s - a.s) < SAME):
+            out[-1].append(t)
+        else:
+            out.append([t])
+        last = v, speed
     return out

@@ -9,7 +9,6 @@ unseen, or a number is wrong.  A branch keeps the breaks that no smaller step ex
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 
@@ -17,37 +16,6 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.kinds import BRANCH_POINT
 
 Interval = tuple[int, int]
-
-
-@dataclass(frozen=True)
-class Row:
-    """A point of a branch with the least and the greatest index compatible with its smallest eigenvalues."""
-
-    point: Point
-    low: int
-    high: int
-
-    @property
-    def decided(self) -> bool:
-        """Whether its index is known."""
-        return self.low == self.high
-
-    def crossing(self, other: Row) -> list[int]:
-        """Numbers of the eigenvalues that have changed sign between two rows; one that is zero at either has not."""
-        return list(range(self.high, other.low)) or list(range(other.high, self.low))
-
-
-def chained(low: int, high: int, specials: Sequence[SpecialPoint], last_low: int, last_high: int) -> bool:
-    """Whether special points in order lead from an index between ``low`` and ``high`` to one between the others.
-
-    The index is between ``low`` and ``high`` before the ``specials``, and between ``last_low`` and ``last_high`` after
-    them.
-    """
-    intervals = [(low, high)]
-    for special in specials:
-        intervals += [(special.negative_before,) * 2, (special.negative_after,) * 2]
-    intervals.append((last_low, last_high))
-    return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(intervals[::2], intervals[1::2], strict=True))
 
 
 def breaks(points: Sequence[Point], specials: Sequence[SpecialPoint], begins: int | None = None) -> list[Unexplained]:

@@ -53,6 +53,11 @@ class Piece:
         """Take the amplitudes ``still`` (k, m), along which eigenvalues are zero all along, out of nodes made from now on."""
         self.moving = np.linalg.svd(still)[0][:, still.shape[1] :]
 
+    @property
+    def still(self) -> int:
+        """Number of amplitudes that were left out."""
+        return self.moving.shape[0] - self.moving.shape[1]
+
     def place(self, x: PETSc.Vec) -> float:
         """Where a state is."""
         return float(self.row.dot(x - self.origin))

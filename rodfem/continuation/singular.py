@@ -47,7 +47,7 @@ DIFFERENCE = 1e-4
 """Step of the differences, in the metric."""
 ITERATIONS = 10
 """Newton steps."""
-STALLED = 1e-7
+STALLED = 1e-6
 """Below this, in the metric, a step that no longer shrinks is round-off."""
 FARTHEST = 0.5
 """A point farther than this from where it is expected, in the metric, is another one."""
@@ -56,7 +56,7 @@ NOISE = 100.0
 round-off."""
 LEAST = 1e-15
 """Round-off of ``beta`` where all of these vanish, over the lowest bending eigenvalue."""
-FREE = 1e-9
+FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown: a family moves freely."""
 
 
@@ -68,7 +68,8 @@ class SingularState:
     amplitude in radian, ``noise`` is the round-off of their size.  ``directions`` are those of the two branches that
     cross at a branch point with one null vector, unit vectors.  ``response`` is the change of state with the load, the
     null vectors left out, ``rate`` the derivative of the eigenvalue along it, and ``spread`` what several eigenvalues,
-    whose mean vanishes, differ from that; ``moved`` is the last change of the load.
+    whose mean vanishes, differ from that.  ``modes`` are all of the border, relaxed; ``last`` is what Newton's
+    method leaves of the state.
     """
 
     x: PETSc.Vec
@@ -80,7 +81,8 @@ class SingularState:
     directions: list[PETSc.Vec]
     rate: float
     spread: float
-    moved: float
+    modes: list[PETSc.Vec]
+    last: PETSc.Vec
 
     @property
     def size(self) -> float:
@@ -98,6 +100,7 @@ class _Made:
     table: np.ndarray
     rate: float
     spread: float
+    modes: list[PETSc.Vec]
 
 
 class SingularSystem:
@@ -115,7 +118,6 @@ class SingularSystem:
         system, x = self.system, x.copy()
         moved, before = 0.0, np.inf
         for _ in range(ITERATIONS):
-            load = system.scalar(x)
             try:
                 step, made = self._step(x)
             except (ConvergenceError, np.linalg.LinAlgError):
@@ -126,7 +128,8 @@ class SingularSystem:
                 return None
             x.axpy(1.0, step)
             if size < TOLERANCE or (size < STALLED and size > 0.5 * before):
-                return self._state(x, abs(system.scalar(x) - load), made)
+                step.scale(size if size < TOLERANCE else 1.0)  # what quadratic convergence leaves, or round-off
+                return self._state(x, step, made)
             before = size
         return None
 
@@ -160,9 +163,12 @@ class SingularSystem:
         rate = sum(v.dot(image) for v, image in zip(null, r, strict=True))
         rows.append([rate, *(sum(u.dot(image) for image in y) for u in V)])
         right.append(np.trace(Z.T @ G @ Z) - sum(s.dot(image) for image in y))
-        table, known = np.array(rows), np.array(right)
-        size = np.maximum(abs(table).max(axis=1), TINY)
-        share = np.linalg.lstsq(table / size[:, None], known / size, rcond=FREE)[0]
+        # in natural units of eigenvalues and loads: what these do not determine, a free motion, stays as it is
+        one, scale = self.solver.units.load, self.inertia.scale
+        units = np.array([one, *np.ones(m)])
+        size = np.array([scale / (one if i >= m - (0 if self.fold else Z.shape[1]) else 1.0) for i in range(m + 1)])
+        table, known = np.array(rows) * units / size[:, None], np.array(right) / size
+        share = units * np.linalg.lstsq(table, known, rcond=FREE)[0]
         step = combine([s, w, *V], np.array([1.0, *share]))
         inner = Z.T @ G @ Z
         made = _Made(
@@ -172,6 +178,7 @@ class SingularSystem:
             np.array([[bend.dot(null[0]), null[0].dot(r[0])], [null[0].dot(r[0]), null[0].dot(y[0])]]),
             rate / len(null),
             float(np.linalg.norm(inner - np.trace(inner) / len(null) * np.eye(len(null)), 2)),
+            V,
         )
         self.Z = Z
         return step, made
@@ -185,14 +192,15 @@ class SingularSystem:
         order = np.argsort(-np.linalg.norm(self.Z.T @ vectors, axis=0))
         return vectors[:, order[:k]], vectors[:, order[k:]]
 
-    def _state(self, x: PETSc.Vec, moved: float, made: _Made) -> SingularState:
+    def _state(self, x: PETSc.Vec, step: PETSc.Vec, made: _Made) -> SingularState:
         matrix, null = self.inertia.at(x).matrix, [v.copy() for v in made.null]
         noise = NOISE * max(rounding(matrix, v, x) for v in null) + LEAST * self.inertia.scale
         simple = len(null) == 1 and not self.fold
         directions = self._directions(made.response, null[0], made.table) if simple else []
         orthonormalize(null, self.inertia.metric)
         load = self.system.scalar(x)
-        return SingularState(x, load, null, made.response, made.beta, noise, directions, made.rate, made.spread, moved)
+        rest = made.rate, made.spread, made.modes, step
+        return SingularState(x, load, null, made.response, made.beta, noise, directions, *rest)
 
     def _directions(self, w: PETSc.Vec, v: PETSc.Vec, table: np.ndarray) -> list[PETSc.Vec]:
         """Unit directions ``xi V + dlam (w, 1)`` with ``a xi^2 + 2 b xi dlam + c dlam^2 = 0``, the reduced equation."""

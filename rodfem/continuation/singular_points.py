@@ -20,7 +20,7 @@ from rodfem.continuation.piece import Piece
 from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
-from rodfem.linalg.orthogonal import combine, orthonormalize
+from rodfem.linalg.orthogonal import across, combine, orthonormalize
 from rodfem.stability.inertia import Index
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
 from rodfem.tolerances import round_off
@@ -55,24 +55,30 @@ def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> f
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 
 
+@dataclass(frozen=True)
+class Change:
+    """Index ``before`` and ``after`` a singular state, ``negative`` at it, and how many eigenvalues stay zero all along."""
+
+    before: int
+    after: int
+    negative: int
+    still: int = 0
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """Where a singular state is expected: ``x``, ``slope`` of the branch, modes near zero, and those that vanish.
 
-    These are the combinations ``critical`` (m, k) of the ``modes``.  The index is ``before`` and ``after`` it,
-    where ``negative`` eigenvalues are left, and ``still`` are zero all along, and ``length`` is that of the piece.  At a ``crossing`` eigenvalues pass zero;
-    otherwise they touch it.
+    These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece.  At a ``crossing``
+    eigenvalues pass zero; otherwise they touch it.
     """
 
     x: PETSc.Vec
     slope: PETSc.Vec
     modes: list[PETSc.Vec]
     critical: np.ndarray
-    before: int
-    after: int
-    negative: int
+    change: Change
     length: float
-    still: int = 0
     crossing: bool = True
 
     @property
@@ -92,7 +98,8 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     modes = _modes(piece.condensation, reduced, own[:, [*order[:count], *near]])
     critical = np.eye(len(modes))[:, :count]
     negative = crossing.before - (count + crossing.before - crossing.after) // 2
-    return Candidate(x, slope, modes, critical, crossing.before, crossing.after, negative, q.s - p.s)
+    change = Change(crossing.before, crossing.after, negative, piece.still)
+    return Candidate(x, slope, modes, critical, change, q.s - p.s)
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
@@ -107,7 +114,8 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     zero[abs(values).argmin()] = True
     negative = reduced.far + int((values[~zero] < 0).sum())
     modes = _modes(condensation, reduced, own[:, zero])
-    return Candidate(x, slope, modes, np.eye(len(modes)), p.index, p.index, negative, q.s - p.s, crossing=False)
+    change = Change(p.index, p.index, negative, piece.still)
+    return Candidate(x, slope, modes, np.eye(len(modes)), change, q.s - p.s, crossing=False)
 
 
 def _unit(solver: BranchSolver, direction: PETSc.Vec) -> PETSc.Vec:
@@ -123,9 +131,8 @@ def _modes(condensation: Condensation, reduced: ReducedStiffness, vectors: np.nd
 
 def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState | None:
     """The singular state of a candidate; None where there is none near by."""
-    critical = at.critical
-    if at.crossing and abs(at.after - at.before) < critical.shape[1]:  # opposite ones have no trace that vanishes
-        critical = critical[:, :1]
+    opposite = at.crossing and abs(at.change.after - at.change.before) < at.critical.shape[1]  # they have no trace that vanishes
+    critical = at.critical[:, :1] if opposite else at.critical
     found = SingularSystem(solver, at.modes, critical, fold=fold).solve(at.x)
     if found is not None and solver.system.distance(found.x, at.x) > STRAYED * at.length:
         return None
@@ -133,37 +140,46 @@ def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState 
 
 
 def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bool) -> SpecialPoint:
-    """Special point at a singular state, with its index, null vectors and tangent."""
-    solver, system = piece.solver, piece.solver.system
-    x, null = found.x, found.vectors
-    if len(at.critical.T) > len(null):
-        null = at.null
-        orthonormalize(null, solver.inertia.metric)
-    count = len(null)
-    tangent = _tangent(solver, at, found, fold=fold)
+    """Special point at the singular state ``found`` of a candidate."""
+    place = piece.begin + piece.place(found.x)
+    special = singular_point(piece.solver, found, place, at.slope, at.change, fold=fold)
+    if at.critical.shape[1] > len(found.vectors):  # opposite crossings, of which one was solved for
+        special.null_vectors += special.nearby[: at.critical.shape[1] - len(found.vectors)]
+        special.nearby = special.nearby[at.critical.shape[1] - len(found.vectors) :]
+        special.point.zero = piece.solver.system.phase.count + special.multiplicity + at.change.still
+    return special
+
+
+def singular_point(
+    solver: BranchSolver, found: SingularState, arclength: float, slope: PETSc.Vec, change: Change, *, fold: bool
+) -> SpecialPoint:
+    """Special point at a singular state of a branch that has about that ``slope``: null vectors, index and tangent."""
+    system, x, null = solver.system, found.x, found.vectors
+    tangent = _tangent(solver, slope, found, fold=fold)
     system.set_phase(x)
-    index = Index(at.negative, system.phase.count + count + at.still)
-    point = solver.point(x, piece.begin + piece.place(x), tangent, index=index)
-    matrix = solver.inertia.at(x)
-    doubt = max(matrix.noise(v) for v in null)
-    left = found.moved + (0.0 if fold else (doubt + found.spread) / abs(found.rate) if found.rate else 0.0)
-    special = SpecialPoint(
-        FOLD if fold else BRANCH_POINT,
-        point,
-        at.before,
-        at.after,
-        left + round_off(point.load, solver.units.load),
-        null,
-        max(coupling_of(solver, x, v) for v in null),
-    )
+    index = Index(change.negative, system.phase.count + len(null) + change.still)
+    point = solver.point(x, arclength, tangent, index=index)
+    left = (0.0 if fold else load_uncertainty(solver, found)) + round_off(point.load, solver.units.load)
+    coupling = max(coupling_of(solver, x, v) for v in null)
+    nearby = across(solver.inertia.metric, found.modes, null)
+    kind, changes = FOLD if fold else BRANCH_POINT, (change.before, change.after)
+    special = SpecialPoint(kind, point, *changes, left, null, nearby, coupling)
     special.unfolding = float("nan") if fold else found.size
     special.test_function = "slope" if fold else "mu"
     return special
 
 
-def _tangent(solver: BranchSolver, at: Candidate, found: SingularState, *, fold: bool) -> PETSc.Vec:
+def load_uncertainty(solver: BranchSolver, found: SingularState) -> float:
+    """Uncertainty of the load of a branch point, by round-off and by what several eigenvalues differ."""
+    matrix = solver.inertia.at(found.x)
+    doubt = max(matrix.noise(v) for v in found.vectors) + found.spread
+    moved = abs(solver.system.scalar(found.last))
+    return moved + (doubt / abs(found.rate) if abs(found.rate) * abs(found.load) > doubt else 0.0)
+
+
+def _tangent(solver: BranchSolver, slope: PETSc.Vec, found: SingularState, *, fold: bool) -> PETSc.Vec:
     """Unit tangent of the branch at a singular state, nearest to the slope that is expected."""
-    system, row = solver.system, solver.row(at.slope)
+    system, row = solver.system, solver.row(slope)
     if fold and len(found.vectors) == 1:
         known = [found.vectors[0].copy()]
     elif found.directions:
@@ -171,7 +187,7 @@ def _tangent(solver: BranchSolver, at: Candidate, found: SingularState, *, fold:
     else:
         known = [found.response.copy(), *[v.copy() for v in found.vectors]]
         orthonormalize(known, system.metric)
-    tangent = combine(known, np.array([(system.metric * v).dot(at.slope) for v in known]))
+    tangent = combine(known, np.array([(system.metric * v).dot(slope) for v in known]))
     tangent.scale(1.0 / system.norm(tangent))
     return tangent
 

@@ -9,15 +9,17 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import VERTICAL_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
-from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import NEAREST, WINDOW, refine
-from rodfem.continuation.special_points import LEVEL, special_at
+from rodfem.continuation.singular import SingularSystem
+from rodfem.continuation.singular_points import LEVEL, Change, singular_point
 from rodfem.continuation.states_between import solve_at_load
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
-from rodfem.linalg.orthogonal import project_out
+from rodfem.linalg.orthogonal import across, project_out
+from rodfem.stability.round_off import decide
 from rodfem.tolerances import TINY
 
+NEAREST = 1e-3
+"""Distance of a fold from the branch point that its branch leaves, within which eigenvalues are zero to round-off."""
 FIRST = 0.05
 """Distance of the first point of a branch from the branch point that it leaves; at least it is :data:`NEAREST`."""
 SHORTEST = 1e-4
@@ -226,17 +228,15 @@ def fold_beside(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Ve
         if apart > special.located_to:
             special.note = f"a branch that leaves here turns back in a fold that is {apart:.0e} away in load"
         return None
-    located = refine(
-        solver,
-        lambda s: (special.point.x + direction * s, direction),
-        -NEAREST * odd / (2 * even),
-        WINDOW,
-        special.null_vectors[0],
-        "slope",
-    )
-    fold = special_at(solver, located, solver.system.distance(special.point.x, located.x))
-    fold.kind, fold.test_function = FOLD, "slope"
-    return fold
+    guess = special.point.x + direction * (-NEAREST * odd / (2 * even))
+    mode = special.null_vectors[0].copy()
+    modes = [mode, *across(solver.inertia.metric, special.nearby, [mode])]
+    found = SingularSystem(solver, modes, np.eye(len(modes))[:, :1], fold=True).solve(guess)
+    if found is None:
+        return None
+    index = decide(solver.inertia.at(found.x)).index.negative
+    place, change = solver.system.distance(special.point.x, found.x), Change(index, index, index)
+    return singular_point(solver, found, place, direction, change, fold=True)
 
 
 def _changed(special: SpecialPoint, side: float, begins: int | None, first: Point) -> bool:

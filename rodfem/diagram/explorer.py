@@ -15,7 +15,7 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.reduced import lines
-from rodfem.continuation.special_points import COUPLED, coupling_of
+from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.known import equilibria_at

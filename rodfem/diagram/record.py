@@ -16,12 +16,12 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint, Unexplained
 from rodfem.continuation.kinds import KINDS, Kind
 from rodfem.continuation.normal_form import Origin
-from rodfem.continuation.unfolding import Unfolded
+from rodfem.continuation.singular import SingularState
 from rodfem.fem.natural_order import NaturalOrder
 from rodfem.problem.events import Event
 from rodfem.stability.soft_mode import SoftMode
 
-CLASSES = {c.__name__: c for c in (Branch, Point, SpecialPoint, NormalForm, SoftMode, Unexplained, Unfolded, Origin)}
+CLASSES = {c.__name__: c for c in (Branch, Point, SpecialPoint, NormalForm, SoftMode, Unexplained, SingularState, Origin)}
 """Classes whose objects are recorded, field by field."""
 TAG = "is"
 """Entry of a dictionary that stands for something else: for what."""

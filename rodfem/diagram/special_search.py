@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -159,17 +158,15 @@ class SpecialSearch:
     def _between(self, a: Point, b: Point, *, ended: bool = False) -> list[SpecialPoint]:
         """Special points between two rows, of which those between are singular."""
         piece, p, q = self._nodes(a, b)
-        system = piece.solver.system
         least = min(a.zero, b.zero)
         off = ASIDE * (q.s - p.s)
         p = p if a.zero <= least else piece.solve(p, q, p.s + off) or p
         q = q if b.zero <= least else piece.solve(p, q, q.s - off) or q
-        still = piece.phi.shape[1] - piece.moving.shape[1]
         out: list[SpecialPoint] = []
         pieces = [(p, q)]
         turn = piece.turn(p, q)
         if turn is not None:
-            touch = self._touching(piece, p, q, turn, still, ended=ended)
+            touch = self._touching(piece, p, q, turn, ended=ended)
             if touch is not None:
                 out.append(touch)
                 s = piece.place(touch.point.x)
@@ -179,9 +176,8 @@ class SpecialSearch:
                 pieces += [(right, q)] if right is not None else []
         misses: list[Node] = []
         for begin, end in pieces:
-            for crossing in crossings(begin, end, piece.solve, misses):
-                at = replace(of_crossing(piece, crossing), still=still)
-                special = self._located(piece, at, ended=ended)
+            for crossing in crossings(begin, end, piece.solve, piece.solver.inertia.tolerance, misses):
+                special = self._located(piece, of_crossing(piece, crossing), ended=ended)
                 if special is None:
                     self._steps.ask(a, b)
                     self.observer.warn(missing(a.load, b.load))
@@ -190,14 +186,14 @@ class SpecialSearch:
         return sorted(out, key=lambda special: special.point.arclength)
 
     def _touching(
-        self, piece: Piece, p: Node, q: Node, s: float, still: int, *, ended: bool
+        self, piece: Piece, p: Node, q: Node, s: float, *, ended: bool
     ) -> SpecialPoint | None:
         """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""
         solver, off = piece.solver, ASIDE * (q.s - p.s)
         left, right = piece.solve(p, q, max(s - off, (p.s + s) / 2)), piece.solve(p, q, min(s + off, (s + q.s) / 2))
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
-        at = replace(of_turn(piece, left, right, turn), still=still)
+        at = of_turn(piece, left, right, turn)
         if max(coupling_of(solver, at.x, v) for v in at.null) > CLEARLY:
             return None
         found = solved(solver, at, fold=False)

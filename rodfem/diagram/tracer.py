@@ -9,7 +9,6 @@ from math import isnan
 from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
-from rodfem.adaptivity.missed_points import missed_points
 from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
@@ -469,6 +468,3 @@ class Tracer:
                         self.meshes.richer(special.point.mesh).estimate(special)
                 self.control.label(special)
             self.kinks.error_bars(branch)
-            with self.without(f"Whether special points of {branch.name} are missing was not examined"):
-                for sentence in missed_points(branch, self.meshes):
-                    self.observer.warn(sentence)

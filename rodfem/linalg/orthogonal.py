@@ -62,3 +62,20 @@ def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
     out.set(0.0)
     out.maxpy(list(weights), vectors)
     return out
+
+
+def across(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], known: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
+    """Orthonormal basis in a metric of what ``vectors`` span beside the ``known`` ones, which are orthonormal.
+
+    What is less than half of a vector is round-off, or the error of the vectors: it spans nothing new.
+    """
+    basis, out = list(known), []
+    for vector in vectors:
+        rest = vector.copy()
+        project_out(rest, basis, metric, times=2)
+        size, whole = (float(np.sqrt(max(v.dot(metric * v).real, 0.0))) for v in (rest, vector))
+        if size > 0.5 * whole or not known:
+            rest.scale(1.0 / size)
+            out.append(rest)
+            basis.append(rest)
+    return out

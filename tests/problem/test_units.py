@@ -14,7 +14,7 @@ from rescaled import STEEL, differences, rescaled
 
 import rodfem
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, sliding
-from rodfem.continuation.special_points import coupling_of
+from rodfem.continuation.singular_points import coupling_of
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output import digits
 from rodfem.problem.local_state import Constants
