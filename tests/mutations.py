@@ -178,9 +178,6 @@ FAULTS = {
     "scenes-of-a-loop": Fault(
         "rodfem/fem/system.py", "        check_unchanged(scene)\n", "", "tests/problem/test_unchanged.py"
     ),
-    "rods-by-their-code-alone": Fault(
-        "rodfem/app/code_digest.py", "*_stated(scene), repr(scene.numbers), ", "", "tests/app/test_many.py"
-    ),
     "zeros-beside-the-fastest-motions": Fault(
         "rodfem/stability/frequencies.py",
         "return greatest if self.floating else",
