@@ -48,7 +48,6 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
         "--output": f"folder for files and pictures (default {output})",
         "--no-figures": "draw nothing",
-        "--resume": "go on with a run in that folder that was interrupted; give all other options as before",
     }
     groups: dict[str, dict[str, dict[str, Any]]] = {
         "discretisation": {
@@ -74,7 +73,6 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "output": {
             "--output": {"type": folder, "default": output, "metavar": "DIR"},
             "--no-figures": {"dest": "figures", "action": "store_false"},
-            "--resume": {"action": "store_true"},
         },
     }
     for title, options in groups.items():

@@ -214,7 +214,7 @@ def test_an_interrupt_is_one_sentence(folder: Path) -> None:
     assert child.wait(PATIENCE) == 128 + signal.SIGINT
     text = seen.end()
     assert lines_that_stay(text)[-2:] == [
-        f"interrupted; the branches that were finished are in {folder}: --resume goes on there",
+        f"interrupted; the branches that were finished are in {folder}: rodfem.load reads them",
         "",
     ]
     assert "Traceback" not in text and text.count("\x1b[?25l") == text.count("\x1b[?25h") == 1
