@@ -112,8 +112,7 @@ def _run(
     scene, discretization, plan = statement.scene(**constants), _mesh(mesh, options, constants), plan_of(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
-    figures = options.figures and not options.quick
-    run(scene, discretization, plan, options.output, figures=figures, words=words)
+    run(scene, discretization, plan, options.output, figures=options.figures, words=words)
     if unread := petsc_options.unread(petsc):
         Report().warn(f"PETSc did not read the option {', '.join(unread)}: see whether it is spelled right.")
 

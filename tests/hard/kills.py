@@ -42,7 +42,7 @@ from rodfem.whole_files import DRAFTS
 
 KINDS = {"process": "a single process", "writing": "a single process, while files are written",
          "rank": "one of two ranks", "mpirun": "mpirun itself"}  # fmt: skip
-PROGRAM = ("demos/hemitropic.py", "--no-figures", "--quick", "--depth", "1", "--range", "0", "0.3", "--output")
+PROGRAM = ("demos/hemitropic.py", "--no-figures", "--step", "0.15", "--depth", "1", "--range", "0", "0.3", "--output")
 TURNS = ("process", "writing", "rank", "writing", "process", "writing", "mpirun", "process", "writing", "rank")
 """Kinds of successive tries."""
 LIMIT = 60.0
