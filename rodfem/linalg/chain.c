@@ -718,7 +718,6 @@ PUBLIC void chain_schur(const chain *c, double *out)
         out[(size_t)j * c->rest + i] = c->schur[(size_t)j * c->rest + i] * unscaled(c, c->left, i) * unscaled(c, c->right, j);
 }
 
-PUBLIC void chain_forget(chain *c) { c->scaled = 0; } /* the scale of the matrix before */
 PUBLIC int chain_rest(const chain *c) { return c->rest; }
 PUBLIC int chain_negative(const chain *c) { return c->negative; }
 PUBLIC int chain_zero(const chain *c) { return c->zero; }

@@ -180,10 +180,6 @@ class Elimination:
         self.lib.chain_schur(self._chain, buffer(self.ffi, out))
         return out
 
-    def forget(self) -> None:
-        """Forget the scale of the last matrix, which the next one has otherwise as long as it serves."""
-        self.lib.chain_forget(self._chain)
-
     @property
     def rest(self) -> int:
         """Number of unknowns that an open chain leaves."""
@@ -253,11 +249,6 @@ class Chain(AlongRod):
     def adopt(self, *, regular: bool) -> None:
         """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""
         self.resorted, self.regular, self.elimination.regular = False, regular, regular
-
-    def forget(self) -> None:
-        """Forget the scale of the last matrix."""
-        if self._matrix is not None:
-            self.elimination.forget()
 
     def solve_columns(self, right: np.ndarray) -> np.ndarray:
         """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""

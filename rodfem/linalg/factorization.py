@@ -246,10 +246,6 @@ class AlongRod(ByColumns):
         """Factor along the rod; raises :class:`GaveUpError` on all ranks where one gives up."""
 
     @abstractmethod
-    def forget(self) -> None:
-        """Forget what the last matrix leaves to the next one: its scale."""
-
-    @abstractmethod
     def eliminated(self) -> tuple[tuple[int, int], float]:
         """Inertia and determinant by elimination."""
 

@@ -105,12 +105,6 @@ class Pieces(AlongRod):
         solved = self.joint.solve(joint)
         return self.elimination.back(solved[self._mine])[: len(right)]
 
-    def forget(self) -> None:
-        """Forget the scales of the last matrix."""
-        if self._matrix is not None:
-            self.elimination.forget()
-            self.joint.forget()
-
     def eliminated(self) -> tuple[tuple[int, int], float]:
         """Inertia and determinant by elimination."""
         return self._inertia, self._determinant
