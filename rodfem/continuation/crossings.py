@@ -144,7 +144,9 @@ def crossings(
         middle = solve(a, b, a.s + ask * h)
         if middle is not None:
             known = len(misses)
-            out = sum((crossings(*ends, solve, tolerance, misses, depth + 1) for ends in ((a, middle), (middle, b))), [])
+            out = sum(
+                (crossings(*ends, solve, tolerance, misses, depth + 1) for ends in ((a, middle), (middle, b))), []
+            )
             if not out and a.far == b.far and len(misses) == known:
                 misses.append(middle)
             return out
@@ -162,15 +164,15 @@ def crossings(
 def together(a: Node, b: Node, places: np.ndarray, tolerance: float) -> list[list[float]]:
     """Places of crossings in order, those of different modes grouped that are one point within the ``tolerance``."""
     out: list[list[float]] = []
-    last: tuple[np.ndarray, float] | None = None
+    before, fast = np.zeros(len(a.H)), 0.0
     for t in places.tolist():
         values, vectors = np.linalg.eigh(at(a, b, t))
         v = vectors[:, abs(values).argmin()]
-        speed = abs(float(v @ rate(a, b, t) @ v))
-        near = last is not None and (t - out[-1][-1]) * max(speed, last[1]) <= tolerance
-        if near and (abs(v @ last[0]) < ALIKE or (t - out[-1][-1]) * (b.s - a.s) < SAME):
+        speed, apart = abs(float(v @ rate(a, b, t) @ v)), t - out[-1][-1] if out else 1.0
+        alike = abs(v @ before) >= ALIKE and apart * (b.s - a.s) >= SAME
+        if out and apart * max(speed, fast) <= tolerance and not alike:
             out[-1].append(t)
         else:
             out.append([t])
-        last = v, speed
+        before, fast = v, speed
     return out

@@ -41,7 +41,6 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.bordered import Bordered
-from rodfem.tolerances import TINY
 
 DIFFERENCE = 1e-4
 """Step of the differences, in the metric."""
@@ -68,7 +67,8 @@ class SingularState:
     amplitude in radian, ``noise`` is the round-off of their size.  ``directions`` are those of the two branches that
     cross at a branch point with one null vector, unit vectors.  ``response`` is the change of state with the load, the
     null vectors left out, ``rate`` the derivative of the eigenvalue along it, and ``spread`` what several eigenvalues,
-    whose mean vanishes, differ from that.  ``modes`` are all of the border, relaxed; ``last`` is what Newton's
+    whose mean vanishes, differ from that.  ``modes`` are all of the border, relaxed, ``others`` the
+    eigenvalues of those that do not vanish; ``last`` is what Newton's
     method leaves of the state.
     """
 
@@ -82,6 +82,7 @@ class SingularState:
     rate: float
     spread: float
     modes: list[PETSc.Vec]
+    others: np.ndarray
     last: PETSc.Vec
 
     @property
@@ -101,6 +102,7 @@ class _Made:
     rate: float
     spread: float
     modes: list[PETSc.Vec]
+    others: np.ndarray
 
 
 class SingularSystem:
@@ -166,7 +168,9 @@ class SingularSystem:
         # in natural units of eigenvalues and loads: what these do not determine, a free motion, stays as it is
         one, scale = self.solver.units.load, self.inertia.scale
         units = np.array([one, *np.ones(m)])
-        size = np.array([scale / (one if i >= m - (0 if self.fold else Z.shape[1]) else 1.0) for i in range(m + 1)])
+        size = np.full(m + 1, scale)
+        size[m if self.fold else m - Z.shape[1] : m] /= one
+        size = np.maximum(size, abs(np.array(rows) * units).max(axis=1))
         table, known = np.array(rows) * units / size[:, None], np.array(right) / size
         share = units * np.linalg.lstsq(table, known, rcond=FREE)[0]
         step = combine([s, w, *V], np.array([1.0, *share]))
@@ -179,6 +183,7 @@ class SingularSystem:
             rate / len(null),
             float(np.linalg.norm(inner - np.trace(inner) / len(null) * np.eye(len(null)), 2)),
             V,
+            np.linalg.eigvalsh(N.T @ (G + G.T) @ N) / 2,
         )
         self.Z = Z
         return step, made
@@ -199,7 +204,7 @@ class SingularSystem:
         directions = self._directions(made.response, null[0], made.table) if simple else []
         orthonormalize(null, self.inertia.metric)
         load = self.system.scalar(x)
-        rest = made.rate, made.spread, made.modes, step
+        rest = made.rate, made.spread, made.modes, made.others, step
         return SingularState(x, load, null, made.response, made.beta, noise, directions, *rest)
 
     def _directions(self, w: PETSc.Vec, v: PETSc.Vec, table: np.ndarray) -> list[PETSc.Vec]:

@@ -27,8 +27,8 @@ from rodfem.tolerances import round_off
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
-CLEARLY = 1e-3
-"""Above this the point is a fold before anything is solved for."""
+CLEARLY, FELT = 1e-3, 1e-6
+"""Above these, of the cosine and of the product in natural units, the point is a fold before anything is solved for."""
 LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
 INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
@@ -53,6 +53,13 @@ def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> f
     if derivative.norm() * solver.units.load < least:
         return 0.0
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
+
+
+def is_fold(solver: BranchSolver, x: PETSc.Vec, null: list[PETSc.Vec]) -> bool:
+    """Whether the load clearly does work on one of the null vectors."""
+    force = solver.inertia.at(x).border.copy()
+    work = max(abs(force.dot(v)) for v in null) * solver.units.load
+    return work > FELT * solver.inertia.scale and max(coupling_of(solver, x, v) for v in null) > CLEARLY
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,10 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     x, slope = piece.curve(p, q, crossing.s)
     reduced = piece.condensation.at(x, _unit(piece.solver, slope), piece.phi)
     values, own = np.linalg.eigh(reduced.H)
-    order, count = np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0)), crossing.vectors.shape[1]
+    order, count = (
+        np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0)),
+        crossing.vectors.shape[1],
+    )
     near = [i for i in order[count:] if abs(values[i]) < NEARBY * piece.solver.inertia.scale]
     modes = _modes(piece.condensation, reduced, own[:, [*order[:count], *near]])
     critical = np.eye(len(modes))[:, :count]
@@ -118,6 +128,15 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     return Candidate(x, slope, modes, np.eye(len(modes)), change, q.s - p.s, crossing=False)
 
 
+def of_miss(piece: Piece, node: Node) -> Candidate:
+    """Candidate near a state at which an eigenvalue is least, and not zero."""
+    knot = node.kept
+    values, own = np.linalg.eigh(knot.reduced.H)
+    modes = _modes(piece.condensation, knot.reduced, own[:, [abs(values).argmin()]])
+    change = Change(node.index, node.index, node.index, piece.still)
+    return Candidate(knot.x, knot.slope, modes, np.eye(1), change, piece.length, crossing=False)
+
+
 def _unit(solver: BranchSolver, direction: PETSc.Vec) -> PETSc.Vec:
     return direction * (1.0 / solver.system.norm(direction))
 
@@ -131,7 +150,9 @@ def _modes(condensation: Condensation, reduced: ReducedStiffness, vectors: np.nd
 
 def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState | None:
     """The singular state of a candidate; None where there is none near by."""
-    opposite = at.crossing and abs(at.change.after - at.change.before) < at.critical.shape[1]  # they have no trace that vanishes
+    opposite = (
+        at.crossing and abs(at.change.after - at.change.before) < at.critical.shape[1]
+    )  # they have no trace that vanishes
     critical = at.critical[:, :1] if opposite else at.critical
     found = SingularSystem(solver, at.modes, critical, fold=fold).solve(at.x)
     if found is not None and solver.system.distance(found.x, at.x) > STRAYED * at.length:
@@ -143,10 +164,12 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
     """Special point at the singular state ``found`` of a candidate."""
     place = piece.begin + piece.place(found.x)
     special = singular_point(piece.solver, found, place, at.slope, at.change, fold=fold)
-    if at.critical.shape[1] > len(found.vectors):  # opposite crossings, of which one was solved for
-        special.null_vectors += special.nearby[: at.critical.shape[1] - len(found.vectors)]
-        special.nearby = special.nearby[at.critical.shape[1] - len(found.vectors) :]
-        special.point.zero = piece.solver.system.phase.count + special.multiplicity + at.change.still
+    more = at.critical.shape[1] - len(found.vectors)
+    if more:  # opposite crossings, of which one was solved for
+        special.null_vectors += special.nearby[:more]
+        special.nearby = special.nearby[more:]
+        special.point.zero += more
+        special.located_to += 2 * np.sort(abs(found.others))[more - 1] / abs(found.rate)
     return special
 
 
@@ -194,6 +217,6 @@ def _tangent(solver: BranchSolver, slope: PETSc.Vec, found: SingularState, *, fo
 
 def missing(a_load: float, b_load: float) -> str:
     """Sentence on a crossing between two loads that no singular state was found for."""
-    return f"A special point between loads {a_load:.8g} and {b_load:.8g} is missing: no singular state; {SMALLER_STEPS}."
-
-
+    return (
+        f"A special point between loads {a_load:.8g} and {b_load:.8g} is missing: no singular state; {SMALLER_STEPS}."
+    )

@@ -11,15 +11,16 @@ from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.crossings import Node, crossings
-from rodfem.continuation.kinds import BRANCH_POINT, IMPERFECT
+from rodfem.continuation.kinds import IMPERFECT
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.piece import Piece
+from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.continuation.singular_points import (
-    CLEARLY,
     Candidate,
-    coupling_of,
+    is_fold,
     missing,
     of_crossing,
+    of_miss,
     of_turn,
     solved,
     special_point,
@@ -28,6 +29,8 @@ from rodfem.diagram.shorter_steps import ShorterSteps, Unresolved
 from rodfem.diagram.step_check import StepCheck
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
+DIP = 0.1
+"""Eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is taken to stay zero."""
 ASIDE = 0.02
@@ -107,6 +110,7 @@ class SpecialSearch:
         return self._between(a, b, ended=True)
 
     def _forget(self) -> None:
+        self._nearest: float = -inf
         self._phi = None
         self._known.clear()
 
@@ -139,14 +143,13 @@ class SpecialSearch:
     def _nodes(self, a: Point, b: Point) -> tuple[Piece, Node, Node]:
         """The piece from ``a`` to ``b`` with its ends; a new border where the last one has become that of others."""
         for attempt in (0, 1):
-            if self._phi is None:
-                self._phi = self._on(b).border(b.x if attempt else a.x)
+            phi = self._phi = self._on(b).border(b.x if attempt else a.x) if self._phi is None else self._phi
             first, last = self._reduced(a), self._reduced(b)
             if first.far == last.far and max(first.rotated, last.rotated) < ROTATED:
                 break
             if not attempt:
                 self._forget()
-        piece = Piece(self._on(b), a, b, self._phi)
+        piece = Piece(self._on(b), a, b, phi)
         assert a.tangent is not None
         assert b.tangent is not None
         still = min(first.zero, last.zero)
@@ -183,18 +186,22 @@ class SpecialSearch:
                     self.observer.warn(missing(a.load, b.load))
                 else:
                     out.append(special)
+        for node in misses:
+            self._missed(piece, node, ended=ended)
+        nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
+        if not out and self._nearest > nearest < ahead and nearest < DIP * piece.solver.inertia.scale:
+            self._missed(piece, p, ended=True)  # the rows resolve it
+        self._nearest = -inf if out else nearest
         return sorted(out, key=lambda special: special.point.arclength)
 
-    def _touching(
-        self, piece: Piece, p: Node, q: Node, s: float, *, ended: bool
-    ) -> SpecialPoint | None:
+    def _touching(self, piece: Piece, p: Node, q: Node, s: float, *, ended: bool) -> SpecialPoint | None:
         """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""
         solver, off = piece.solver, ASIDE * (q.s - p.s)
         left, right = piece.solve(p, q, max(s - off, (p.s + s) / 2)), piece.solve(p, q, min(s + off, (s + q.s) / 2))
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
         at = of_turn(piece, left, right, turn)
-        if max(coupling_of(solver, at.x, v) for v in at.null) > CLEARLY:
+        if is_fold(solver, at.x, at.null):
             return None
         found = solved(solver, at, fold=False)
         if found is None:
@@ -212,8 +219,7 @@ class SpecialSearch:
         Raises :class:`Gap` for an imperfection that is not known, unless the branch has ``ended``.
         """
         solver = piece.solver
-        coupling = max(coupling_of(solver, at.x, v) for v in at.null)
-        if coupling > CLEARLY and (found := solved(solver, at, fold=True)) is not None:
+        if is_fold(solver, at.x, at.null) and (found := solved(solver, at, fold=True)) is not None:
             return special_point(piece, at, found, fold=True)
         found = solved(solver, at, fold=False)
         if found is not None and found.size <= found.noise:
@@ -229,9 +235,22 @@ class SpecialSearch:
             special.kind, special.note = IMPERFECT, str(gap)
         return special
 
-    def _open_gap(self, piece, at, found, *, ended):
-        special = special_point(piece, at, found, fold=False)
-        gap = self.gaps.examine(piece.solver, special, found)
+    def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> Gap | None:
+        """The gap at a singular state whose unfolding parameters are not round-off; raised unless it is known."""
+        gap = self.gaps.examine(piece.solver, special_point(piece, at, found, fold=False), found)
         if gap is not None and not ended and self.gaps.open(gap, piece.solver):
             raise gap
         return gap
+
+    def _missed(self, piece: Piece, node: Node, *, ended: bool) -> None:
+        """Look for the branch on the other side where an eigenvalue comes near zero and turns back.
+
+        An imperfection is the cause if a branch point with unfolding parameters is near by: then raises :class:`Gap`,
+        unless the branch has ``ended``, or rows resolve the bend.
+        """
+        at = of_miss(piece, node)
+        found = SingularSystem(piece.solver, at.modes, at.critical, fold=False).solve(at.x)
+        if found is not None and found.size > found.noise:
+            gap = self._open_gap(piece, at, found, ended=ended)
+            if gap is not None and ended:
+                self.gaps.open(gap, piece.solver)

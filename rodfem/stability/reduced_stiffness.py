@@ -41,6 +41,8 @@ DIFFERENCE = 1e-4
 """Distance of the states whose matrices are differenced, in the metric."""
 ROTATED = 1.0
 """Size of ``W^t M W - 1`` above which a border has become that of other modes."""
+ROUGH, DEPENDENT = 1e-3, 1e-3
+"""Relative accuracy of the eigenvalues of a border; square of a mode that is none of its own."""
 MODES = 6
 """Columns of a border."""
 
@@ -86,13 +88,15 @@ class Condensation:
         self._bordered: dict[int, Bordered] = {}
 
     def border(self, x: PETSc.Vec, count: int = MODES) -> np.ndarray:
-        """Modes nearest zero at a state, (own rows, count)."""
+        """Modes nearest zero at a state, (own rows, count), fewer if there are no more."""
         found = self.inertia.at(x)
         found.count()
-        count = min(count, self.system.fields.unknowns - self.inertia.constraints - 2)
         with self.inertia.afresh():
-            vectors = found.nearest(count, 1e-3)[1]
-        return np.stack([v.array_r for v in vectors], axis=1)
+            vectors = found.nearest(count, ROUGH)[1]
+        phi = np.stack([v.array_r for v in vectors], axis=1)
+        squares, turn = np.linalg.eigh(self.inertia.sum(phi.T @ self.inertia.weighed(phi)))
+        kept = squares > DEPENDENT  # a mesh of a few unknowns has no more
+        return np.asarray(phi @ (turn[:, kept] / np.sqrt(squares[kept])))
 
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
         """Reduced stiffness matrix at an equilibrium with its unit tangent, for a border."""

@@ -41,7 +41,7 @@ from rodfem.app.terminal import Report
 from rodfem.codim2.follow import locus
 from rodfem.continuation.branch import Point
 from rodfem.continuation.follow import _to_load
-from rodfem.continuation.index_chain import Row, breaks, chained, explain, merge_doubles
+from rodfem.continuation.index_chain import breaks, explain, merge_doubles
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.switching import directions, leave
 from rodfem.diagram import explorer
@@ -339,10 +339,6 @@ def test_what_is_not_explained_is_kept() -> None:
     terminal = io.StringIO()
     Report(stream=terminal).table([branch], found.solver.system)
     assert f"! {branch.name}: {broken}" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
-    a, b = Row(branch.points[0], 0, 0), Row(branch.points[-1], 2, 2)
-    assert chained(a.low, a.high, singular, b.low, b.high)
-    assert not chained(a.low, a.high, singular[:1], b.low, b.high)
-    assert not chained(a.low, a.high, singular[::-1], b.low, b.high)
 
 
 @pytest.mark.long

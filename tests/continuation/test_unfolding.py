@@ -27,7 +27,7 @@ from rodfem import (
 )
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
-from rodfem.continuation.unfolding import unfold
+from rodfem.continuation.singular import SingularSystem
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
@@ -118,7 +118,7 @@ def test_unfolding_is_the_work_of_the_imperfection() -> None:
         straight = diagram(cantilever(0.0), depth=0)
         special = straight.special()[0]
         solver = Solver(cantilever(lateral), Discretization("reduced", 8, 6)).equilibria
-        found = unfold(solver, special)
+        found = SingularSystem(solver, special.null_vectors, np.eye(special.multiplicity), fold=False).solve(special.point.x)
         assert found is not None
         assert found.load == pytest.approx(EULER, abs=1e-11)
         values.append(found)
