@@ -1,17 +1,18 @@
 r"""Where eigenvalues pass zero between two states of a branch: roots of the reduced stiffness matrix.
 
-Between two states with the same border the cubic Hermite interpolant of ``H`` (:mod:`rodfem.stability.reduced_stiffness`)
+Between two states with the same border the cubic Hermite interpolant of ``H``, their reduced stiffness matrix
+(:mod:`rodfem.stability.reduced_stiffness`),
 
     H(t) = A0 + A1 t + A2 t^2 + A3 t^3,      0 <= t <= 1,
 
-is singular at the eigenvalues of a pencil of order 3k: all of them at once.  A real one is a crossing, of whatever kind:
-several at one place, opposite ones, pairs that cancel, folds.  A complex one near the axis is a pair that the
+is singular at the eigenvalues of a pencil of order 3k: all of them at once.  A real one is a crossing, of whatever
+kind: several at one place, opposite ones, pairs that cancel, folds.  A complex one near the axis is a pair that the
 interpolant does not tell from a near miss, and asks for one state more, as do several in one piece, and a change of the
 index across the border, by which the piece is too long for it.
 
-Most pieces have none, and one test says so: in the eigenvectors of ``H(0) + H(1)`` all four control matrices of Bernstein
-have a positive definite block, and a negative definite one.  Then so has each of their means, and a matrix of this shape
-is regular.
+Most pieces have none, and one test says so: in the eigenvectors of ``H(0) + H(1)`` all four control matrices of
+Bernstein have a positive definite block, and a negative definite one.  Then so has each of their means, and a matrix of
+this shape is regular.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ class Node:
 
     @property
     def index(self) -> int:
+        """Number of negative eigenvalues."""
         return self.far + negative(self.H)
 
 
@@ -122,7 +124,8 @@ def crossings(
 ) -> list[Crossing]:
     """All crossings between two nodes; ``solve`` makes a node between two others.
 
-    Eigenvalues of several modes that are within the ``tolerance`` of zero at one place pass it there.  ``misses`` gets nodes at which an eigenvalue is nearly zero, and does not pass it.
+    Eigenvalues of several modes that are within the ``tolerance`` of zero at one place pass it there.  ``misses`` gets
+    nodes at which an eigenvalue is nearly zero, and does not pass it.
     """
     h = b.s - a.s
     if a.far == b.far and clear(a, b):
@@ -144,9 +147,8 @@ def crossings(
         middle = solve(a, b, a.s + ask * h)
         if middle is not None:
             known = len(misses)
-            out = sum(
-                (crossings(*ends, solve, tolerance, misses, depth + 1) for ends in ((a, middle), (middle, b))), []
-            )
+            out = crossings(a, middle, solve, tolerance, misses, depth + 1)
+            out += crossings(middle, b, solve, tolerance, misses, depth + 1)
             if not out and a.far == b.far and len(misses) == known:
                 misses.append(middle)
             return out

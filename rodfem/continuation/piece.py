@@ -2,8 +2,8 @@ r"""A piece of a branch between two of its states, as a curve whose second varia
 
 Places are along the chord: ``s = d . M (x - x_a)`` with the unit vector ``d`` from the one state to the other.  A state
 at a place is solved for on the plane across the chord, so that places are smooth along the branch, and differences of
-the arclengths of neighbouring rows.  Between two states with their tangents the branch is a cubic, and so is the reduced
-stiffness matrix (:mod:`rodfem.continuation.crossings`).
+the arclengths of neighbouring rows.  Between two states with their tangents the branch is a cubic, and so is the
+reduced stiffness matrix (:mod:`rodfem.continuation.crossings`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rodfem.linalg.orthogonal import combine
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
 
 STRAYED = 0.3
-"""Distance of a state from where it is expected, over that from the nearer end, at which it is one of another branch."""
+"""Distance of a state from where it is expected, over that from the nearer end, at which it is another branch's."""
 LEAST = 1e-9
 """That distance, in the metric, which is round-off."""
 
@@ -50,7 +50,7 @@ class Piece:
         self.moving = np.eye(phi.shape[1])
 
     def leave_out(self, still: np.ndarray) -> None:
-        """Take the amplitudes ``still`` (k, m), along which eigenvalues are zero all along, out of nodes made from now on."""
+        """Leave the amplitudes ``still`` (k, m), along which eigenvalues stay zero, out of nodes made from now on."""
         self.moving = np.linalg.svd(still)[0][:, still.shape[1] :]
 
     @property

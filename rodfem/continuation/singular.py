@@ -5,17 +5,17 @@ Near a singular state ``m`` modes ``psi = M V`` of the saddle matrix S vanish, o
     ( S       psi )  ( V   w   s )     ( 0   -F_lam   -F )
     ( psi^t   0   )  ( G   b   c )  =  ( I    0        0 ),      so that   b_i = -V_i . F_lam,
 
-G (m, m) is minus the reduced stiffness matrix of :mod:`rodfem.stability.reduced_stiffness`.  Columns Z (m, k) span the k
-modes that are to vanish together, and N the others, which are near by.  What is solved for is
+G (m, m) is minus the reduced stiffness matrix of :mod:`rodfem.stability.reduced_stiffness`.  Columns Z (m, k) span the
+k modes that are to vanish together, and N the others, which are near by.  What is solved for is
 
     tr Z^t G Z = 0        an eigenvalue is zero, or k of them are,
     N^t beta = 0          the state is an equilibrium but for forces beta_i psi_i,
     Z^t beta = 0          at a fold,
     Z^t b = 0             at a branch point, where the load does no work on the null vectors, and beta is left over.
 
-An imperfection, however small, takes a branch point apart: of ``A xi^3 + B lam xi + eps = 0`` no point is singular *and*
-has a derivative in the load that vanishes.  With the unfolding parameters ``beta`` (Moore, SIAM J. Numer. Anal. 17 (1980)
-567-576) it is regular again, and they measure the imperfection: ``-eps`` above, round-off at a branch point.
+An imperfection, however small, takes a branch point apart: of ``A xi^3 + B lam xi + eps = 0`` no point is singular
+*and* has a derivative in the load that vanishes.  With the unfolding parameters ``beta`` (Moore, SIAM J. Numer. Anal.
+17 (1980) 567-576) it is regular again, and they measure the imperfection: ``-eps`` above, round-off at a branch point.
 
 Newton's step is ``dx = s + dlam w + sum_j xi_j V_j``, which changes
 
@@ -56,7 +56,7 @@ round-off."""
 LEAST = 1e-15
 """Round-off of ``beta`` where all of these vanish, over the lowest bending eigenvalue."""
 FREE = 1e-8
-"""Part of the equations, relative to the largest, below which they do not determine an unknown: a family moves freely."""
+"""Part of the equations, relative to the largest, below which they do not determine an unknown."""
 
 
 @dataclass(frozen=True)

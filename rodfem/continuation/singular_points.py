@@ -1,8 +1,8 @@
 r"""Folds and branch points of a branch: from a crossing to the solution of its singular system, with all that it tells.
 
-With ``phi`` the null vector and ``F_lam`` the derivative of the equations in the load, ``phi . F_lam != 0`` at a fold and
-``= 0`` at a branch point (Keller 1977).  Where that is nearly zero the systems of both are solved: a branch point whose
-unfolding parameters are round-off is one, and one with others was taken apart by an imperfection.
+With ``phi`` the null vector and ``F_lam`` the derivative of the equations in the load, ``phi . F_lam != 0`` at a fold
+and ``= 0`` at a branch point (Keller 1977).  Where that is nearly zero the systems of both are solved: a branch point
+whose unfolding parameters are round-off is one, and one with others was taken apart by an imperfection.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LEVEL = 1e-3
 INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
 """A derivative of the equations in the load smaller than this, relative to bending, or to the Jacobian, is zero."""
 NEARBY = 1e-2
-"""Eigenvalue, over the lowest bending one, of modes that the border of a singular system has beside the null vectors."""
+"""Eigenvalue, over the lowest bending one, of modes that the border of a singular system has as well."""
 ZERO = 1e-6
 """Eigenvalue, over the lowest bending one, that is zero where the load turns back and an eigenvalue touches zero."""
 STRAYED = 0.3
@@ -64,7 +64,7 @@ def is_fold(solver: BranchSolver, x: PETSc.Vec, null: list[PETSc.Vec]) -> bool:
 
 @dataclass(frozen=True)
 class Change:
-    """Index ``before`` and ``after`` a singular state, ``negative`` at it, and how many eigenvalues stay zero all along."""
+    """Index ``before`` and ``after`` a singular state, ``negative`` at it; ``still`` eigenvalues are zero all along."""
 
     before: int
     after: int

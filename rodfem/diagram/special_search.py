@@ -54,6 +54,7 @@ class SpecialSearch:
         self._check, self._steps = StepCheck(observer), ShorterSteps()
         self._condensations: dict[int, Condensation] = {}
         self._phi: np.ndarray | None = None
+        self._mesh = -1
         self._known: dict[int, tuple[Point, ReducedStiffness]] = {}
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
@@ -90,7 +91,6 @@ class SpecialSearch:
         """
         settled = self._open[0]
         if settled.mesh != b.mesh:
-            self._forget()
             self._open = [self.meshes.here(settled, self.meshes.solvers[b.mesh])]
         try:
             self._open.append(b)
@@ -142,6 +142,9 @@ class SpecialSearch:
 
     def _nodes(self, a: Point, b: Point) -> tuple[Piece, Node, Node]:
         """The piece from ``a`` to ``b`` with its ends; a new border where the last one has become that of others."""
+        if self._mesh != b.mesh:
+            self._forget()
+            self._mesh = b.mesh
         for attempt in (0, 1):
             phi = self._phi = self._on(b).border(b.x if attempt else a.x) if self._phi is None else self._phi
             first, last = self._reduced(a), self._reduced(b)

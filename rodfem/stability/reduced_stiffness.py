@@ -1,7 +1,7 @@
 r"""The reduced stiffness matrix H of a state: its second variation on a few amplitudes, with all else relaxed.
 
-Of k vectors ``Phi`` (n, k), orthonormal in the metric ``M`` and near the modes nearest zero, ``B = M Phi`` is the border
-of the saddle matrix ``S``.  With
+Of k vectors ``Phi`` (n, k), orthonormal in the metric ``M`` and near the modes nearest zero, ``B = M Phi`` is the
+border of the saddle matrix ``S``.  With
 
     S W = B H,    B^t W = 1,    that is    H = W^t S W = (B^t S^-1 B)^-1,
 
@@ -29,6 +29,8 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
+from rodfem.linalg.chain import Chain
+from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import shared
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.round_off import quotient_error
@@ -105,7 +107,7 @@ class Condensation:
         found = inertia.at(x)
         try:
             below = found.below(0.0)
-            Z = found.factors.solve_columns(B) if hasattr(found.factors, "solve_columns") else self._columns(B)
+            Z = self._solved(found.factors, B)
             H = np.linalg.inv(_symmetric(inertia.sum(B.T @ Z)))
             near = not abs(np.linalg.eigvalsh(_symmetric(H))).min() > NEAR * inertia.scale
         except (ConvergenceError, np.linalg.LinAlgError):
@@ -161,15 +163,19 @@ class Condensation:
             return np.asarray(known.matrix @ columns)
         return np.stack([(self.inertia.matrix * self.vector(c)).array_r for c in columns.T], axis=1)
 
-    def _columns(self, B: np.ndarray) -> np.ndarray:
+    def _solved(self, factors: Factors, B: np.ndarray) -> np.ndarray:
+        """``S^-1 B``."""
+        if isinstance(factors, Chain) and not factors.resorted:
+            return factors.solve_columns(B)
         out = []
         for column in B.T:
             y = self.system.new_vector()
-            self.inertia.factors.solve(self.vector(column), y)
+            factors.solve(self.vector(column), y)
             out.append(y.array_r.copy())
         return np.stack(out, axis=1)
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
+        """Vector of own rows."""
         out = self.system.new_vector()
         out.array[:] = own
         return out
