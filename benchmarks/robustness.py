@@ -193,9 +193,8 @@ seed {SEED}) special points on two meshes are compared with each other: their di
 ## Runs that are killed
 
 A run of the compressed hemitropic rod is killed by SIGKILL (`python -m tests.hard.kills`): at a random time, or before
-a random one of its events of files. Then no process may run on, the folder has no file yet or whole files of one run,
-and the same command with `--resume` ends with the diagram of a run that was not killed and leaves nothing else in the
-folder. **wrong**: anything else.
+a random one of its events of files. Then no process may run on, and the folder has no file yet or whole files of one
+run. **wrong**: anything else.
 
 {kills_of(store)}"""
 

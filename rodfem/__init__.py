@@ -39,11 +39,11 @@ finds and classifies the points where it is lost, follows what branches off, and
 * **Diagram**: :func:`trace` computes without files and returns a :class:`Diagram`: ``diagram["branch 1"]``,
   ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
   ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.save(folder)``; :func:`load` reads a saved one.  :func:`run` is
-  the same with a terminal, files and pictures, and :func:`resume` goes on with one that was interrupted.
+  the same with a terminal, files and pictures.
 * **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one.
 * **Is it stable?**: each point has its index; :meth:`Diagram.assess` decides by any of six methods, and says how far to
   trust it; :meth:`Diagram.modes` finds how the rod moves in its left-most modes, and what a controller needs to know.
-* **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, restartable.
+* **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, and skips those that are finished.
 * **What is not connected**: :meth:`Diagram.search` looks for other equilibria at a load by deflation.
 
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
@@ -86,7 +86,6 @@ _HOMES = {
     "Event": "problem.events",
     "IndexStepControl": "continuation.step_control",
     "run": "app.run",
-    "resume": "app.resume",
     "trace": "diagram.trace",
     "load": "diagram.saved",
     "Diagram": "diagram.diagram",

@@ -3,7 +3,6 @@
 __version__: str
 
 from rodfem.app.many import many as many
-from rodfem.app.resume import resume as resume
 from rodfem.app.run import run as run
 from rodfem.codim2.locus import Locus as Locus
 from rodfem.continuation.branch import Branch as Branch

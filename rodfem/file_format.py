@@ -100,9 +100,6 @@ MODES = Format("rodfem modes", 1, f"the modes.h5 of a run with {Argument('Plan',
 LOCUS = Format("rodfem locus", 1, f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
 RESULT = Format("rodfem result", 1, "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
-STEP = Format("rodfem step", 1, "a resume-1.h5, resume-2.h5 ... of a run that was interrupted")
-"""Read by the version of rodfem that wrote it, and by no other."""
-
 
 UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, AttributeError, RuntimeError)
 """Errors of h5py and numpy for a file that holds something else than was expected."""

@@ -5,7 +5,7 @@ Every point knows the number of its mesh.  Here meshes are made, and points carr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite, log10
 
@@ -78,14 +78,13 @@ class TooCoarse(Exception):
 
 
 class Meshes:
-    """The solvers of one run, by the number of their mesh, and their richer ``companions``, made when needed."""
+    """The solvers of one run, by the number of their mesh, and their richer companions, made when needed."""
 
     def __init__(self, solver: BranchSolver, accuracy: float | None) -> None:
         """Begin with one mesh; None as accuracy: no other is made."""
         self.solvers = [solver]
         self.accuracy = None if accuracy is None else internal_accuracy(solver.system.scene, accuracy)
-        self.companions: dict[int, Enriched] = {}
-        self._awaited: dict[int, list[Callable[[Enriched], None]]] = {}
+        self._companions: dict[int, Enriched] = {}
         self._indicators: dict[int, SmoothnessIndicator] = {}
         if accuracy is not None:
             self._weights = weights_of(solver.system.scene)
@@ -98,18 +97,9 @@ class Meshes:
 
     def richer(self, number: int) -> Enriched:
         """Companion of a mesh, on halves of its elements one degree richer, made when it is first asked for."""
-        if number not in self.companions:
-            self.companions[number] = Enriched(self.solvers[number])
-            for work in self._awaited.pop(number, []):
-                work(self.companions[number])
-        return self.companions[number]
-
-    def when_made(self, number: int, work: Callable[[Enriched], None]) -> None:
-        """Do something with the companion of a mesh: now, or as soon as it is made."""
-        if number in self.companions:
-            work(self.companions[number])
-        else:
-            self._awaited.setdefault(number, []).append(work)
+        if number not in self._companions:
+            self._companions[number] = Enriched(self.solvers[number])
+        return self._companions[number]
 
     def error_of(self, special: SpecialPoint) -> float:
         """Estimated error of a special point in load and ordinate, relative to those that exceed their natural size."""
@@ -135,10 +125,6 @@ class Meshes:
             if known is not old and cost(fields, d.elements, d.degree) <= affordable:
                 if found.fulfilled_by(d, known.system.fields.all_vertices(), indicator):
                     return known
-        return self.add(mesh)
-
-    def add(self, mesh: Discretization) -> BranchSolver:
-        """Solver on a further mesh, which gets the next number."""
         first = self.solvers[0]
         s = first.system
         with s.clock("setup"):

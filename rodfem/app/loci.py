@@ -26,8 +26,6 @@ def follow_all(
     output: Path,
     report: Report,
     figures: bool,
-    *,
-    known: bool,
 ) -> None:
     """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture.
 
@@ -45,12 +43,10 @@ def follow_all(
         What hears of each.
     figures
         Whether pictures are drawn.
-    known
-        Whether loci that are in the folder are those of this run, and stay.
     """
     if plan.locus is None:
         return
-    found = _Loci(plan, plan.locus, output, report, solvers, known)
+    found = _Loci(plan, plan.locus, output, report, solvers)
     for branch in branches:
         found.follow(branch)
     if found.saved and figures:
@@ -70,10 +66,9 @@ class _Loci:
         output: Path,
         report: Report,
         solvers: Sequence[StaticSolver],
-        known: bool,
     ) -> None:
         """Nothing is followed yet."""
-        self.solvers, self.output, self.report, self.known = solvers, output, report, known
+        self.solvers, self.output, self.report = solvers, output, report
         self.name, *self.interval = asked
         self.load, self.units = sorted(plan.over(solvers[0].system.scene)), solvers[0].units
         self.adapted = plan.accuracy is not None
@@ -102,16 +97,12 @@ class _Loci:
                 self.report.warn(str(trouble))
 
     def _locus(self, special: SpecialPoint) -> Locus:
-        """Locus of a special point, from its file where the run goes on; said, and saved."""
+        """Locus of a special point, said and saved."""
         from rodfem.codim2.follow import locus
-        from rodfem.codim2.locus import Locus
 
-        file = self.output / f"locus-{len(self.saved) + 1}.json"
-        found = Locus.read(file) if self.known and file.exists() else None
-        if found is None or not found.starts_at(special, self.units):
-            bounds = (self.load[0], self.load[1]), (self.interval[0], self.interval[1])
-            found = locus(self.solvers[special.point.mesh], special, self.name, bounds)
+        bounds = (self.load[0], self.load[1]), (self.interval[0], self.interval[1])
+        found = locus(self.solvers[special.point.mesh], special, self.name, bounds)
         self.report.say(found.text())
         self.saved.append(found.data())
-        on_first(self.comm, partial(found.save, file))
+        on_first(self.comm, partial(found.save, self.output / f"locus-{len(self.saved)}.json"))
         return found

@@ -64,9 +64,7 @@ def main(
         with sentences(parser):
             _run(statement, mesh, options, petsc, parser.in_options)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            f"interrupted; {KEPT} {options.output}: {parser.option('resume')} goes on there"
-        ) from None
+        raise KeyboardInterrupt(f"interrupted; {KEPT} {options.output}: rodfem.load reads them") from None
     except MemoryError:
         complain(f"Memory is exhausted: use fewer elements or a lower degree; {KEPT} {options.output}.")
 
@@ -105,7 +103,6 @@ def _run(
     """
     from petsc4py import PETSc
 
-    from rodfem.app.resume import resume
     from rodfem.app.run import run
     from rodfem.app.terminal import Report
 
@@ -115,11 +112,7 @@ def _run(
     scene, discretization, plan = statement.scene(**constants), _mesh(mesh, options, constants), plan_of(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
-    figures = options.figures and not options.quick
-    if options.resume:
-        resume(options.output, scene, discretization, plan, figures=figures, words=words)
-    else:
-        run(scene, discretization, plan, options.output, figures=figures, words=words)
+    run(scene, discretization, plan, options.output, figures=options.figures, words=words)
     if unread := petsc_options.unread(petsc):
         Report().warn(f"PETSc did not read the option {', '.join(unread)}: see whether it is spelled right.")
 

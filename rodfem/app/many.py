@@ -1,8 +1,8 @@
 """Many rods: the same work on a list of scenes, shared among the ranks, each rod on one of them.
 
-Results are files, one for each rod, written whole as they finish: an interrupted run goes on where it stopped, on any
-number of ranks.  A rod that is no longer the same, in whatever its scene states, is computed anew, and so are all
-where the work on them is another.
+Results are files, one for each rod, written whole as they finish.  A rod whose file is whole and has its name, load,
+range and constants is finished and skipped, on any number of ranks.  Functions of a scene, and the work, are not
+compared: if one of them has changed, choose another folder.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.app.code_digest import digest, digest_of
 from rodfem.app.interrupts import held
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
@@ -29,11 +28,10 @@ from rodfem.ranks import end_together, on_first
 Work = Callable[[Scene], dict[str, Any]]
 
 
-def key_of(scene: Scene, work: Work) -> dict[str, Any]:
-    """Properties of a scene, and of the ``work`` on it, in which a saved result must agree to be used again."""
+def key_of(scene: Scene) -> dict[str, Any]:
+    """Properties of a scene in which a saved result must agree to be used again."""
     constants = {name: p.value for name, p in scene.parameters.items()}
-    known = {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
-    return known | {"stated": digest_of(scene), "code": digest([work])}
+    return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
 
 
 @checked(
@@ -51,9 +49,10 @@ def many(
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
     :class:`InputError` or :class:`ConvergenceError`, or a numerical library or memory gives up, the result is
     ``{"error": sentence}``, and the others go on.  ``progress(done, all)`` is called on rank 0 after each of its rods.
-    ``scenes`` are shared among the ranks of ``comm``.  Raises :class:`InputError` where ``folder`` cannot be written,
-    is in use by another process, or has a result in another or a newer format, and where ``work`` returns anything
-    else.
+    ``scenes`` are shared among the ranks of ``comm``.  A rod is skipped if its file in ``folder`` is whole and has its
+    name, load, range and constants: choose another folder if a function of a scene, or ``work``, has changed.  Raises
+    :class:`InputError` where ``folder`` cannot be written, is in use by another process, or has a result in another or
+    a newer format, and where ``work`` returns anything else.
     """
     folder = Path(folder)
     end_together()
@@ -73,19 +72,17 @@ def _shared(
     trouble: InputError | None = None
     try:
         for done, i in enumerate(range(comm.rank, len(scenes), comm.size), start=1):
-            if _saved(files[i], key_of(scenes[i], work)) is None:
+            if _saved(files[i], key_of(scenes[i])) is None:
                 result = _result(scenes[i], work)
                 with held():
-                    save_json({"format": RESULT.mark(), "key": key_of(scenes[i], work), "result": result}, files[i])
+                    save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
             if comm.rank == 0:
                 progress(min(done * comm.size, len(scenes)), len(scenes))
     except InputError as error:  # a result or a file cannot be written: the other ranks go on with theirs
         trouble = error
     for other in filter(None, comm.allgather(trouble)):
         raise other
-    found = (
-        [_saved(file, key_of(scene, work)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
-    )
+    found = [_saved(file, key_of(scene)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
     return comm.bcast([{} if result is None else result for result in found])
 
 
@@ -119,7 +116,7 @@ def _check(files: Sequence[Path]) -> None:
 def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
     """Result in a file, None where there is none for this rod."""
     data = _contents(file)
-    return data.get("result") if data.get("key") == key else None
+    return data.get("result") if key.items() <= data.get("key", {}).items() else None
 
 
 def _contents(file: Path) -> dict[str, Any]:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from rodfem.diagram.plan import Plan
     from rodfem.fem.fields import Discretization
 
-STEP, QUICK = 0.05, 0.15
-"""Largest step along a branch, in radian, by default, and for a quick look."""
+STEP = 0.05
+"""Largest step along a branch, in radian, by default."""
 
 
 def add_options(parser: Parser, load: str, output: Path) -> None:
@@ -38,8 +38,6 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "--step": f"largest step along a branch, in radian of rotation (root mean square; default {STEP})",
         "--depth": "follow what leaves from branch points of branches of a depth less than D; the first branch has "
         "depth 0, what leaves from it 1, and so on (default 2)",
-        "--most-branches": "follow nothing more once there are N branches (default: no limit)",
-        "--quick": f"a quick look: steps of up to {QUICK}, no error bars, no pictures",
         "--spectrum": "also compute the K left-most eigenvalues of every state with SLEPc",
         "--method": "judge the states at the loads of --at, and print all that is said, by "
         f"{', '.join((AUTO, *METHODS))}",
@@ -48,7 +46,6 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
         "--output": f"folder for files and pictures (default {output})",
         "--no-figures": "draw nothing",
-        "--resume": "go on with a run in that folder that was interrupted; give all other options as before",
     }
     groups: dict[str, dict[str, dict[str, Any]]] = {
         "discretisation": {
@@ -63,8 +60,6 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
             "--at": {"type": float, "nargs": "+", "default": [], "metavar": "LOAD"},
             "--step": {"dest": "largest", "type": float, "metavar": "S"},
             "--depth": {"type": int, "default": 2, "metavar": "D"},
-            "--most-branches": {"type": int, "default": 0, "metavar": "N"},
-            "--quick": {"action": "store_true"},
             "--spectrum": {"type": int, "default": 0, "metavar": "K"},
             "--method": {"default": "", "metavar": "NAME"},
             "--modes": {"type": int, "default": 0, "metavar": "K"},
@@ -74,7 +69,6 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "output": {
             "--output": {"type": folder, "default": output, "metavar": "DIR"},
             "--no-figures": {"dest": "figures", "action": "store_false"},
-            "--resume": {"action": "store_true"},
         },
     }
     for title, options in groups.items():
@@ -111,14 +105,12 @@ def plan_of(options: argparse.Namespace) -> Plan:
         tuple(options.at),
         depth=options.depth,
         spectrum=options.spectrum,
-        steps=StepControl(largest=(QUICK if options.quick else STEP) if options.largest is None else options.largest),
-        error_bars=not options.quick,
+        steps=StepControl(largest=STEP if options.largest is None else options.largest),
         tries=options.tries,
         locus=_pair(options.locus),
         method=options.method,
         modes=options.modes,
         accuracy=options.accuracy,
-        most_branches=options.most_branches,
     )
 
 

@@ -17,13 +17,10 @@ from rodfem.app.persons_file import leave_the_run
 from rodfem.app.run_terminal import Terminal
 from rodfem.app.terminal import Report
 from rodfem.diagram.diagram import Diagram
-from rodfem.diagram.journal import Journal
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.record import Record
 from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN, traced
 from rodfem.fem.fields import Discretization
-from rodfem.output.checkpoint import remove_steps
 from rodfem.output.files import save_json
 from rodfem.output.folder import locked
 from rodfem.output.typical import typical_state
@@ -60,12 +57,12 @@ def run(
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
-    Files are updated after every branch: an interrupted run keeps all completed branches, and goes on from there by
-    :func:`rodfem.resume`.  Those of an earlier run in the folder stay until the first branch is complete.  Returns the
-    diagram.  A file that ``rodfem run FILE.py`` reads for its rod ends here: that command runs it.  Raises
-    :class:`~rodfem.errors.InputError` for bad input, before any computation, and where the folder cannot be written any
-    more or is in use by another process, and
-    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+    Files are updated after every branch: an interrupted run keeps all completed branches, which :func:`rodfem.load`
+    reads; to have the others, run the scene anew.  Those of an earlier run in the folder stay until the first branch is
+    complete.  Returns the diagram.  A file that ``rodfem run FILE.py`` reads for its rod ends here: that command runs
+    it.  Raises :class:`~rodfem.errors.InputError` for bad input, before any computation, and where the folder cannot be
+    written any more or is in use by another process, and :class:`~rodfem.errors.ConvergenceError` where not even a
+    first equilibrium is found.
 
     Parameters
     ----------
@@ -91,22 +88,8 @@ def run(
     output = Path(output or Path("results") / scene.name)
     plan.check(scene, discretization)
     terminal = Terminal(plan, output, comm, quiet, words)
-    with locked(output, comm):
-        return carry_out(scene, discretization, terminal, figures, comm)
-
-
-def carry_out(
-    scene: Scene, discretization: Discretization, terminal: Terminal, figures: bool, comm: MPI.Comm
-) -> Diagram:
-    """Do all that the plan of the ``terminal`` asks for, in its folder, which is locked; go on with what is known.
-
-    ``scene`` and ``discretization`` have passed the plan's check; pictures are drawn if ``figures``, and the ranks of
-    ``comm`` share the rod.
-    """
-    known = [Record(step.text, step.vectors) for step in terminal.steps]
-    journal = Journal(known, terminal.keep, terminal.run)
-    with terminal:
-        diagram = traced(scene, discretization, terminal.plan, terminal, comm, journal)
+    with locked(output, comm), terminal:
+        diagram = traced(scene, discretization, plan, terminal, comm)
         _report(diagram, terminal, figures)
     return diagram
 
@@ -129,14 +112,13 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
 
         assess_all(branches, diagram.solvers, plan, output, terminal, figures)
     if plan.locus is not None:
-        follow_all(branches, diagram.solvers, plan, output, terminal, figures, known=terminal.goes_on)
+        follow_all(branches, diagram.solvers, plan, output, terminal, figures)
     if figures:
         terminal.working("pictures")
         on_first(comm, lambda: draw(output, terminal))
     diagram.complete = True
     with held():
         on_first(comm, lambda: save_json(data | {"complete": True}, output / "diagram.json"))
-        on_first(comm, lambda: remove_steps(output))
 
 
 def draw(output: Path, report: Report) -> None:

@@ -171,10 +171,6 @@ class Locus:
             **tables,
         )
 
-    def starts_at(self, special: SpecialPoint, units: Units) -> bool:
-        """Whether the curve was started from a special point of its scene, which has the natural sizes ``units``."""
-        return self.kind == special.kind and _same(special, self.crossings[0], units)
-
     def save(self, path: Path) -> None:
         """Write :meth:`data` as JSON, whole or not at all; call it on one rank."""
         save_json(self.data(), path)

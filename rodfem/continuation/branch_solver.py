@@ -85,11 +85,6 @@ class BranchSolver(StaticSolver):
         """Those of Newton's method, and the symmetric ones that count."""
         return [*super().factors(), self.inertia.factors]
 
-    def forget(self) -> None:
-        """Forget the vectors that Newton's method carries along a branch, too."""
-        super().forget()
-        self.corrector.restart()
-
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero.
 

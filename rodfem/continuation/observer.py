@@ -32,9 +32,6 @@ class Observer:
     def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
         """On the chosen ``mesh`` ``number`` frequencies still ``change``, relative; an error was ``asked`` for."""
 
-    def asked(self, asked: dict[str, Any]) -> None:
-        """Scene, discretisation and plan in numbers, as files have them (:mod:`rodfem.diagram.asked`)."""
-
     def branch(self, branch: Branch) -> None:
         """A branch begins."""
 

@@ -223,13 +223,6 @@ class StaticSolver:
         """All factors that this solver makes."""
         return [self.system.lu]
 
-    def forget(self) -> None:
-        """Forget what one computation leaves to the next, which then is the same whatever came before."""
-        self.system.set_phase(None)
-        for factors in self.factors():
-            if isinstance(factors, Chain):
-                factors.forget()
-
     def notices(self) -> list[str]:
         """Sentences for the record that nobody has read: symmetries that were none, factors by the last resort."""
         out = self.system.verification.read()

@@ -62,7 +62,7 @@ class Diagram:
     origin
         Command, date and versions of its libraries.
     asked
-        Scene, discretisation and plan in numbers, as they were traced; None: unknown.
+        Plan and fingerprint of the equations, as they were traced; None: unknown.
     lacks
         What its plan had and the file that it was read from does not hold: ``events`` or ``steps``.
     complete

@@ -68,19 +68,12 @@ class Explorer(Tracer):
         self._branch_off(before)
 
     def _found(self, load: float) -> list[Point]:
-        """Equilibria at ``load`` that a search finds beside the branches, unless the journal knows them."""
-        name = f"search at {load!r}"
+        """Equilibria at ``load`` that a search finds beside the branches."""
         self.observer.note("")
         self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
-        if (recalled := self.book.recall(name)) is not None:
-            self._repeat(recalled)
-            return list(recalled.found)
-        self.book.begin()
         with self.solver.system.clock.scope("search"):
             known = equilibria_at(self.solver, self.branches, load, self.here)
-            found = find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
-        self.book.keep(name, found, {})
-        return found
+            return find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
 
     def _on_branch(self, point: Point, first: int = 0) -> bool:
         """Whether a point is on one of the branches traced, from number ``first`` on."""

@@ -11,12 +11,11 @@ from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.diagram.asked import as_asked, prints
+from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.frequency_mesh import frequency_mesh
 from rodfem.diagram.frequency_rows import FREQUENCIES
-from rodfem.diagram.journal import Journal
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import Sweep
@@ -84,37 +83,26 @@ def trace(
     return diagram
 
 
-def traced(
-    scene: Scene,
-    discretization: Discretization,
-    plan: Plan,
-    observer: Observer,
-    comm: MPI.Comm,
-    journal: Journal | None = None,
-) -> Diagram:
-    """Trace a scene as :func:`trace` does, and go on with the steps that a journal knows.
+def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: Observer, comm: MPI.Comm) -> Diagram:
+    """Trace a scene as :func:`trace` does: the diagram, which is not yet ``complete``, as a run has more to do.
 
     Parameters
     ----------
     scene, discretization, plan, observer, comm
         As there.
-    journal
-        Steps of a run that was interrupted, and what keeps further ones.
 
-    Raises as :func:`trace` does, and :class:`~rodfem.errors.InputError` for the journal of another run.
+    Raises as :func:`trace` does.
     """
     plan.check(scene, discretization)
     end_together()
-    journal = journal or Journal()
     recorder, clock = Recorder(observer), Clock()
     with form_compiler.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
-            mesh = journal.first_mesh or _mesh(scene, discretization, plan, recorder, comm)
+            mesh = _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None:
                 check_waves(found, plan.over(scene), recorder.warn)
-        asked = as_asked(scene, discretization, plan) | prints(found.system, plan)
-        recorder.asked(asked)
+        asked = as_asked(found.system, plan)
         recorder.system(found.system, plan.accuracy)
         if unused := _not_used(discretization, plan):
             recorder.note(unused)
@@ -134,12 +122,11 @@ def traced(
 
         tracer: Explorer | Sweep
         if isinstance(found, BranchSolver):
-            tracer = Explorer(found, plan, recorder, complete, journal)
+            tracer = Explorer(found, plan, recorder, complete)
         else:
             tracer = Sweep(found, plan, recorder, complete)
         diagram = Diagram(scene, plan, tracer.branches, tracer.solvers)
         diagram.warnings, diagram.notes, diagram.asked = recorder.warnings, recorder.notes, asked
-        diagram.run = journal.run or diagram.run
         try:
             tracer.run()
             if plan.accuracy is not None and scene.conservative:

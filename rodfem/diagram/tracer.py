@@ -18,9 +18,8 @@ from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END, USER
-from rodfem.continuation.observer import Observer, Recorder
+from rodfem.continuation.observer import Observer
 from rodfem.continuation.switching import FIRST
-from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.branch_ends import (
     before_the_end,
     closing,
@@ -33,7 +32,6 @@ from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.finders import FINDERS
 from rodfem.diagram.hidden_changes import HiddenChanges
 from rodfem.diagram.images import image_of
-from rodfem.diagram.journal import Journal
 from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
@@ -58,18 +56,11 @@ class Tracer:
     is lost.
     """
 
-    def __init__(
-        self,
-        solver: BranchSolver,
-        plan: Plan,
-        observer: Observer,
-        finished: Callable[[], None],
-        journal: Journal | None = None,
-    ) -> None:
+    def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
         """Start with no branch; the plan must have passed its :meth:`Plan.check`.
 
         ``solver`` has the first mesh, the ``observer`` hears of the progress, ``finished()`` is called after each
-        branch.  The ``plan`` has range, depth and steps; the ``journal`` knows the steps of a run that goes on.
+        branch.  The ``plan`` has range, depth and steps.
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.scene = solver.system.scene
@@ -88,8 +79,6 @@ class Tracer:
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         self.kinks = Kinks(self.meshes.solvers, observer, self.scene.load)
         self.hidden = HiddenChanges(self.meshes.solvers, observer, self.scene.load)
-        said = observer if isinstance(observer, Recorder) else None
-        self.book = Bookkeeper(journal or Journal(), self.meshes, self.gaps, self.branches, plan.events, said)
 
     @property
     def solvers(self) -> Sequence[BranchSolver]:
@@ -106,10 +95,6 @@ class Tracer:
 
     def trace(self, branch: Branch) -> None:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
-        if branch.ended == NOT_TRACED:
-            if self._recalled(branch.name):
-                return
-            self.book.begin()
         self.branches.append(branch)
         if branch.ended == NOT_TRACED:
             self.observer.branch(branch)
@@ -140,9 +125,6 @@ class Tracer:
         """
         if point.tangent is None:
             raise ValueError("A point without a tangent is no start of a branch.")
-        if self._recalled(name):
-            return
-        self.book.begin()
         back = Branch(name, None, depth, [point.backwards(0.0)])
         self.use(point.mesh)
         self.observer.branch(back)
@@ -426,7 +408,6 @@ class Tracer:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)
         self.control.summary(branch, self.observer)
-        self.book.keep(branch.name, branch, {"warned": self.zeros.said, "mesh": self.solver.mesh})
         self.finished()
 
     def _soft_modes(self, branch: Branch) -> None:
@@ -435,31 +416,6 @@ class Tracer:
             explain(branch)  # once more: richer meshes may have decided more than a factorisation does
         for sentence in self.soft.undecided(branch):
             self.observer.warn(sentence)
-
-    def _recalled(self, name: str) -> bool:
-        """Whether the journal knows a branch of that name, which is then one of those that have been traced."""
-        known = self.book.recall(name)
-        if known is None:
-            return False
-        branch: Branch = known.found
-        self.branches.append(branch)
-        self.zeros.said = known.left["warned"]
-        self.use(known.left["mesh"])
-        self.observer.branch(branch)
-        for special in branch.special:
-            if special.kind != END:
-                self.observer.special(branch, special)
-        self._repeat(known)
-        self.observer.finished(branch)
-        self.finished()
-        return True
-
-    def _repeat(self, known: Recalled) -> None:
-        """Say once more what was said in a step."""
-        for note in known.notes:
-            self.observer.note(f"  {note}")
-        for warning in known.warnings:
-            self.observer.warn(warning)
 
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.scope("error bars"):

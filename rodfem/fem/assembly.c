@@ -40,11 +40,15 @@ typedef struct {
     const int *column;   /* cells x kinds x size: offset of the column in rows of that pattern; -1: not there */
 } Places;
 
+static long assembled; /* forms since the module was loaded */
+PUBLIC long assemblies(void) { return assembled; }
+
 /* Add the form for the values u to out.  Returns 1 where an interior facet couples more than the cell of its first side,
    which no place is for.  */
 PUBLIC int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out)
 {
     const uint8_t permutations[2] = {0, 0};
+    assembled++;
     int n = form->size;
     double coordinates[12];
     for (int k = 0; k < form->integrals; k++) {

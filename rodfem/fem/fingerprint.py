@@ -7,19 +7,13 @@ both ends is seen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.errors import SceneError
 from rodfem.fem.fields import LOAD
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
-from rodfem.problem.events import Event
 from rodfem.problem.local_state import inside
-from rodfem.tolerances import NEGLIGIBLE
 
 AMPLITUDE = 0.1
 """Size of the waves on top of the undeformed rod, in natural sizes."""
@@ -44,39 +38,13 @@ def fingerprint(system: System, span: tuple[float, float]) -> list[float | None]
     return [float(value) if np.isfinite(value) else None for values in out for value in values]
 
 
-def of_events(system: System, events: Sequence[Event], span: tuple[float, float]) -> list[list[float | None]]:
-    """Values of each of the ``events`` at the states of a :func:`fingerprint`; None where it has none.  Collective.
-
-    The states are those of a ``system`` for a ``span``.
-    """
-    if not events:
-        return []
-    shape = Shape(system)
-    samples = [shape.sample(_waves(system, load)) for load in _loads(system, span)]
-    return [[_value(event, sample) for sample in samples] for event in events]
-
-
-def same_event(a: list[float | None], b: list[float | None]) -> bool:
-    """Whether values of an event are those of one function, up to round-off, which is absolute where they are zero."""
-    known = _known(a, b)
-    if known is None or not len(known):
-        return known is not None
-    close = max(SAME * abs(known).max(), NEGLIGIBLE)
-    return bool((abs(known[:, 0] - known[:, 1]) <= close).all())
-
-
 def same(a: list[float | None], b: list[float | None]) -> bool:
     """Whether two fingerprints are those of one scene; of an older file, which has less, what it has is compared."""
-    known = _known(a, b)
-    return known is not None and bool((abs(known[:, 0] - known[:, 1]) <= SAME * abs(known).max(axis=1)).all())
-
-
-def _known(a: list[float | None], b: list[float | None]) -> np.ndarray | None:
-    """Pairs of the numbers that both lists have, (k, 2), as far as the shorter goes; None where one alone has one."""
     pairs = list(zip(a, b, strict=False))
     if any((p is None) != (q is None) for p, q in pairs):
-        return None
-    return np.array([(p, q) for p, q in pairs if p is not None and q is not None]).reshape(-1, 2)
+        return False
+    known = np.array([(p, q) for p, q in pairs if p is not None and q is not None]).reshape(-1, 2)
+    return bool((abs(known[:, 0] - known[:, 1]) <= SAME * abs(known).max(axis=1)).all())
 
 
 def _numbers(system: System, shape: Shape, mass: PETSc.Mat, load: float) -> list[float]:
@@ -99,14 +67,6 @@ def _loads(system: System, span: tuple[float, float]) -> list[float]:
     """Loads of the states: those of the range of the scene of a ``system``, then of the ``span`` if it is another."""
     own = system.scene.span
     return [*own, *inside(own)] + ([] if tuple(span) == own else [*span, *inside(span)])
-
-
-def _value(event: Event, sample: dict[str, Any]) -> float | None:
-    """Value of an event at a state, given by its arrays; None where it has none."""
-    try:
-        return event(sample)
-    except SceneError:
-        return None
 
 
 def _waves(system: System, load: float) -> PETSc.Vec:

@@ -26,6 +26,10 @@
 #define MOST 10        /* and at most: fine meshes need six */
 #define SERVES 16.0    /* a scale serves while all sizes are within this of one */
 
+static long factored, solved_columns; /* work since the module was loaded: a measure without noise */
+PUBLIC long chain_factored(void) { return factored; }
+PUBLIC long chain_solved_columns(void) { return solved_columns; }
+
 typedef struct {
     int own, m;              /* number of fully summed unknowns, and of all, without delayed ones */
     int *unknowns;           /* m of them: the fully summed ones first */
@@ -458,6 +462,7 @@ static int eliminate_general(chain *c, double *a, int m, int full, int *rows, in
    ends, 3 where a value is no number.  */
 PUBLIC int chain_factor(chain *c, const double *values)
 {
+    factored++;
     double most = 0, sum = 0;
     for (int i = 0; i < c->n; i++)
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
@@ -632,6 +637,7 @@ static int room_for_columns(chain *c)
 /* Solutions x for k columns of b, one after the other (n each).  2: out of memory.  */
 PUBLIC int chain_solve(chain *c, int k, const double *b, double *x)
 {
+    solved_columns += k;
     if (!room_for_columns(c)) return 2;
     double *y = c->forward, *solved = c->symmetric ? y : c->back, *z = c->back + (size_t)c->n * WIDTH;
     for (int column = 0, w; column < k; column += w) {
@@ -650,6 +656,7 @@ PUBLIC int chain_solve(chain *c, int k, const double *b, double *x)
    strip, of four or of WIDTH, are zero.  2: out of memory.  */
 PUBLIC int chain_solve_transposed(chain *c, int k, const double *b, double *x)
 {
+    solved_columns += k;
     if (!room_for_columns(c)) return 2;
     double *y = c->forward, *solved = c->back, *z = c->back + (size_t)c->n * WIDTH;
     for (int column = 0, w; column < k; column += w) {
@@ -667,7 +674,6 @@ PUBLIC int chain_solve_transposed(chain *c, int k, const double *b, double *x)
     return 0;
 }
 
-PUBLIC void chain_forget(chain *c) { c->scaled = 0; } /* the scale of the matrix before */
 PUBLIC int chain_negative(const chain *c) { return c->negative; }
 PUBLIC int chain_zero(const chain *c) { return c->zero; }
 PUBLIC int chain_fronts(const chain *c) { return c->fronts; }

@@ -151,10 +151,6 @@ class Elimination:
             raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
         return out
 
-    def forget(self) -> None:
-        """Forget the scale of the last matrix, which the next one has otherwise as long as it serves."""
-        self.lib.chain_forget(self._chain)
-
     def inertia(self) -> tuple[int, int]:
         """Number of negative pivots of the symmetric matrix last factored, and of those that are zero."""
         return int(self.lib.chain_negative(self._chain)), int(self.lib.chain_zero(self._chain))
@@ -229,11 +225,6 @@ class Chain:
     def adopt(self, *, regular: bool) -> None:
         """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""
         self.resorted, self.regular, self.elimination.regular = False, regular, regular
-
-    def forget(self) -> None:
-        """Forget the scale of the last matrix."""
-        if self._matrix is not None:
-            self.elimination.forget()
 
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
         """Solve with the last factors."""

@@ -39,8 +39,8 @@ def typical_modes(branches: Sequence[Branch], solvers: Sequence[StaticSolver]) -
 def of_branch(branch: Branch, solvers: Sequence[StaticSolver]) -> list[Typical]:
     """Modes at the typical states of a ``branch``, each on the mesh of its point; collective.
 
-    They depend on nothing but the branch: a run that goes on finds the same.  None of a rod without inertia.
-    ``solvers`` are those of the meshes by number.
+    They depend on nothing but the branch.  None of a rod without inertia.  ``solvers`` are those of the meshes by
+    number.
     """
     if solvers[0].system.equations.massless:
         return []

@@ -20,7 +20,7 @@ LOCK = ".lock"
 MOST = 300
 """Bytes of the lock that are read."""
 PICTURES_OF_A_RUN = ("locus.png", "diagram.png", "shape.png", "modes-*.png", "modes-*.gif", "report.html")
-OF_A_RUN = ("resume-*.h5", "modes.h5", "locus*.json", *PICTURES_OF_A_RUN)
+OF_A_RUN = ("modes.h5", "locus*.json", *PICTURES_OF_A_RUN)
 """Files that a run may leave beside its diagram and states."""
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
 """Suffixes of pictures of diagrams; without one it is PNG."""

@@ -99,7 +99,7 @@ def test_a_file_that_runs_its_rod_itself(tmp_path: Path, capsys: pytest.CaptureF
     """The rod is traced once, over the range of the command line, and nothing is written where the file says."""
     file, there, here = (tmp_path / name for name in ("mine.py", "there", "here"))
     file.write_text(f"{SCENE}\nimport rodfem\nrodfem.run(column, output={str(there)!r})\nnot_reached()\n")
-    console.main(["run", str(file), "--range", "0", "3", "--quick", "--output", str(here)])
+    console.main(["run", str(file), "--range", "0", "3", "--no-figures", "--output", str(here)])
     assert capsys.readouterr().out.count("column: ") == 1
     assert not there.exists() and rodfem.load_json(here / "diagram.json")["range"] == [0.0, 3.0]
     rodfem.run(load(file).column, output=there, figures=False, quiet=True)  # as ever, once it has been read

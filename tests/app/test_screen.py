@@ -17,9 +17,8 @@ from pathlib import Path
 import hemitropic_cases
 import pytest
 from hard.folders import surroundings
-from hemitropic_cases import run_demo
 
-from rodfem import Discretization, Plan, trace
+from rodfem import Discretization, Plan, run, trace
 from rodfem.app.screen import coloured
 from rodfem.app.terminal import Report, is_screen
 from rodfem.launcher import RANK
@@ -214,7 +213,7 @@ def test_an_interrupt_is_one_sentence(folder: Path) -> None:
     assert child.wait(PATIENCE) == 128 + signal.SIGINT
     text = seen.end()
     assert lines_that_stay(text)[-2:] == [
-        f"interrupted; the branches that were finished are in {folder}: --resume goes on there",
+        f"interrupted; the branches that were finished are in {folder}: rodfem.load reads them",
         "",
     ]
     assert "Traceback" not in text and text.count("\x1b[?25l") == text.count("\x1b[?25h") == 1
@@ -237,11 +236,11 @@ def test_most_branches() -> None:
 
 
 @pytest.mark.long
-def test_a_quick_look(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    common = ("--range", "0", "0.5", "--elements", "6", "--degree", "3", "--output", str(folder))
-    run_demo(*common, "--quick", "--most-branches", "2")
+def test_a_run_without_error_bars_of_few_branches(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    plan = Plan(most_branches=2, error_bars=False)
+    run(hemitropic_cases.scene(span=(0.0, 0.5)), MESH, plan, folder, figures=False)
     out = capfd.readouterr().out
     assert "no estimate" in out and not list(folder.glob("*.png"))
-    assert "1 branch point was not followed, as there are 2 branches: --most-branches 4 follows what leaves" in out
+    assert "1 branch point was not followed, as there are 2 branches: Plan(most_branches=4) follows what leaves" in out
     assert "The first branch, straight, is stable from lam = 0 to 0.11" in out
     assert "\033" not in out

@@ -1,12 +1,10 @@
-"""Files of another rod, or of another event: what no number of a scene tells, its equations do."""
+"""Files of another rod: what no number of a scene tells, its equations do; and the plan of a diagram that is read."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 import ufl
@@ -16,7 +14,7 @@ import rodfem
 from rodfem import Attachment, Discretization, Event, Inertia, Plan, Scene, clamped, free
 from rodfem.continuation.kinds import EVENT
 from rodfem.errors import InputError
-from rodfem.fem.fingerprint import OLDER, fingerprint, same, same_event
+from rodfem.fem.fingerprint import OLDER, fingerprint, same
 from rodfem.fem.system import System
 
 MESH = Discretization("auto", 4, 4)
@@ -56,10 +54,8 @@ def test_files_of_another_rod(folder: Path, name: str) -> None:
     scene, other, plan = OTHERS[name]
     rodfem.run(scene(), MESH, plan, folder, figures=False, quiet=True)
     assert len(rodfem.load(folder, scene())) == 1
-    assert len(rodfem.resume(folder, scene(), quiet=True, figures=False)) == 1
-    for read in (rodfem.load, lambda *a: rodfem.resume(*a, quiet=True, figures=False)):
-        with pytest.raises(InputError, match="was run with other equations than those of the scene"):
-            read(folder, other())
+    with pytest.raises(InputError, match="was run with other equations than those of the scene"):
+        rodfem.load(folder, other())
 
 
 def test_a_fingerprint_of_an_older_file() -> None:
@@ -77,48 +73,6 @@ def test_loads_beyond_the_range_of_the_scene() -> None:
     for high, alike in ((1.0, True), (6.0, False)):
         first, second = (fingerprint(System(beyond(e), MESH), (0.0, high)) for e in (0.0, 0.05))
         assert same(first, second) == alike
-
-
-# --- events ----------------------------------------------------------------------------------------------------------
-
-
-def reaching(x: float, name: str = "reaches") -> Plan:
-    """A plan with an event: the tip is at ``x``."""
-    return Plan((0.0, 1.0), depth=0, error_bars=False, events=(Event(name, of=lambda s: s.r[-1, 0] - x),))
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_another_event_of_one_name(folder: Path) -> None:
-    """A complete run and one that goes on tell it from that of the run; of an older file names are compared."""
-    scene = column("pulled", (clamped(), free(lambda c: (c.P, 0.0, 0.0))), (0.0, 1.0))
-    silent: dict[str, Any] = {"quiet": True, "figures": False}
-    rodfem.run(scene, MESH, reaching(0.1), folder, **silent)
-    kept = rodfem.resume(folder, scene, MESH, reaching(0.1), **silent)
-    assert [s.note for s in kept.special("reaches")] == ["reaches"]
-    with pytest.raises(InputError, match="was run with another event 'reaches'"):
-        rodfem.resume(folder, scene, MESH, reaching(0.05), **silent)
-    data = json.loads((folder / "diagram.json").read_text())
-    del data["asked"]["events"]
-    (folder / "diagram.json").write_text(json.dumps(data))
-    assert len(rodfem.resume(folder, scene, MESH, reaching(0.1), **silent)) == 1
-    with pytest.raises(InputError, match="was run with events"):
-        rodfem.resume(folder, scene, MESH, reaching(0.1, "arrives"), **silent)
-
-
-def test_values_of_events() -> None:
-    """Round-off of zero is no difference; a value where the other has none is one."""
-    for first, second, alike in (
-        ([1.0, 2.0], [1.0, 2.0 + 1e-12], True),
-        ([1.0, 2.0], [1.0, 2.0 + 1e-6], False),
-        ([1e-17, 0.0], [0.0, -1e-16], True),
-        ([None, 2.0], [None, 2.0], True),
-        ([None, 2.0], [1.0, 2.0], False),
-        ([None, None], [None, None], True),
-        ([None, None], [1.0, 2.0], False),
-        ([1.0], [1.0, 2.0], True),
-    ):
-        assert same_event(first, second) == same_event(second, first) == alike
 
 
 @pytest.mark.long

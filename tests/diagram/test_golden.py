@@ -22,8 +22,13 @@ from golden_cases import (
     single_branches,
 )
 from literature.test_classics import CRITICAL
+from mpi4py import MPI
+from work import counted
+from work import recorded as recorded_work
 
 NUMBERS = numbers()
+NOISE = 1.05
+"""Factor by which work may differ where libraries and processors round differently."""
 
 
 @pytest.mark.alone
@@ -50,8 +55,12 @@ def marked(name: str) -> Any:
 
 @pytest.mark.parametrize("name", [marked(name) for name in NUMBERS])
 def test_nothing_has_changed(name: str) -> None:
-    """Bars, which nobody compares, are computed of varied cases: of the others they would take half of the time."""
-    found, recorded = record(cases()[name](), error_bars=name in VARIED), NUMBERS[name]
+    """Bars, which nobody compares, are computed of varied cases: of the others they would take half of the time.
+
+    Nor does it cost more: counts of work are compared on one rank, and may only fall.
+    """
+    with counted() as work:
+        found, recorded = record(cases()[name](), error_bars=name in VARIED), NUMBERS[name]
     for key in ("name", "ended", "indices"):
         assert [b[key] for b in found] == [b[key] for b in recorded]
     for branch, old in zip(found, recorded, strict=True):
@@ -61,6 +70,8 @@ def test_nothing_has_changed(name: str) -> None:
             allowed = max(t["bar"], 1e-10 * max(1.0, abs(t["load"])))
             assert s["load"] == pytest.approx(t["load"], abs=allowed, rel=0), branch["name"]
             assert s.get("omega2") == (pytest.approx(t["omega2"], rel=1e-8) if "omega2" in t else None)
+    most = {kind: NOISE * count + 2 for kind, count in recorded_work()[name].items()}
+    assert MPI.COMM_WORLD.size > 1 or {kind: count for kind, count in work.items() if count > most[kind]} == {}
 
 
 @pytest.mark.long

@@ -1,15 +1,26 @@
-"""Record every special point and index of all cases in ``tests/golden/numbers.json``."""
+"""Record every special point and index of all cases in ``tests/golden``: numbers.json; with ``work``: work.json.
+
+Work is counted with the error bars that ``tests/diagram/test_golden.py`` computes.
+"""
 
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
-from golden_cases import cases, record
+from golden_cases import VARIED, cases, record
+from work import RECORD, counted
 
 if __name__ == "__main__":
-    numbers = {}
+    numbers, costs = {}, {}
     for name, scene in cases().items():
-        numbers[name] = record(scene())
-        print(name, sum(len(b["special"]) for b in numbers[name]), flush=True)
-    (Path(__file__).parent / "numbers.json").write_text(json.dumps(numbers, indent=1) + "\n")
+        if sys.argv[1:] == ["work"]:
+            with counted() as costs[name]:
+                record(scene(), error_bars=name in VARIED)
+            print(name, costs[name], flush=True)
+        else:
+            numbers[name] = record(scene())
+            print(name, sum(len(b["special"]) for b in numbers[name]), flush=True)
+    path, found = (RECORD, costs) if costs else (Path(__file__).parent / "numbers.json", numbers)
+    path.write_text(json.dumps(found, indent=1) + "\n")

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 
 HOME = Path(__file__).parents[2]
 MPIRUN = ("/usr/bin/mpirun.openmpi", "--oversubscribe", "-n", "2")
@@ -34,11 +33,8 @@ def alive(process: int) -> bool:
 
 
 def branches_in(folder: Path, drafts: bool = False) -> list[str]:
-    """Branches that both files of a folder have, which holds nothing else but the steps of a run that goes on.
-
-    And, after a kill, the ``drafts`` of files.
-    """
-    rest = {file.name for file in folder.iterdir() if not file.match("resume-*.h5")}
+    """Branches that both files of a folder have, which holds nothing else but, after a kill, ``drafts`` of files."""
+    rest = {file.name for file in folder.iterdir()}
     rest -= {name for name in rest if drafts and ".part." in name}
     assert rest - {".lock"} == {"diagram.json", "states.h5"}, rest
     data = json.loads((folder / "diagram.json").read_text())
@@ -53,21 +49,6 @@ def contents(folder: Path) -> dict[str, Any]:
     """Diagram of a run, but for times, origin and the name of the run."""
     data: dict[str, Any] = json.loads((folder / "diagram.json").read_text())
     return {name: value for name, value in data.items() if name not in ("timing", "origin", "run")}
-
-
-def check_states(folder: Path, other: Path, close: float = 0.0) -> None:
-    """Both files have the same rows, and those of the diagram beside them."""
-
-    def check(name: str, entry: Any) -> None:
-        if isinstance(entry, h5py.Dataset) and entry.dtype.kind == "f":
-            np.testing.assert_allclose(entry[()], theirs[name][()], rtol=close, atol=close)
-
-    with h5py.File(folder / "states.h5") as mine, h5py.File(other / "states.h5") as theirs:
-        names: list[set[str]] = [set(), set()]
-        mine.visit(names[0].add)
-        theirs.visit(names[1].add)
-        assert names[0] == names[1]
-        mine.visititems(check)
 
 
 def alike(a: Any, b: Any, close: float) -> bool:

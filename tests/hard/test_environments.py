@@ -28,7 +28,7 @@ from rodfem.fem import form_compiler
 
 pytestmark = pytest.mark.alone
 RUN = "import sys; from rodfem.app.console import main; main(sys.argv[1:])"
-SMALL = ("--quick", "--elements", "4", "--degree", "2", "--depth", "0")
+SMALL = ("--step", "0.15", "--no-figures", "--elements", "4", "--degree", "2", "--depth", "0")
 
 
 def run(*words: str, before: tuple[str, ...] = (), **environment: str | None) -> subprocess.CompletedProcess[str]:

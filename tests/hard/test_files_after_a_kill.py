@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import shutil
@@ -158,6 +159,20 @@ def test_files_of_two_runs(folder: Path, diagrams: tuple[Diagram, Diagram]) -> N
     COMM.barrier()
     with pytest.raises(InputError, match=r"states.h5 and the diagram.json beside it are of different runs: keep"):
         rodfem.load(folder / diagrams[1].scene.name, diagrams[1].scene)
+
+
+@pytest.mark.long
+@pytest.mark.alone
+def test_same_input_same_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Byte for byte, but for times, their date among them, and the name of the run."""
+    monkeypatch.setattr("rodfem.diagram.diagram.uuid4", lambda: type("name", (), {"hex": "one"}))
+    for name in ("first", "second"):
+        run(scene(), rodfem.Discretization("auto", 6, 6), rodfem.Plan((0.0, 0.3), error_bars=False), folder / name,
+            figures=False, quiet=True)  # fmt: skip
+    first, second = (json.loads((folder / name / "diagram.json").read_text()) for name in ("first", "second"))
+    times = {"timing": {}, "origin": {}}
+    assert json.dumps(first | times) == json.dumps(second | times)
+    assert (folder / "first" / "states.h5").read_bytes() == (folder / "second" / "states.h5").read_bytes()
 
 
 @pytest.mark.short
