@@ -67,4 +67,4 @@ bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md,
 
 clean: ## remove what the commands above made, but not .venv
 	rm -rf results build *.egg-info .mypy_cache .ruff_cache .pytest_cache
-	find rodfem forms demos tests -name __pycache__ -prune -exec rm -rf {} +
+	find rodfem forms demos docs tests -name __pycache__ -prune -exec rm -rf {} +

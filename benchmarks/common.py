@@ -59,15 +59,12 @@ def environment(**more: str) -> dict[str, str]:
     return kept | MPI_SETTINGS | {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg", "PYTHONPATH": ":".join(paths)} | more
 
 
-def measured(module: str, *arguments: object, ranks: int = 1, limit: float = 300.0) -> Iterator[dict[str, Any]]:
+def measured(module: str, *arguments: object, limit: float = 300.0) -> Iterator[dict[str, Any]]:
     """What a module prints as lines of JSON when it is run in a process of its own, as it comes.
 
     A process that fails, or takes longer than ``limit`` seconds, ends with ``{"failed": why}``.
     """
-    command = [sys.executable, "-m", module, *map(str, arguments)]
-    if ranks > 1:
-        command = [MPIRUN, "--oversubscribe", "-n", str(ranks), *command]
-    command = ["timeout", "--foreground", "-k", "5", f"{limit:g}", *command]
+    command = ["timeout", "--foreground", "-k", "5", f"{limit:g}", sys.executable, "-m", module, *map(str, arguments)]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(), cwd=ROOT
     ) as process:

@@ -30,7 +30,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",
 ]
-exclude_patterns = ["*.py", "course/solutions"]
+exclude_patterns = ["*.py", "course/check.py", "course/lesson", "course/solutions"]
 html_theme = "furo"
 html_title = "rodfem"
 html_show_copyright = False

@@ -65,7 +65,6 @@ class Format:
         if MARK in file.attrs:
             mark = {key: file.attrs.get(name) for key, name in zip(KEYS, self.mark_attributes(), strict=True)}
         self._check(mark, {*file.attrs, *file}, file.filename, needs)
-        _check_links(file, file.filename, set())
 
     def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
         if mark is not None:
@@ -104,23 +103,6 @@ FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
 UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, AttributeError, RuntimeError)
 """Errors of h5py and numpy for a file that holds something else than was expected."""
-
-
-def _check_links(group: Any, where: str, seen: set[Any]) -> None:
-    """Raise :class:`InputError` for an HDF5 group that leads to another file: rodfem writes none."""
-    import h5py
-
-    if group.id in seen:
-        return
-    seen.add(group.id)
-    for name in group:
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise InputError(f"{where} has a link instead of {name!r}: give a file that a run has written.")
-        entry = group[name]
-        if isinstance(entry, h5py.Dataset) and (entry.external or entry.is_virtual):
-            raise InputError(f"{where} takes {name!r} from another file: give one that a run has written.")
-        if isinstance(entry, h5py.Group):
-            _check_links(entry, where, seen)
 
 
 def _no_number(name: str) -> float:

@@ -1429,12 +1429,6 @@ FAULTS = {
         "rodfem/adaptivity/zero_stretch.py", "else 0.25", "else 0.0025", f"{ERRORS} {HEMITROPIC} {BUCKLED}"
     ),
     # files
-    "code-is-taken-for-whole": Fault(
-        "rodfem/code_cache.py",
-        "return bool(size >= place + entry * number)",
-        "return size >= 64",
-        "tests/hard/test_environments.py",
-    ),
     "no-drafts": Fault(
         "rodfem/whole_files.py",
         'draft = path.with_name(f".{path.stem}.part{path.suffix}")',

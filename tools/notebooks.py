@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The lessons of the course as notebooks, which run where rodfem is not installed yet: the first cell installs it.
+"""The lessons of the course as notebooks, beside the package that they use; the first cell installs rodfem.
 
 Run it as ``python tools/notebooks.py FOLDER``, with jupytext: ``pip install ".[notebooks]"``.
 """
@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 import jupytext
 from nbformat.v4 import new_code_cell
 
 LESSONS = Path(__file__).parents[1] / "docs" / "course"
+PACKAGE = "lesson"
+"""What all lessons import."""
 INSTALL = """\
 # In a hosted notebook (Python 3.12 or newer) this installs rodfem and all that it needs, in a minute.
 from importlib.util import find_spec
@@ -23,8 +26,8 @@ if find_spec("rodfem") is None:
 
 
 def write(folder: Path) -> list[Path]:
-    """Write all lessons as notebooks into ``folder``; returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write all lessons as notebooks into ``folder``, with their package; returns the paths of the notebooks."""
+    copytree(LESSONS / PACKAGE, folder / PACKAGE, ignore=ignore_patterns("__pycache__"), dirs_exist_ok=True)
     written = []
     for lesson in sorted(LESSONS.glob("[0-9]*.py")):
         notebook = jupytext.read(lesson)

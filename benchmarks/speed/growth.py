@@ -1,11 +1,9 @@
-"""Cost against the number of unknowns, on one rank or several: the cord with elements of degree 2, straight or buckled.
+"""Cost against the number of unknowns: the cord with elements of degree 2, straight or buckled.
 
     python -m benchmarks.speed.growth buckled reduced 1000 10000
-    mpirun -n 2 python -m benchmarks.speed.growth straight pointwise 100000
-    mpirun -n 2 python -m benchmarks.speed.growth --each straight pointwise 50000    (each rank a rod of its own)
 
-prints a line of JSON for each number of elements: seconds of processor and of wall time (medians of three, after one
-that is not counted) of an equilibrium at a load a little off and of a count, and memory over all ranks.
+prints a line of JSON for each number of elements: seconds of processor time (medians of three, after one that is not
+counted) of an equilibrium at a load a little off and of a count, and memory.
 """
 
 from __future__ import annotations
@@ -15,10 +13,9 @@ import resource
 import sys
 from collections.abc import Callable
 from statistics import median
-from time import perf_counter, process_time
+from time import process_time
 from typing import Any
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from benchmarks.speed.scenes import scene
@@ -31,12 +28,11 @@ import small_states  # isort: skip
 LOAD, DEGREE, RUNS = 40.0, 2, 3
 NUDGE = 1e-3
 """Change of the load, relative, of which an equilibrium is computed: two or three corrections, as along a branch."""
-COMM = MPI.COMM_WORLD
 
 
 def memory() -> float:
-    """Most memory that all ranks together have had so far, in MB."""
-    return float(COMM.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)) / 1024
+    """Most memory that this process has had so far, in MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def first(solver: Any, state: str) -> PETSc.Vec:
@@ -54,23 +50,21 @@ def first(solver: Any, state: str) -> PETSc.Vec:
 
 
 def timed(name: str, work: Callable[[], Any]) -> dict[str, float]:
-    """Median processor time of one rank, the busiest, and wall time until all are done."""
+    """Median processor time."""
     work()
-    times, walls = [], []
+    times = []
     for _ in range(RUNS):
-        COMM.barrier()
-        started, wall = process_time(), perf_counter()
+        started = process_time()
         work()
-        times.append(COMM.allreduce(process_time() - started, op=MPI.MAX))
-        walls.append(COMM.allreduce(perf_counter() - wall, op=MPI.MAX))
-    return {name: median(times), f"{name} wall": median(walls)}
+        times.append(process_time() - started)
+    return {name: median(times)}
 
 
-def measure(state: str, formulation: str, elements: int, comm: MPI.Comm) -> dict[str, Any]:
+def measure(state: str, formulation: str, elements: int) -> dict[str, Any]:
     """Times in seconds and memory in MB."""
-    before, started, wall = memory(), process_time(), perf_counter()
-    solver: Any = Solver(scene("cord"), Discretization(formulation, elements, DEGREE), comm).equilibria
-    setup = {"setup": process_time() - started, "setup wall": perf_counter() - wall}
+    before, started = memory(), process_time()
+    solver: Any = Solver(scene("cord"), Discretization(formulation, elements, DEGREE)).equilibria
+    setup = process_time() - started
     x = first(solver, state)
     corrections: list[int] = []
 
@@ -87,8 +81,7 @@ def measure(state: str, formulation: str, elements: int, comm: MPI.Comm) -> dict
         "elements": elements,
         "degree": DEGREE,
         "unknowns": solver.system.fields.unknowns,
-        "ranks": COMM.size,
-        **setup,
+        "setup": setup,
         **timed("equilibrium", equilibrium),
         **timed("count", lambda: index.append(solver.inertia.at(x).count().negative)),
         "corrections": corrections[-1],
@@ -100,12 +93,9 @@ def measure(state: str, formulation: str, elements: int, comm: MPI.Comm) -> dict
 
 def main() -> None:
     """Print what is measured."""
-    each = "--each" in sys.argv
-    state, formulation, *elements = (word for word in sys.argv[1:] if word != "--each")
+    state, formulation, *elements = sys.argv[1:]
     for n in elements:
-        found = measure(state, formulation, int(n), MPI.COMM_SELF if each else COMM)
-        if COMM.rank == 0:
-            print(json.dumps(found), flush=True)
+        print(json.dumps(measure(state, formulation, int(n))), flush=True)
 
 
 if __name__ == "__main__":

@@ -58,48 +58,6 @@ def growth(store: Store) -> str:
     return table(head, out)
 
 
-def scaling(store: Store) -> str:
-    """Ranks against one rank."""
-    head = [
-        "",
-        "elements",
-        "ranks",
-        "set-up, s",
-        "equilibrium, s",
-        "index, s",
-        "memory, MB",
-        "speed-up",
-        "of the index",
-    ]
-    out: list[list[str]] = []
-    one: dict[tuple[str, str], Row] = {}
-    for key, data in sorted(store.under("scaling")):
-        kind, n, ranks = key.split("/")
-        for r in data:
-            if "failed" in r:
-                out.append([kind, n, ranks, f"failed: {r['failed']}", "", "", "", "", ""])
-                continue
-            base = one.setdefault((kind, n), r)
-            out.append([kind, str(r["elements"]), ranks, *(digits(r[f"{k} wall"]) for k in WORK), digits(r["memory"])])
-            out[-1] += [digits(base[f"{k} wall"] / r[f"{k} wall"], 2) for k in WORK[1:]]
-    return table(head, out)
-
-
-def faster(store: Store) -> str:
-    """Whether the longest rod is faster on two ranks than on one."""
-    found = {(r["elements"], r["ranks"]): r for r in store.rows("scaling/strong")}
-    longest = max((n for n, _ in found), default=0)
-    one, two = found.get((longest, 1)), found.get((longest, 2))
-    if one is None or two is None:
-        return ""
-    gains = [one[f"{k} wall"] / two[f"{k} wall"] for k in WORK[1:]]
-    return (
-        f"One rod of {longest} elements faster on 2 ranks than on 1: {'met' if min(gains) > 1 else 'missed'}, "
-        f"{digits(gains[0], 2)} times as fast an equilibrium, {digits(gains[1], 2)} times an index. What falls "
-        "short of 2 is assembly, the copies of each rank's entries, and messages."
-    )
-
-
 def many(store: Store) -> str:
     """The map on one rank and more."""
     found = store.rows("map")
@@ -178,8 +136,6 @@ def write(store: Store, path: Path) -> None:
     if store.rows("growth"):
         lines += ["## Growth", words.GROWTH.format(far=FAR)]
         lines += [_figure("growth", "Cost against the number of unknowns"), growth(store)]
-    if any(True for _ in store.under("scaling")):
-        lines += ["### Ranks", words.RANKS, scaling(store), faster(store)]
     if store.rows("map"):
         lines += ["## Many rods", words.MANY, many(store)]
     if demos := store.rows("processes"):

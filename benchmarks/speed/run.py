@@ -31,7 +31,7 @@ PARTS = ("assembly", "solve", "stability")
 
 @dataclass(frozen=True)
 class Size:
-    """How much is measured: elements by degree, runs, loads for scipy, elements for growth and scaling, couplings."""
+    """How much is measured: elements by degree, runs, loads for scipy, elements for growth, couplings."""
 
     reduced: Grid = field(
         default_factory=lambda: {
@@ -58,7 +58,6 @@ class Size:
     growth: Mapping[str, Sequence[int]] = field(
         default_factory=lambda: {"reduced": (100, 1000, 10_000, 100_000), "pointwise": (100, 1000, 10_000, 45_000)}
     )
-    scaling: tuple[int, ...] = (10_000, 100_000)
     couplings: int = 12
 
 
@@ -70,7 +69,6 @@ QUICK = Size(
     runs=1,
     loads=4,
     growth={"reduced": (100, 1000, 3000), "pointwise": (100, 1000, 3000)},
-    scaling=(3000,),
     couplings=2,
 )
 
@@ -117,18 +115,9 @@ def everything(store: Store, size: Size) -> None:
             for n in sizes:
                 key = f"growth/{state}/{formulation}/{n}"
                 store.measure(key, partial(_run, "growth", (state, formulation, n)))
-    cores = os.cpu_count() or 1
-    for n in size.scaling:
-        for ranks in range(1, cores + 1):
-            for elements, kind in ((n, "strong"), (n * ranks // cores, "weak")):
-                key = f"scaling/{kind}/{n}/{ranks}"
-                store.measure(key, partial(_run, "growth", ("buckled", "reduced", elements), ranks))
-        for ranks in range(1, cores + 1):
-            arguments = ("--each", "buckled", "reduced", n // cores)
-            store.measure(f"scaling/each/{n}/{ranks}", partial(_run, "growth", arguments, ranks))
     store.measure("first", partial(_if_it_runs, partial(first_minute, size.runs)))
     store.measure("processes", partial(processes, size.runs))
-    for ranks in range(1, cores + 1):
+    for ranks in range(1, (os.cpu_count() or 1) + 1):
         store.measure(f"map/{ranks}", partial(_if_it_runs, partial(map_of_rods, size.couplings, ranks)))
 
 
@@ -137,8 +126,8 @@ def _rows(store: Store, prefix: str, module: str, arguments: tuple[object, ...])
     store.measure(f"{prefix}/{name}/{formulation}/{degree}", partial(_run, module, arguments))
 
 
-def _run(module: str, arguments: tuple[object, ...], ranks: int = 1) -> list[dict[str, Any]]:
-    return list(measured(f"benchmarks.speed.{module}", *arguments, ranks=ranks, limit=LIMIT))
+def _run(module: str, arguments: tuple[object, ...]) -> list[dict[str, Any]]:
+    return list(measured(f"benchmarks.speed.{module}", *arguments, limit=LIMIT))
 
 
 def _if_it_runs(work: Callable[[], dict[str, Any]]) -> list[dict[str, Any]]:

@@ -48,12 +48,6 @@ GROWTH = """
 The cord at lam = 40 with elements of degree 2. Medians of three; memory is what the rod adds to the process.
 An equilibrium is computed at a load a thousandth off; exponents are fitted from {far} unknowns on.
 """
-RANKS = """
-The buckled cord, wall time. Strong: the same number of elements on more ranks; weak: as many for each rank, for which
-a speed-up of 1 is perfect. Each: as many processes, which have a rod each and nothing to do with one another: what
-their speed-up falls short of 1 by, they take from each other (memory, caches, and whoever else uses the machine), and
-no program for several ranks has it back.
-"""
 MANY = """
 `demos/map.py` with fewer rods, wall time. Taken up again, when all is finished, it only starts, reads and draws.
 """

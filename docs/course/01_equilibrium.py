@@ -23,7 +23,7 @@
 # %%
 import numpy as np
 
-from rodfem.course.pictures import axes, show
+from lesson.pictures import axes, show
 
 EULER = np.pi**2 / 4  # the load at which lesson 2 finds the straight rod unstable
 x, w = np.polynomial.legendre.leggauss(20)
@@ -51,7 +51,7 @@ show(ax.figure, "01_energy")
 # %%
 from ufl import cos, derivative, dx, sin
 
-from rodfem.course.by_hand import angle, assemble, constant, nodes
+from lesson.by_hand import angle, assemble, constant, nodes
 
 theta = angle()  # piecewise polynomial on (0, 1)
 P = constant(theta, 1.5 * EULER)
@@ -130,7 +130,7 @@ print(f"across: {answer:.10f} (exact {exact[1]:.10f})")
 # **1.3** Remove the clamp, and hold the angle by a spring of stiffness 4 instead: add $\frac12\,4\,\theta(0)^2$ to the
 # energy, in UFL by `ds`. Which load is now the smallest with a bent equilibrium? Guess from the natural condition.
 #
-# `rodfem check 1.2 mine.py` runs your program and judges the number that it assigns to `answer`.
+# `python docs/course/check.py 1.2 mine.py` runs your program and judges the number that it assigns to `answer`.
 
 # %% [markdown]
 # ## Where it breaks

@@ -21,7 +21,7 @@
 # %%
 import numpy as np
 
-from rodfem.course.pictures import panels, show
+from lesson.pictures import panels, show
 
 EULER = np.pi**2 / 4
 x, w = np.polynomial.legendre.leggauss(12)
@@ -57,7 +57,7 @@ show(drawn[0].figure, "02_index")
 from scipy.linalg import ldl
 from ufl import cos, derivative, dx
 
-from rodfem.course.by_hand import angle, assemble, constant, nodes
+from lesson.by_hand import angle, assemble, constant, nodes
 
 theta = angle()
 P = constant(theta, 0.0)

@@ -21,7 +21,7 @@
 # %%
 import numpy as np
 
-from rodfem.course.pictures import panels, show
+from lesson.pictures import panels, show
 
 a1, a3 = np.meshgrid(np.linspace(-1, 1, 81), np.linspace(-1, 1, 81))
 drawn = panels(2, "amplitude $a_1$", "amplitude $a_3$", equal=True)
@@ -56,7 +56,7 @@ show(drawn[0].figure, "03_line")
 # %%
 from ufl import SpatialCoordinate, conditional, cos, derivative, dx, lt, sin
 
-from rodfem.course.by_hand import angle, assemble, constant, nodes
+from lesson.by_hand import angle, assemble, constant, nodes
 
 theta = angle()
 P = constant(theta, 0.0)

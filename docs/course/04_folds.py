@@ -16,7 +16,7 @@
 # %%
 import numpy as np
 
-from rodfem.course.pictures import axes, equilibria, shapes, show
+from lesson.pictures import axes, equilibria, shapes, show
 
 ax = axes("place $x$ of the apex", "energy, each load shifted")
 for shift, p in enumerate((0.0, 0.2, 2 / np.sqrt(27), 0.6)):
@@ -44,7 +44,7 @@ show(ax.figure, "04_truss")
 # %%
 from ufl import SpatialCoordinate, conditional, cos, derivative, dx, lt, sin
 
-from rodfem.course.by_hand import angle, assemble, constant, nodes
+from lesson.by_hand import angle, assemble, constant, nodes
 
 HALF = np.radians(107.5)
 FOOT, DEPTH = np.sin(HALF), 1 - np.cos(HALF)

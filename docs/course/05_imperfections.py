@@ -19,7 +19,7 @@
 # %%
 import numpy as np
 
-from rodfem.course.pictures import axes, equilibria, show
+from lesson.pictures import axes, equilibria, show
 
 EULER = np.pi**2 / 4
 near = lambda a, eps: EULER * (1 + a**2 / 8) - 4 * eps / (np.pi * a)  # noqa: E731, load of the amplitude a
@@ -54,7 +54,7 @@ show(ax.figure, "05_pitchfork")
 # %%
 from ufl import cos, derivative, dx, sin
 
-from rodfem.course.by_hand import angle, assemble, constant, nodes
+from lesson.by_hand import angle, assemble, constant, nodes
 
 theta = angle()
 phi = theta.copy()

@@ -30,7 +30,7 @@ from math import pi
 
 import numpy as np
 
-from rodfem.course.pictures import axes, show
+from lesson.pictures import axes, show
 
 phi = np.linspace(0, 4 * pi, 200)
 ax = axes(r"turns of the end, $\varphi/2\pi$", "quaternion of the end")
@@ -53,7 +53,7 @@ show(ax.figure, "06_quaternion")
 from scipy.linalg import eigvalsh, null_space
 from ufl import as_vector, cos, derivative, dot, dx, sin
 
-from rodfem.course.by_hand import arclengths, assemble, fields, spins
+from lesson.by_hand import arclengths, assemble, fields, spins
 from rodfem.forms.energy import bending_and_twist
 from rodfem.forms.rotation import conjugate, product, rotation, vector_part
 

@@ -26,8 +26,8 @@
 import numpy as np
 
 import rodfem
+from lesson.pictures import show
 from rodfem import Ordinate, Parameter, Plan, Ring, Scene
-from rodfem.course.pictures import show
 from rodfem.forms.energy import bending_and_twist
 
 
@@ -61,7 +61,7 @@ show(diagram.plot(), "07_ring")
 # %%
 from ufl import diff, dot, dx, variable
 
-from rodfem.course.by_hand import arclengths, assemble, constant, fields
+from lesson.by_hand import arclengths, assemble, constant, fields
 from rodfem.forms.rotation import conjugate, product, turn, vector_part
 
 q, at = fields(4, 0.0, 2 * np.pi)

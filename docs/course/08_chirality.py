@@ -28,8 +28,8 @@ from math import hypot, inf, pi
 import numpy as np
 
 import rodfem
+from lesson.pictures import panels, show
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped, sliding
-from rodfem.course.pictures import panels, show
 from rodfem.forms.energy import bending_and_twist, hemitropic
 
 cord = Scene(
@@ -69,7 +69,7 @@ show(drawn[0].figure, "08_cord")
 from scipy.linalg import eigvalsh, null_space
 from ufl import derivative, dot, dx
 
-from rodfem.course.by_hand import assemble, fields
+from lesson.by_hand import assemble, fields
 
 theta, at = fields(2, -3.0, 3.0)
 d = theta.dx(0)

@@ -23,7 +23,7 @@
 import numpy as np
 from scipy.linalg import eigvals
 
-from rodfem.course.pictures import axes, show
+from lesson.pictures import axes, show
 
 
 def ziegler(P):
@@ -51,7 +51,7 @@ show(ax.figure, "09_ziegler")
 # %%
 from ufl import TestFunction, TrialFunction, derivative, ds, dx
 
-from rodfem.course.by_hand import assemble, fields
+from lesson.by_hand import assemble, fields
 
 u, at = fields(3)
 theta, w, n = u[0], u[1], u[2]

@@ -26,7 +26,7 @@ from math import acos, cos, pi, sin, sqrt
 
 import numpy as np
 
-from rodfem.course.pictures import axes, show
+from lesson.pictures import axes, show
 
 T, M = 2900.993205792131, 98.541496171190744  # 27 turns, and ends closer by 0.03: see Number
 m, s = M / (2 * sqrt(T)), np.linspace(-0.5, 0.5, 201)
@@ -45,7 +45,7 @@ import ufl
 from scipy.linalg import eigh
 from ufl import SpatialCoordinate, derivative, dx
 
-from rodfem.course.by_hand import angle, assemble, nodes
+from lesson.by_hand import angle, assemble, nodes
 
 
 def errors(elements, degree):

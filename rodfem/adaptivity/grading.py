@@ -33,8 +33,6 @@ KEEP = 0.15
 LARGEST = 3.0
 """No element grows by more than this factor at a time: the decay was measured on the element that there is."""
 LEAST_DECAY, MOST_DECAY = 1.5, 1e3
-ALMOST = 1e-6
-"""Part of an element that a piece of the rod may have more than a whole number of them."""
 
 
 @dataclass(frozen=True)
@@ -176,19 +174,6 @@ def pieces_of(scene: Scene) -> np.ndarray:
         if not same_place(s, out[-1], scene.length):
             out.append(s)
     return np.array([*out, b])
-
-
-def first_mesh(scene: Scene, formulation: str, elements: int, degree: int) -> Discretization:
-    """About so many elements of nearly equal size.
-
-    There are ``elements`` of them, of this ``degree``, or a few more: breaks of the ``scene`` are vertices.  The
-    ``formulation`` is ``auto``, ``pointwise`` or ``reduced``.
-    """
-    pieces = pieces_of(scene)
-    counts = np.maximum(np.ceil(np.diff(pieces) / scene.length * elements - ALMOST).astype(int), 1)
-    inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
-    vertices = tuple(map(float, np.concatenate([pieces[:1], *inner])))
-    return Discretization(formulation, len(vertices) - 1, degree, vertices)
 
 
 def cost(fields: Fields, elements: int, degree: int) -> float:

@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite, log10
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched
-from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, first_mesh, weights_of
+from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, pieces_of, weights_of
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import Argument, ConvergenceError, Remedy
@@ -26,6 +27,8 @@ from rodfem.tolerances import TINY, unit
 
 OF_A_RING = 1e-8
 """Accuracy with which a uniform ring is computed at least."""
+ALMOST = 1e-6
+"""Part of an element that a piece of the rod may have more than a whole number of them."""
 MARGIN = 100.0
 """A new mesh is made for an accuracy better than the one asked for by this factor: it is to last for a while."""
 FURTHER = 10.0
@@ -42,13 +45,18 @@ def internal_accuracy(scene: Scene, accuracy: float) -> float:
 
 
 def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
-    """Discretisation to start with: few elements, of a degree that grows with the digits asked for.
+    """Discretisation to start with: few elements of nearly equal size, of a degree that grows with the digits.
 
     The ``accuracy`` is that of loads and ordinates, relative to values greater than one.  The ``scene`` and the
-    ``formulation`` are kept; on the ranks of ``comm`` no rank is without an element.
+    ``formulation`` are kept, and breaks of the scene are vertices; on the ranks of ``comm`` no rank is without an
+    element.
     """
     degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
-    return first_mesh(scene, formulation, max(4, comm.size), min(max(degree, 4), 9))
+    pieces = pieces_of(scene)
+    counts = np.ceil(np.diff(pieces) / scene.length * max(4, comm.size) - ALMOST).astype(int).clip(1)
+    inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
+    vertices = tuple(map(float, np.concatenate([pieces[:1], *inner])))
+    return Discretization(formulation, len(vertices) - 1, min(max(degree, 4), 9), vertices)
 
 
 class TooCoarse(Exception):

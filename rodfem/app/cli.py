@@ -17,7 +17,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rodfem.app import petsc_options
 from rodfem.app.interrupts import listen
 from rodfem.app.pipes import end_quietly
 from rodfem.errors import ConvergenceError, InputError, SetupError
@@ -115,12 +114,9 @@ def sentences(parser: Parser) -> Iterator[None]:
 def start_petsc(options: Sequence[str]) -> None:
     """Load PETSc with its options, some of which it reads then; those that it refuses end with a sentence."""
     try:
-        petsc_options.check(options)
         petsc4py = import_module("petsc4py")
         petsc4py.init(["rodfem", *options])
         end_quietly()
-    except InputError as trouble:
-        complain(str(trouble))
     except Exception as trouble:  # petsc4py has no class of its own for errors until PETSc is loaded
         words = str(trouble).splitlines()[0]
         complain(f"PETSc does not start with the options {' '.join(options)} ({words}): see whether files are missing.")

@@ -29,8 +29,8 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "--degree": "polynomial degree; the error falls as h^(2K) (default: the scene's own, or 6)",
         "--formulation": "; ".join(f"{made.name}: {made.words}" for made in formulations.FORMULATIONS.values())
         + f"; {formulations.AUTO}: the first that the scene allows (default {formulations.AUTO})",
-        "--factors": "chain: compiled assembly and elimination along the rod; petsc: the same numbers, slower, by "
-        "dolfinx, PETSc and MUMPS (default chain)",
+        "--factors": "chain: compiled assembly and elimination along the rod, on one rank; petsc: the same numbers, "
+        "slower, by dolfinx, PETSc and MUMPS, as always on several ranks (default chain)",
         "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
         "error by less than EPS (relative to values greater than one)",
         "--range": f"start at {load} = A, stay between A and B (default: the scene's)",

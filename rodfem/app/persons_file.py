@@ -1,18 +1,16 @@
 """A person's Python file, run by a command of the program: the module that it is, or one sentence on where it fails.
 
 It may import what stands beside it.  Its folder is the last one in which modules are looked for: a file ``json.py`` or
-``h5py.py`` there is no module of those that compute.  Which of the two the person means is not guessed: where the file
-imports one by such a name, it is refused.
+``h5py.py`` there is no module of those that compute.
 """
 
 from __future__ import annotations
 
-import ast
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from importlib.machinery import SourceFileLoader
-from importlib.util import find_spec, module_from_spec, spec_from_loader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
@@ -46,17 +44,16 @@ def leave_the_run() -> None:
 
 
 def load(file: Path, name: str | None = None) -> ModuleType:
-    """Module of a file, by its own name or another one.
+    """Module of a file, by the name of the file, with a stroke that no other module has, or by another one.
 
-    Raises :class:`~rodfem.errors.InputError` where it is missing, imports one of two modules of the same name, ends the
-    program, or fails: with the last of its own lines that ran.
+    Raises :class:`~rodfem.errors.InputError` where it is missing, ends the program, or fails: with the last of its own
+    lines that ran.
     """
     if not file.is_file():
         raise InputError(f"{file} is no file: give the path of a Python program.")
     path = file.resolve()
-    _require_one_of_each(path)
     stated = nullcontext() if name else for_its_rod(path)
-    name = name or (f"{file.stem}_" if _elsewhere(file.stem, path) else file.stem)
+    name = name or f"{file.stem}_"
     spec = spec_from_loader(name, SourceFileLoader(name, str(path)))
     assert spec is not None and spec.loader is not None
     module, before = module_from_spec(spec), sys.modules.get(spec.name)
@@ -76,46 +73,6 @@ def load(file: Path, name: str | None = None) -> ModuleType:
         if before is not None:
             sys.modules[spec.name] = before
     return module
-
-
-def _require_one_of_each(path: Path) -> None:
-    """Raise :class:`InputError` where a file, or one beside it that it imports, imports one of two modules."""
-    seen, files = {path}, [path]
-    for file in files:  # grows while it is walked
-        for name in _imported(file):
-            for beside in (path.parent / f"{name}.py", path.parent / name / "__init__.py"):
-                if not beside.is_file() or beside in seen:
-                    continue
-                if other := _elsewhere(name, beside):
-                    raise InputError(
-                        f"{file} imports {name}, of which there are two: {beside} and {other}; rename the former."
-                    )
-                seen.add(beside)
-                files.append(beside)
-
-
-def _imported(file: Path) -> Iterator[str]:
-    """Names of modules and packages that a file imports; of none where it is no Python, which is said when it runs."""
-    try:
-        tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError):
-        return
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.partition(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
-            yield node.module.partition(".")[0]
-
-
-def _elsewhere(name: str, beside: Path) -> str:
-    """Where Python finds a module of a name, if that is not the file ``beside``; empty where there is none."""
-    try:
-        spec = find_spec(name)
-    except ValueError:  # a module that was not imported, as __main__
-        return "a module of Python's own"
-    if spec is None or spec.origin is None or Path(spec.origin).resolve() == beside:
-        return ""
-    return spec.origin if Path(spec.origin).is_absolute() else "a module of Python's own"
 
 
 def _last_line(path: Path, trouble: BaseException) -> int | None:

@@ -22,7 +22,8 @@ from rodfem.fem.shape import Shape
 from rodfem.fem.state import Energies
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
-from rodfem.linalg.factorization import AlongRod, Factors
+from rodfem.linalg.chain import Chain
+from rodfem.linalg.factorization import Factors
 from rodfem.problem.units import Units
 
 if TYPE_CHECKING:
@@ -226,7 +227,7 @@ class StaticSolver:
         """Sentences for the record that nobody has read: symmetries that were none, factors by the last resort."""
         out = self.system.verification.read()
         for factors in self.factors():
-            if isinstance(factors, AlongRod) and factors.times:
+            if isinstance(factors, Chain) and factors.times:
                 out.append(
                     f"{factors.times} matrices could not be factored along the rod, too many pivots were delayed: "
                     "MUMPS factored them."

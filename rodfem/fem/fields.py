@@ -331,8 +331,8 @@ class Fields:
 
     @property
     def compiled(self) -> bool:
-        """Whether compiled code assembles matrices: of real numbers, unless PETSc is asked for."""
-        return not compat.COMPLEX and self.discretization.factors == CHAIN
+        """Whether compiled code assembles matrices: of real numbers on one rank, unless PETSc is asked for."""
+        return self.comm.size == 1 and not compat.COMPLEX and self.discretization.factors == CHAIN
 
     @property
     def along(self) -> int:

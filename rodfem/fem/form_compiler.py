@@ -60,12 +60,12 @@ def _by_name(module_name: str, object_names: Sequence[str], cache_dir: str | Pat
         while True:
             file = next((f for f in (place / f"{module_name}{end}" for end in EXTENSION_SUFFIXES) if f.is_file()), None)
             marked = (place / f"{module_name}.c.cached").is_file()
-            if file is not None and marked and code_cache.is_whole(file):
+            if file is not None and marked:
                 module = _loaded(module_name, file)
                 return [getattr(module.lib, name) for name in object_names], module
             if _claim(place, module_name):
                 if marked:
-                    _remove(place, module_name, file)  # it is cut short, or lost
+                    _remove(place, module_name)  # it is lost
                 found = _awaited(module_name, object_names, place, timeout)
                 if found[0] is not None:
                     _release(place, module_name)
@@ -102,7 +102,7 @@ def _claim(place: Path, name: str) -> bool:
         return False
     _CLAIMS[name] = descriptor
     if abandoned and not (place / f"{name}.c.cached").is_file():
-        _remove(place, name, None)
+        _remove(place, name)
     return True
 
 
@@ -113,11 +113,10 @@ def _release(place: Path, name: str) -> None:
         os.close(_CLAIMS.pop(name))
 
 
-def _remove(place: Path, name: str, file: Path | None) -> None:
-    """Remove an unusable module: its mark, its code in C, for FFCx a lock, and its ``file`` if there is one."""
-    for broken in (place / f"{name}.c.cached", place / f"{name}.c", file):
-        if broken is not None:
-            broken.unlink(missing_ok=True)
+def _remove(place: Path, name: str) -> None:
+    """Remove what is left of a module that is not there: its mark, and its code in C, for FFCx a lock."""
+    for left in (place / f"{name}.c.cached", place / f"{name}.c"):
+        left.unlink(missing_ok=True)
 
 
 def _awaited(module_name: str, object_names: Sequence[str], place: Path, timeout: int) -> Any:

@@ -75,18 +75,16 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
     """Zero PETSc AIJ matrix with ``pattern``, on the ranks of ``fields``.
 
-    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.  On one rank its values
-    are shared with numpy where compiled code assembles it; on several it has its ``pattern`` as an attribute then.
+    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.  Its values are shared
+    with numpy where compiled code assembles it.
     """
-    if fields.compiled and fields.comm.size == 1:
+    if fields.compiled:
         matrix = shared_matrix(fields.comm, pattern)
     else:
         size = (fields.local_unknowns, fields.unknowns)
         matrix = PETSc.Mat().createAIJ((size, size), comm=fields.comm)
         index = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
         matrix.setPreallocationCSR((*index, np.zeros(pattern.nnz)))
-        if fields.compiled:
-            matrix.setAttr("pattern", pattern)
     matrix.setLGMap(rows, columns)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
     matrix.setOption(PETSc.Mat.Option.IGNORE_ZERO_ENTRIES, True)  # a point between two cells couples all of both, by 0

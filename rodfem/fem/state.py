@@ -78,7 +78,7 @@ class Evaluation(NodalValues):
 
     def tangent(self) -> sp.csr_matrix:
         """Their derivative in all local degrees of freedom, clamped ones included."""
-        if not self.fields.compiled or self.fields.comm.size > 1:
+        if not self.fields.compiled:
             self._register()
             return compat.local_table(self.equations.jacobian.form)
         pattern, places = self.equations.local_entries
@@ -187,10 +187,6 @@ class State(Evaluation):
         if (own := shared(matrix)) is not None:
             self._add(form, self.system.matrix_places(own.pattern, load), own.values)
             matrix.stateIncrease()
-        elif (pattern := matrix.getAttr("pattern")) is not None:
-            spread, places = self.system.spread(matrix, pattern, load)
-            self.equations.take(self.line)
-            spread.add(form, self.local, places)
         else:
             self._register()
             compat.assemble_matrix(matrix, form.form, *self.system.maps(load))

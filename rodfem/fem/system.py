@@ -33,7 +33,6 @@ from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.parameters import Line
 from rodfem.fem.phase import no_phase, phase_at
 from rodfem.fem.sparsity import bordered_pattern, metric_pattern, new_matrix
-from rodfem.fem.spread_assembly import Layout, SpreadMatrix, spread_places
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Symmetry, capable, may_slide
 from rodfem.fem.values import NodalValues
@@ -120,10 +119,8 @@ class System:
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
         dofs = self.equations.cells.dofs
-        self.equation_places = vector_places(dofs, number) if self.fields.compiled and comm.size == 1 else None
+        self.equation_places = vector_places(dofs, number) if self.fields.compiled else None
         self._places: dict[tuple[int, bool], Places] = {}
-        self._layouts: dict[int, Layout] = {}
-        self._spread: dict[int, SpreadMatrix] = {}
         self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
         self._numbered = np.flatnonzero(number >= 0)
@@ -286,21 +283,6 @@ class System:
         if key not in self._places:
             self._places[key] = matrix_places(self.equations.cells.dofs, *self.maps(load), pattern)
         return self._places[key]
-
-    def spread(self, matrix: PETSc.Mat, pattern: sp.csr_matrix, load: bool) -> tuple[SpreadMatrix, Places]:
-        """A ``matrix`` on several ranks for compiled assembly, and the places of bilinear forms in it; collective.
-
-        ``pattern`` is that of this rank's rows, with the column of the ``load`` or without.
-        """
-        dofs, key = self.equations.cells.dofs, (id(pattern), load)
-        if id(pattern) not in self._layouts:
-            self._layouts[id(pattern)] = Layout(self.fields, dofs, pattern)
-        layout = self._layouts[id(pattern)]
-        if key not in self._places:
-            self._places[key] = spread_places(layout, dofs, *self.maps(load))
-        if matrix.handle not in self._spread:
-            self._spread[matrix.handle] = SpreadMatrix(layout, matrix)
-        return self._spread[matrix.handle], self._places[key]
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: conditions and forces, or a one where a drift is switched off."""

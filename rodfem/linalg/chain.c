@@ -47,12 +47,11 @@ typedef struct {
 } Pile;
 
 typedef struct chain {
-    int n, symmetric, open, border, fronts, largest; /* border: unknowns of the last group; largest: order of a front */
-    int rest;                /* unknowns that an open chain leaves: delayed ones, then the border */
+    int n, symmetric, fronts, largest; /* largest: order of a front */
     Front *front;
     int *unknowns, *target;  /* of all fronts; places of the entries in their fronts, row and column in turn */
     int *source;             /* places of the entries among the values of the matrix */
-    int *starts, *indices, *places; /* pattern of the matrix, and places of its entries among the values given */
+    int *starts, *indices;   /* pattern of the matrix */
     double *natural;         /* sizes of the unknowns, powers of two, from which the scale starts */
     double *scale, *work, *dense, *schur, *forward, *back;
     char *of_border;
@@ -96,7 +95,7 @@ static int at_least(double **array, size_t *room, size_t size)
 PUBLIC void chain_free(chain *c)
 {
     if (!c) return;
-    free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices); free(c->places);
+    free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices);
     free(c->natural); free(c->scale); free(c->work); free(c->of_border); free(c->dense); free(c->schur); free(c->forward); free(c->back);
     free(c->place); free(c->left); free(c->right);
     free(c->order.data); free(c->panel.data); free(c->pivot.data);
@@ -113,14 +112,12 @@ static int close_front(Front *f, Pile *unknowns, const int *active, int count)
     return rest != NULL;
 }
 
-/* Fronts of a matrix of n rows with the pattern (starts, indices), whose entries are at `places` among the values that
-   are given later.  The unknowns come in the `sequence` of elimination, in `groups` groups, group g from begin[g] to
-   begin[g + 1]; those of the last group, the border, may couple to all.  A front has those of the border that couple to
-   it or to one before.  A group that adds no unknown to the front before it belongs to that front.  The border of an
-   `open` chain is not eliminated; rows of a symmetric matrix that belong to the border need not have their entries in
-   other columns then.  NULL: out of memory.  */
-PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence,
-                        int groups, const int *begin, int symmetric, int open, int largest)
+/* Fronts of a matrix of n rows with the pattern (starts, indices).  The unknowns come in the `sequence` of elimination,
+   in `groups` groups, group g from begin[g] to begin[g + 1]; those of the last group, the border, may couple to all.  A
+   front has those of the border that couple to it or to one before.  A group that adds no unknown to the front before it
+   belongs to that front.  NULL: out of memory.  */
+PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int *sequence, int groups, const int *begin,
+                        int symmetric, int largest)
 {
     chain *c = calloc(1, sizeof(chain));
     int *seen = calloc(n + 1, sizeof(int));
@@ -129,13 +126,11 @@ PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int 
     int *entry = malloc((starts[n] + 1) * sizeof(int));
     Pile unknowns = {NULL, 0, 0, sizeof(int)}, target = {NULL, 0, 0, 2 * sizeof(int)}, source = {NULL, 0, 0, sizeof(int)};
     if (!c || !seen || !active || !owner || !below || !rows || !entry) goto failed;
-    c->n = n; c->symmetric = symmetric; c->open = open; c->largest = largest;
-    c->border = n - begin[groups - 1];
+    c->n = n; c->symmetric = symmetric; c->largest = largest;
     c->order.width = sizeof(int); c->panel.width = c->pivot.width = sizeof(double);
     c->front = calloc(groups + 1, sizeof(Front));
     c->starts = malloc((n + 1) * sizeof(int));
     c->indices = malloc((starts[n] + 1) * sizeof(int));
-    c->places = malloc((starts[n] + 1) * sizeof(int));
     c->natural = malloc((n + 1) * sizeof(double));
     c->scale = malloc((n + 1) * sizeof(double));
     c->work = malloc((n + 1) * sizeof(double));
@@ -143,11 +138,10 @@ PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int 
     c->place = malloc((n + 1) * sizeof(int));
     c->left = malloc((n + 1) * sizeof(int));
     c->right = malloc((n + 1) * sizeof(int));
-    if (!c->front || !c->starts || !c->indices || !c->places || !c->natural || !c->scale || !c->work || !c->of_border || !c->place
+    if (!c->front || !c->starts || !c->indices || !c->natural || !c->scale || !c->work || !c->of_border || !c->place
         || !c->left || !c->right) goto failed;
     memcpy(c->starts, starts, (n + 1) * sizeof(int));
     memcpy(c->indices, indices, starts[n] * sizeof(int));
-    memcpy(c->places, places, starts[n] * sizeof(int));
     for (int i = 0; i < n; i++) owner[i] = -1;
     for (int i = 0; i < n; i++) c->natural[i] = 1.0;
     for (int k = 0; k < starts[n]; k++) below[indices[k] + 2]++;
@@ -168,7 +162,7 @@ PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int 
                 if (!seen[v]) { seen[v] = 1; active[count++] = v; }
             }
         }
-        if (count > before || !c->fronts || (last && (border < n || open))) {
+        if (count > before || !c->fronts || (last && border < n)) {
             if (c->fronts && !close_front(&c->front[c->fronts - 1], &unknowns, active, before)) goto failed;
             c->fronts++;
         }
@@ -205,7 +199,7 @@ PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int 
                 int *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
-                *from = places[e]; to[0] = p; to[1] = q;
+                *from = e; to[0] = p; to[1] = q;
             }
         }
         if (!symmetric) for (int k = 0; k < f->own; k++) { /* columns of the fully summed in the rows of the others */
@@ -216,7 +210,7 @@ PUBLIC chain *chain_new(int n, const int *starts, const int *indices, const int 
                 int *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
-                *from = places[entry[e]]; to[0] = c->place[u]; to[1] = k;
+                *from = entry[e]; to[0] = c->place[u]; to[1] = k;
             }
         }
         f->entries = (long)source.used - f->first;
@@ -247,7 +241,7 @@ PUBLIC void chain_sizes(chain *c, const double *sizes)
 /* Size of the k-th entry of the matrix, in row i, for unknowns in units of their natural sizes.  */
 static double in_units(const chain *c, const double *values, int i, int k)
 {
-    return fabs(values[c->places[k]]) * c->natural[i] * c->natural[c->indices[k]];
+    return fabs(values[k]) * c->natural[i] * c->natural[c->indices[k]];
 }
 
 static double lowered(double scale, double size, int by) /* scale / size^(1/by), in powers of two */
@@ -265,7 +259,7 @@ static void equilibrate_border(chain *c, const double *values, double least)
     for (int i = 0; i < c->n; i++)
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
-            double a = fabs(values[c->places[k]]);
+            double a = fabs(values[k]);
             if (c->of_border[i] == c->of_border[j] || in_units(c, values, i, k) < least) continue;
             if (c->of_border[j]) size[j] += a * s[i];
             else if (!c->symmetric) size[i] += a * s[j];
@@ -284,7 +278,7 @@ static int measure(chain *c, const double *values, double least)
         double most = 0, sum = 0, mine = s[i];
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
-            double a = fabs(values[c->places[k]]);
+            double a = fabs(values[k]);
             if (in_units(c, values, i, k) < least) continue;
             a *= mine * s[j];
             if (a > most) most = a;
@@ -312,7 +306,7 @@ static void equilibrate(chain *c, const double *values, double least)
         for (int i = 0; i < c->n; i++) if (!c->of_border[i]) s[i] = lowered(s[i], c->work[i], 2);
     }
     c->exponents = 0;
-    for (int i = 0; i < c->n; i++) if (!c->open || !c->of_border[i]) c->exponents += ilogb(s[i]);
+    for (int i = 0; i < c->n; i++) c->exponents += ilogb(s[i]);
     c->scaled = 1;
 }
 
@@ -464,8 +458,8 @@ static int eliminate_general(chain *c, double *a, int m, int full, int *rows, in
 
 /* --- the whole chain ---------------------------------------------------------------------------------------------- */
 
-/* Factor the matrix of the given values; an open chain leaves the Schur complement of [delayed | border]: 0, 1 where it is exactly singular, 2 where a front is too large or memory ends,
-   3 where a value is no number.  */
+/* Factor the matrix of the given values: 0, 1 where it is exactly singular, 2 where a front is too large or memory
+   ends, 3 where a value is no number.  */
 PUBLIC int chain_factor(chain *c, const double *values)
 {
     factored++;
@@ -484,11 +478,9 @@ PUBLIC int chain_factor(chain *c, const double *values)
     equilibrate(c, values, NOTHING * most);
     const double *s = c->scale;
     int delayed = 0, remaining = 0; /* of the Schur complement: fully summed unknowns first */
-    c->rest = 0;
     for (int index = 0; index < c->fronts; index++) {
         Front *f = &c->front[index];
-        int m = delayed + f->m, last = index == c->fronts - 1, kept = last && c->open;
-        int full = kept ? 0 : delayed + f->own;
+        int m = delayed + f->m, last = index == c->fronts - 1, full = delayed + f->own;
         if (m > c->largest + f->m || !at_least(&c->dense, &c->dense_room, (size_t)m * m + 1)) return 2;
         double *a = c->dense;
         memset(a, 0, (size_t)m * m * sizeof(double));
@@ -529,7 +521,7 @@ PUBLIC int chain_factor(chain *c, const double *values)
         memcpy(panel, a, (size_t)m * done * sizeof(double));
         if (!c->symmetric) for (int k = 0; k < done; k++) /* rows of U, one after the other */
             for (int j = 0; j < m; j++) panel[(size_t)m * done + (size_t)k * m + j] = A(k, j);
-        if (last && !kept) { c->zero = m - done; break; }
+        if (last) { c->zero = m - done; break; }
         remaining = m - done;
         if (!at_least(&c->schur, &c->schur_room, (size_t)remaining * remaining + 1)) return 2;
         for (int j = 0; j < remaining; j++)
@@ -538,7 +530,6 @@ PUBLIC int chain_factor(chain *c, const double *values)
         memcpy(c->right, columns + done, remaining * sizeof(int));
         delayed = full - done;
     }
-    c->rest = c->open ? remaining : 0;
     c->determinant -= 2 * log(2.0) * (double)c->exponents;
     return c->zero ? 1 : 0;
 }
@@ -629,12 +620,6 @@ static void up_by(const chain *c, int w, const double *y, double *x, double *z)
     }
 }
 
-/* Scale between the i-th unknown that an open chain leaves and the chain's own: its border is left unscaled.  */
-static double unscaled(const chain *c, const int *unknowns, int i)
-{
-    return i < c->rest - c->border ? 1.0 : 1.0 / c->scale[unknowns[i]];
-}
-
 /* Order of the largest front, delayed pivots included.  */
 PUBLIC int chain_largest(const chain *c)
 {
@@ -643,58 +628,36 @@ PUBLIC int chain_largest(const chain *c)
     return most;
 }
 
-static int room_for_columns(chain *c, int k)
+static int room_for_columns(chain *c)
 {
-    return at_least(&c->forward, &c->forward_room, (size_t)c->n * k + 1)
+    return at_least(&c->forward, &c->forward_room, (size_t)c->n * WIDTH + 1)
         && at_least(&c->back, &c->back_room, ((size_t)c->n + chain_largest(c)) * WIDTH + 1);
 }
 
-/* Eliminate from k columns of b, one after the other (n each); what an open chain leaves of them goes to `rest`.
-   2: out of memory.  */
-PUBLIC int chain_forward(chain *c, int k, const double *b, double *rest)
+/* Solutions x for k columns of b, one after the other (n each).  2: out of memory.  */
+PUBLIC int chain_solve(chain *c, int k, const double *b, double *x)
 {
     solved_columns += k;
-    if (!room_for_columns(c, k)) return 2;
+    if (!room_for_columns(c)) return 2;
+    double *y = c->forward, *solved = c->symmetric ? y : c->back, *z = c->back + (size_t)c->n * WIDTH;
     for (int column = 0, w; column < k; column += w) {
-        w = strip(k - column);
-        double *y = c->forward + (size_t)column * c->n;
         const double *right = b + (size_t)column * c->n;
+        double *out = x + (size_t)column * c->n;
+        w = strip(k - column);
         for (int i = 0; i < c->n; i++) ALL(q) y[(size_t)i * w + q] = right[(size_t)q * c->n + i] * c->scale[i];
         down_by(c, w, y, c->back);
-        for (int i = 0; i < c->rest; i++)
-            ALL(q) rest[(size_t)(column + q) * c->rest + i] = y[(size_t)c->left[i] * w + q] * unscaled(c, c->left, i);
-    }
-    return 0;
-}
-
-/* Substitute back in those columns, into x: `rest` are the solutions of what an open chain left.  */
-PUBLIC void chain_back(chain *c, int k, const double *rest, double *x)
-{
-    for (int column = 0, w; column < k; column += w) {
-        w = strip(k - column);
-        double *y = c->forward + (size_t)column * c->n, *z = c->back + (size_t)c->n * WIDTH;
-        double *solved = c->symmetric ? y : c->back, *out = x + (size_t)column * c->n;
-        for (int i = 0; i < c->rest; i++)
-            ALL(q) solved[(size_t)c->right[i] * w + q] = rest[(size_t)(column + q) * c->rest + i] * unscaled(c, c->right, i);
         up_by(c, w, y, solved, z);
         for (int i = 0; i < c->n; i++) ALL(q) out[(size_t)q * c->n + i] = solved[(size_t)i * w + q] * c->scale[i];
     }
-}
-
-/* Solutions x of a closed chain for k columns of b.  2: out of memory.  */
-PUBLIC int chain_solve(chain *c, int k, const double *b, double *x)
-{
-    if (chain_forward(c, k, b, NULL)) return 2;
-    chain_back(c, k, NULL, x);
     return 0;
 }
 
-/* Solutions x of a closed chain without symmetry, transposed, for k columns of b.  Columns that are missing in the last
+/* Solutions x of a matrix without symmetry, transposed, for k columns of b.  Columns that are missing in the last
    strip, of four or of WIDTH, are zero.  2: out of memory.  */
 PUBLIC int chain_solve_transposed(chain *c, int k, const double *b, double *x)
 {
     solved_columns += k;
-    if (!room_for_columns(c, WIDTH)) return 2;
+    if (!room_for_columns(c)) return 2;
     double *y = c->forward, *solved = c->back, *z = c->back + (size_t)c->n * WIDTH;
     for (int column = 0, w; column < k; column += w) {
         const double *right = b + (size_t)column * c->n;
@@ -711,14 +674,6 @@ PUBLIC int chain_solve_transposed(chain *c, int k, const double *b, double *x)
     return 0;
 }
 
-/* The Schur complement that an open chain leaves, dense, column after column; of a symmetric one the lower triangle.  */
-PUBLIC void chain_schur(const chain *c, double *out)
-{
-    for (int j = 0; j < c->rest; j++) for (int i = 0; i < c->rest; i++)
-        out[(size_t)j * c->rest + i] = c->schur[(size_t)j * c->rest + i] * unscaled(c, c->left, i) * unscaled(c, c->right, j);
-}
-
-PUBLIC int chain_rest(const chain *c) { return c->rest; }
 PUBLIC int chain_negative(const chain *c) { return c->negative; }
 PUBLIC int chain_zero(const chain *c) { return c->zero; }
 PUBLIC int chain_fronts(const chain *c) { return c->fronts; }

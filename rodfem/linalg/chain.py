@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.compiled import buffer, module
-from rodfem.linalg.factorization import AlongRod, GaveUpError, Mumps, Sizes
+from rodfem.linalg.factorization import Mumps, Sizes
 from rodfem.linalg.matrices import Entries
 
 LARGEST = 2000
@@ -64,12 +64,14 @@ def _towards(couplings: sp.csc_matrix, along: np.ndarray) -> np.ndarray:
     return along[::-1] if (last + 1).sum() < (inner - first).sum() else along
 
 
-class Elimination:
-    """The compiled elimination of matrices with one pattern, given as arrays on this rank.
+class GaveUpError(ConvergenceError):
+    """The elimination along the rod needs fronts that are too large: too many pivots were delayed."""
 
-    The chain is closed, and all of it is eliminated; or it is open, and its border is not: what is left is the Schur
-    complement of the pivots that were delayed to the end, and of the border.  ``regular`` is false where the last
-    matrix was exactly singular.
+
+class Elimination:
+    """The compiled elimination of matrices with one pattern, given as arrays.
+
+    ``regular`` is false where the last matrix was exactly singular.
     """
 
     def __init__(
@@ -78,29 +80,22 @@ class Elimination:
         starts: np.ndarray,
         indices: np.ndarray,
         order: tuple[np.ndarray, np.ndarray],
-        *,
-        places: np.ndarray | None = None,
-        is_open: bool = False,
     ) -> None:
         """Find the fronts of the pattern (``starts``, ``indices``); the ``order`` is that of :func:`sequence`.
 
-        ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  ``places`` are those of the pattern's entries
-        among the values that are to be factored, unless they are the same.  With ``is_open`` the border, the last
-        group, is not eliminated; a symmetric one may lack the entries of its border's rows that are in other columns.
-        Raises :class:`MemoryError` where there is no room.
+        ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  Raises :class:`MemoryError` where there is no
+        room.
         """
         compiled = module("linalg/chain")
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self.rows, self.regular = len(starts) - 1, False
-        places = np.arange(len(indices), dtype=np.int32) if places is None else places
-        pattern = [np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, places, *order)]
+        *pattern, groups = (np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, *order))
         made = self.lib.chain_new(
             self.rows,
-            *(buffer(self.ffi, x) for x in pattern[:4]),
-            len(order[1]) - 1,
-            buffer(self.ffi, pattern[4]),
+            *(buffer(self.ffi, x) for x in pattern),
+            len(groups) - 1,
+            buffer(self.ffi, groups),
             kind == "cholesky",
-            is_open,
             LARGEST,
         )
         if made == self.ffi.NULL:
@@ -141,49 +136,20 @@ class Elimination:
         sizes = np.ascontiguousarray(sizes, dtype=float)
         self.lib.chain_sizes(self._chain, buffer(self.ffi, sizes))
 
-    def forward(self, right: np.ndarray) -> np.ndarray:
-        """Eliminate from ``right`` (n, k); the right-hand sides (rest, k) of what an open chain leaves.
-
-        Raises :class:`MemoryError` where there is no room.
-        """
-        right = np.asarray(right, dtype=float, order="F")
-        rest = np.empty((self.rest, right.shape[1]), order="F")
-        if self.lib.chain_forward(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, rest)):
-            raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
-        return rest
-
-    def back(self, rest: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) for the last right-hand sides, given those (rest, k) of what an open chain leaves."""
-        rest = np.asarray(rest, dtype=float, order="F")
-        out = np.empty((self.rows, rest.shape[1]), order="F")
-        self.lib.chain_back(self._chain, rest.shape[1], buffer(self.ffi, rest), buffer(self.ffi, out))
-        return out
-
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) of a closed chain for ``right`` (n, k)."""
-        return self.back(self.forward(right))
+        """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
+        return self._solved(self.lib.chain_solve, right)
 
     def solve_transposed(self, right: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) of a closed chain without symmetry, transposed, for ``right`` (n, k).
+        """The same of a matrix without symmetry, transposed."""
+        return self._solved(self.lib.chain_solve_transposed, right)
 
-        Raises :class:`MemoryError` where there is no room.
-        """
+    def _solved(self, solve: Any, right: np.ndarray) -> np.ndarray:
         right = np.asarray(right, dtype=float, order="F")
         out = np.empty_like(right)
-        if self.lib.chain_solve_transposed(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
+        if solve(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
             raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
         return out
-
-    def schur(self) -> np.ndarray:
-        """Schur complement (rest, rest) that an open chain leaves, delayed pivots first; else (0, 0)."""
-        out = np.empty((self.rest, self.rest), order="F")
-        self.lib.chain_schur(self._chain, buffer(self.ffi, out))
-        return out
-
-    @property
-    def rest(self) -> int:
-        """Number of unknowns that an open chain leaves."""
-        return int(self.lib.chain_rest(self._chain))
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative pivots of the symmetric matrix last factored, and of those that are zero."""
@@ -214,27 +180,37 @@ class Elimination:
         return int(self.lib.chain_largest(self._chain))
 
 
-class Chain(AlongRod):
+class Chain:
     """:class:`~rodfem.linalg.factorization.Factors` of matrices with one pattern, on one rank.
 
     ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  The last ``border`` rows of a matrix may couple to
-    all others.  ``regular`` is false where the last one was exactly singular; ``elimination`` has its factors.
+    all others.  ``regular`` is false where the last one was exactly singular; ``elimination`` has its factors.  A
+    matrix on which the elimination gives up is factored by the last resort; ``times`` is the number of those.
     """
 
     def __init__(self, kind: str, border: int, resort: Mumps | None = None, sizes: Sizes | None = None) -> None:
         """Keep the number of scalars, and the last ``resort``, for when there is a matrix of this ``kind``.
 
-        ``sizes`` returns the natural sizes of the unknowns, None where they are one.
+        Without a ``resort`` :class:`GaveUpError` is raised instead.  ``sizes`` returns the natural sizes of the
+        unknowns, None where they are one.
         """
-        super().__init__(resort, sizes)
-        self.kind, self.border = kind, border
+        self.kind, self.border, self.resort, self.sizes = kind, border, resort, sizes
+        self.resorted, self.times, self.regular = False, 0, False
         self._matrix: PETSc.Mat | None = None
 
-    def eliminate(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`GaveUpError` where it is no chain."""
+    def __call__(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises :class:`ConvergenceError` where it holds what is no number."""
+        self.resorted = False
         self.prepare(matrix)
-        self.elimination.factor(self._entries.values()[0])
-        self.regular = self.elimination.regular
+        try:
+            self.elimination.factor(self._entries.values())
+            self.regular = self.elimination.regular
+        except GaveUpError:
+            if self.resort is None:
+                raise
+            self.resort(matrix)
+            self.resorted, self.regular = True, self.resort.regular
+            self.times += 1
 
     def prepare(self, matrix: PETSc.Mat) -> None:
         """Find the fronts of a ``matrix``, unless they are known."""
@@ -250,10 +226,24 @@ class Chain(AlongRod):
         """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""
         self.resorted, self.regular, self.elimination.regular = False, regular, regular
 
-    def solve_columns(self, right: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
-        return self.elimination.solve(right)
+    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Solve with the last factors."""
+        if self.resort and self.resorted:
+            self.resort.solve(right, out)
+        else:
+            out.array[:] = self.elimination.solve(right.array_r.real[:, None])[:, 0]
 
-    def eliminated(self) -> tuple[tuple[int, int], float]:
-        """Inertia and determinant by elimination."""
-        return self.elimination.inertia(), self.elimination.determinant()
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once."""
+        if self.resort and self.resorted:
+            self.resort.solve_all(right, out)
+        else:
+            out.getDenseArray()[:] = self.elimination.solve(right.getDenseArray().real)
+
+    def inertia(self) -> tuple[int, int]:
+        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
+        return (self.resort if self.resort and self.resorted else self.elimination).inertia()
+
+    def determinant(self) -> float:
+        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
+        return (self.resort if self.resort and self.resorted else self.elimination).determinant()

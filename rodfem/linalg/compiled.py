@@ -141,7 +141,7 @@ def _found(name: str) -> Path | None:
     full = _full_name(name)
     places = ((PACKAGE / name).parent, code_cache.folder())
     files = (place / f"{full}{suffix}" for place in places for suffix in EXTENSION_SUFFIXES)
-    return next((file for file in files if code_cache.is_whole(file)), None)
+    return next((file for file in files if file.is_file()), None)
 
 
 def _compile(name: str) -> Path:

@@ -1,19 +1,18 @@
 """Factors of matrices with a fixed pattern: what all of them have in common, and those of MUMPS.
 
-MUMPS is the reference and the last resort: what is factored along the rod (:mod:`rodfem.linalg.chain`) may be factored
-by it as well (``-rodfem_lu_pc_factor_mat_solver_type mumps``, ``-rodfem_cholesky_...``), with the same numbers.
+MUMPS serves rods on several ranks, and is the reference and the last resort on one: what is factored along the rod
+(:mod:`rodfem.linalg.chain`) may be factored by it as well (``-rodfem_lu_pc_factor_mat_solver_type mumps``,
+``-rodfem_cholesky_...``), with the same numbers.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import inf, log
 from typing import Any, Protocol
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
@@ -23,25 +22,20 @@ Sizes = Callable[[], PETSc.Vec]
 PETSC_ERR_LIB = 76
 """PETSc's error code for a failure in a library below."""
 LONG = 20_000
-"""Unknowns from which a rod is long: it is gathered on no rank.
+"""Unknowns from which a rod on several ranks is long.
 
-MUMPS in parallel gains nothing on a chain: the elimination tree that QAMD makes of one is as deep as the chain is long,
-and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
+The elimination tree that QAMD makes of a chain is as deep as the chain is long: MUMPS in parallel gains nothing on it,
+and at 1e5 elements its parallel analysis overflows its stack.
 """
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
 """MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
 BALANCED = {"mat_mumps_icntl_7": 4}
-"""MUMPS's ordering that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
-
-
-def is_spread(comm: MPI.Comm, unknowns: int) -> bool:
-    """Whether a rod of so many unknowns is too long to be gathered on each of several ranks."""
-    return bool(comm.size > 1 and unknowns >= LONG)
+"""MUMPS's ordering that makes balanced trees (PORD), slowly: for long rods on several ranks."""
 
 
 def ordering(matrix: PETSc.Mat) -> dict[str, int]:
     """MUMPS's ordering for a matrix on all its ranks."""
-    return BALANCED if is_spread(matrix.comm.tompi4py(), matrix.size[0]) else DENSE_ROWS
+    return BALANCED if matrix.comm.size > 1 and matrix.size[0] >= LONG else DENSE_ROWS
 
 
 @contextmanager
@@ -80,22 +74,6 @@ class Factors(Protocol):
 
     def determinant(self) -> float:
         """Logarithm of the size of the determinant of the symmetric matrix last factored."""
-
-
-class ByColumns(ABC):
-    """Solves for columns of arrays, of vectors and of dense matrices."""
-
-    @abstractmethod
-    def solve_columns(self, right: np.ndarray) -> np.ndarray:
-        """Solve for the columns (n, k) of the n rows of this rank."""
-
-    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Solve with the last factors."""
-        out.array[:] = self.solve_columns(right.array_r.real[:, None])[:, 0]
-
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once."""
-        out.getDenseArray()[:] = self.solve_columns(right.getDenseArray().real)
 
 
 class Mumps:
@@ -224,55 +202,3 @@ class Mumps:
             self.factor.setMumpsCntl(control, threshold)
         with preferred(self.prefix, ordering(matrix)):
             self.ksp.setUp()
-
-
-class GaveUpError(ConvergenceError):
-    """The elimination along the rod needs fronts that are too large: too many pivots were delayed."""
-
-
-class AlongRod(ByColumns):
-    """Factors by elimination along the rod, and, of a matrix on which that gives up, by the last resort.
-
-    ``times`` is the number of those matrices; ``regular`` as for all :class:`Factors`.
-    """
-
-    def __init__(self, resort: Mumps | None, sizes: Sizes | None) -> None:
-        """Keep the last ``resort``, or None: :class:`GaveUpError` is raised instead; and the ``sizes`` of unknowns."""
-        self.resort, self.resorted, self.times, self.regular = resort, False, 0, False
-        self.sizes = sizes
-
-    @abstractmethod
-    def eliminate(self, matrix: PETSc.Mat) -> None:
-        """Factor along the rod; raises :class:`GaveUpError` on all ranks where one gives up."""
-
-    @abstractmethod
-    def eliminated(self) -> tuple[tuple[int, int], float]:
-        """Inertia and determinant by elimination."""
-
-    def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` where it holds what is no number."""
-        self.resorted = False
-        try:
-            self.eliminate(matrix)
-        except GaveUpError:
-            if self.resort is None:
-                raise
-            self.resort(matrix)
-            self.resorted, self.regular = True, self.resort.regular
-            self.times += 1
-
-    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Solve with the last factors."""
-        (self.resort.solve if self.resort and self.resorted else super().solve)(right, out)
-
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once."""
-        (self.resort.solve_all if self.resort and self.resorted else super().solve_all)(right, out)
-
-    def inertia(self) -> tuple[int, int]:
-        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
-        return self.resort.inertia() if self.resort and self.resorted else self.eliminated()[0]
-
-    def determinant(self) -> float:
-        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
-        return self.resort.determinant() if self.resort and self.resorted else self.eliminated()[1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -110,7 +110,6 @@ def places_in(pattern: sp.csr_matrix, other: sp.csr_matrix) -> np.ndarray:
 
 
 STORED = """
-int MatMPIAIJGetSeqAIJ(void *matrix, void **block, void **rest, void *columns);
 int MatSeqAIJGetArrayRead(void *matrix, void **values);
 int MatSeqAIJRestoreArrayRead(void *matrix, void **values);
 """
@@ -128,14 +127,12 @@ def _petsc() -> tuple[Any, Any]:
 
 
 class Entries:
-    """Entries of this rank's rows of an AIJ matrix whose pattern stays, without the search that PETSc makes for each.
+    """Entries of an AIJ matrix on one rank whose pattern stays, without the search that PETSc makes for each.
 
     Attributes
     ----------
     starts, columns
-        Pattern of the rows, with global columns in ascending order.
-    number
-        How many there are.
+        Pattern of the rows, with columns in ascending order.
     """
 
     def __init__(self, matrix: PETSc.Mat) -> None:
@@ -145,43 +142,15 @@ class Entries:
             self.starts, self.columns = known.pattern.indptr, known.pattern.indices
         else:
             self.starts, self.columns, _ = matrix.getValuesCSR()
-        self.number = len(self.columns)
 
-    @cached_property
-    def places(self) -> np.ndarray:
-        """Places of these entries among :meth:`values`: those in columns of this rank's unknowns are stored first."""
-        own = self._own
-        return np.where(own, np.cumsum(own) - 1, np.count_nonzero(own) + np.cumsum(~own) - 1)
-
-    @property
-    def _own(self) -> np.ndarray:
-        """Whether an entry is in a column of this rank's unknowns."""
-        begin, end = self.matrix.getOwnershipRangeColumn()
-        return np.asarray((self.columns >= begin) & (self.columns < end))
-
-    def values(self) -> list[np.ndarray]:
-        """Values now, in the arrays of PETSc: not to be kept."""
-        ffi, lib = _petsc()
-        whole = ffi.cast("void *", self.matrix.handle)
-        if self.matrix.comm.size == 1:
-            return [self._values(whole, self.number)]
-        blocks = ffi.new("void *[2]")
-        lib.MatMPIAIJGetSeqAIJ(whole, blocks, blocks + 1, ffi.NULL)
-        return [self._values(block, n) for block, n in zip(blocks, self._counts, strict=True)]
-
-    @cached_property
-    def _counts(self) -> tuple[int, int]:
-        """Number of entries in columns of this rank's unknowns, and in others."""
-        own = int(np.count_nonzero(self._own))
-        return own, self.number - own
-
-    @staticmethod
-    def _values(block: Any, number: int) -> np.ndarray:
+    def values(self) -> np.ndarray:
+        """Values now, in the array of PETSc: not to be kept."""
+        number = len(self.columns)
         if not number:
             return np.empty(0, PETSc.ScalarType)
         ffi, lib = _petsc()
-        at = ffi.new("void **")
-        lib.MatSeqAIJGetArrayRead(block, at)
+        matrix, at = ffi.cast("void *", self.matrix.handle), ffi.new("void **")
+        lib.MatSeqAIJGetArrayRead(matrix, at)
         out = np.frombuffer(ffi.buffer(at[0], number * np.dtype(PETSc.ScalarType).itemsize), PETSc.ScalarType)
-        lib.MatSeqAIJRestoreArrayRead(block, at)
+        lib.MatSeqAIJRestoreArrayRead(matrix, at)
         return out

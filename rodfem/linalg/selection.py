@@ -1,4 +1,4 @@
-"""Choice of the factors for a matrix: along the rod, on several ranks each its piece, or MUMPS's."""
+"""Choice of the factors for a matrix: along the rod on one rank, or MUMPS's."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from petsc4py import PETSc
 from rodfem.errors import InputError
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors, Mumps, Sizes
-from rodfem.linalg.pieces import Pieces
 
 CHAIN, MUMPS = "chain", "mumps"
 """Names of what factors."""
@@ -39,13 +38,13 @@ def factors_of(
 ) -> Factors:
     """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
 
-    Those of another matrix, of 0 unknowns, are MUMPS's, which is the last resort of the others.  ``controls`` are its
-    ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or ``rodfem_cholesky_``, or with another
-    ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.  ``sizes`` are those of the
-    unknowns, where they are not one.
+    Those of another matrix, of 0 unknowns, and on several ranks are MUMPS's, which is the last resort of the others.
+    ``controls`` are its ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or
+    ``rodfem_cholesky_``, or with another ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the
+    matrices.  ``sizes`` are those of the unknowns, where they are not one.
     """
     prefix = prefix or f"rodfem_{kind}_"
     mumps = Mumps(kind, controls, thresholds, prefix, sizes)
-    if not unknowns or package(prefix) == MUMPS:
+    if not unknowns or package(prefix) == MUMPS or comm.size > 1:
         return mumps
-    return (Chain if comm.size == 1 else Pieces)(kind, scalars, mumps, sizes)
+    return Chain(kind, scalars, mumps, sizes)

@@ -1,4 +1,4 @@
-"""Saved diagrams in the formats of other programs: VTKHDF for ParaView, CSV tables, netCDF through xarray."""
+"""Saved diagrams in the formats of other programs: VTKHDF for ParaView, CSV tables."""
 
 from __future__ import annotations
 
@@ -151,30 +151,5 @@ def _table(lines: list[list[Any]]) -> bytes:
     return text.getvalue().encode()
 
 
-def to_netcdf(folder: Path, target: Path) -> list[Path]:
-    """Write a file for each branch, of the dimensions row, node and component; returns the files.
-
-    Nodes that a row has not are nan.  Raises :class:`InputError` for a folder without a run, and without xarray.
-    """
-    try:
-        import xarray
-    except ImportError:
-        raise InputError("netCDF needs the package xarray: install it by pip install xarray h5netcdf.") from None
-    made = []
-    for rows in rows_of(folder):
-        most = max(len(s) for s in rows.fields["s"])
-        variables: dict[str, Any] = {name: ("row", column) for name, column in rows.columns.items()}
-        for name, values in rows.fields.items():
-            padded = np.full((len(values), most, *values[0].shape[1:]), np.nan)
-            for place, value in zip(padded, values, strict=True):
-                place[: len(value)] = value
-            variables[name] = (("row", "node", f"component_{padded.shape[-1]}")[: padded.ndim], padded)
-        path = target / f"{rows.name.replace(' ', '-')}.nc"
-        image = xarray.Dataset(variables, attrs={"branch": rows.name}).to_netcdf(None, engine="scipy")
-        write_whole({path: bytes(image)})
-        made.append(path)
-    return made
-
-
-FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv, "netcdf": to_netcdf}
+FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv}
 """Formats by name, and what writes them."""

@@ -21,8 +21,8 @@ from slepc4py import SLEPc
 from rodfem import compat
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.linalg.chain import Chain, Elimination
-from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, GaveUpError, is_spread
+from rodfem.linalg.chain import Chain, Elimination, GaveUpError
+from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors
 from rodfem.linalg.matrices import Shared, gathered, local_rows, petsc_matrix, places_in, shared
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
@@ -148,9 +148,9 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             transposed.destroy()
 
     def _whole(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """The pencil; of a rod that is not long all of it on each rank, which solves alone."""
-        pencil, comm = self.in_units(), self.system.comm
-        if comm.size == 1 or is_spread(comm, self.matrix.getSize()[0]):
+        """The pencil; on several ranks all of it on each, which solves alone."""
+        pencil = self.in_units()
+        if self.system.comm.size == 1:
             return pencil
         self._own = slice(*self.matrix.getOwnershipRange())
         whole, mass = (petsc_matrix(MPI.COMM_SELF, gathered(matrix)) for matrix in pencil)
@@ -304,13 +304,12 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return factors.elimination
 
     def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
-        """Inverse of ``matrix - target mass`` along the rod, piece by piece on several ranks; None: SLEPc's own.
+        """Inverse of ``matrix - target mass`` along the rod; None: SLEPc's own.
 
-        On one rank the pencil of twice the size that a complex shift makes is SLEPc's and MUMPS's.  On several MUMPS
-        gives up on a long rod: the zero block of the multipliers delays more pivots than its analysis has room for.
+        The pencil of twice the size that a complex shift makes is SLEPc's and MUMPS's.
         """
         rows, comm = matrix.size[0], matrix.comm.tompi4py()
-        if comm.size == 1 and rows > self.matrix.size[0]:
+        if rows > self.matrix.size[0]:
             return None
         kept = self._shared.inverted
         if kept is None or kept[0].size != matrix.size:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+CHECK = Path(__file__).parents[2] / "docs" / "course" / "check.py"
 PROGRAMS = {
     "lesson": "import rodfem.app.script as script\nif script.lesson(__name__):\n    from petsc4py import PETSc\n",
     "check": "import rodfem.app.console as console\nfrom petsc4py import PETSc\n",
@@ -22,7 +23,7 @@ def test_a_reader_that_leaves_ends_the_program_quietly(tmp_path: Path, kind: str
     program = tmp_path / "mine.py"
     loop = LINES if kind == "lesson" else LINES.lstrip() + "answer = 1\n"
     program.write_text(PROGRAMS[kind] + loop)
-    command = [str(program)] if kind == "lesson" else ["-m", "rodfem", "check", "1", str(program)]
+    command = [str(program)] if kind == "lesson" else [str(CHECK), "1", str(program)]
     with subprocess.Popen(
         [sys.executable, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
     ) as run:

@@ -1,4 +1,4 @@
-"""The command that judges a student's program."""
+"""The program that judges a student's program."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from rodfem.app import console
-from rodfem.course.answer import Answer
-from rodfem.course.answers import answers
-from rodfem.course.pictures import axes, show
+import check
+from lesson.answer import Answer
+from lesson.answers import answers
+from lesson.pictures import axes, show
 from rodfem.errors import InputError
 
 pytestmark = pytest.mark.alone
@@ -67,20 +67,20 @@ def test_traps_are_wrong_and_answers_right(name: str) -> None:
 def test_a_program(program: str, status: int, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.py").write_text(program)
     with pytest.raises(SystemExit) as left:
-        console.main(["check", "1.1", str(tmp_path / "mine.py")])
+        check.main(["1.1", str(tmp_path / "mine.py")])
     said = capsys.readouterr()
     assert left.value.code == status
     assert words in said.out + said.err
 
 
 def test_mistakes_and_questions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    console.main(["check", "1.1"])
+    check.main(["1.1"])
     assert capsys.readouterr().out == f"1.1   {answers()['1.1'].question}\n"
-    console.main(["check"])
+    check.main([])
     assert capsys.readouterr().out.count("\n") == len(answers())
     for words, sentence in ((["11"], "no question '11'"), (["1", str(tmp_path / "none.py")], "is no file")):
         with pytest.raises(SystemExit):
-            console.main(["check", *words])
+            check.main(words)
         assert sentence in capsys.readouterr().err
 
 

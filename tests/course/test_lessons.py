@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from rodfem.course.answers import answer_to, answers
+from lesson.answers import answer_to, answers
 
 COURSE = Path(__file__).parents[2] / "docs" / "course"
 LESSONS = sorted(COURSE.glob("[0-9]*.py"))

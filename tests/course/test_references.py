@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc, jv
 
-from rodfem.course.answers import answers
+from lesson.answers import answers
 
 pytestmark = pytest.mark.alone
 

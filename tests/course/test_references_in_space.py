@@ -13,7 +13,7 @@ from numpy.polynomial import Legendre, Polynomial
 from scipy.linalg import eigvals, expm
 from scipy.optimize import brentq, fsolve
 
-from rodfem.course.answers import answers
+from lesson.answers import answers
 
 pytestmark = pytest.mark.alone
 

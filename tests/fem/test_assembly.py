@@ -8,10 +8,8 @@ from dolfinx import fem
 from golden_cases import cases, distinct
 from mpi4py import MPI
 from petsc4py import PETSc
-from small_states import scene
 
 from rodfem import Discretization, compat
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 
 EXACT = 1e-14
@@ -53,30 +51,3 @@ def test_forms_of_every_scene(name: str) -> None:
         size = theirs.norm(PETSc.NormType.INFINITY)
         theirs.axpy(-1.0, ours)
         assert theirs.norm(PETSc.NormType.INFINITY) <= EXACT * size
-
-
-@pytest.mark.few(1)
-@pytest.mark.versions
-@pytest.mark.short
-@pytest.mark.parametrize(("name", "formulation"), [("cord", "reduced"), ("hemitropic", "pointwise"), ("ring", "auto")])
-def test_matrices_on_all_ranks(name: str, formulation: str) -> None:
-    """Rows that another rank owns are sent there: PETSc's matrices are dolfinx's own."""
-    made = cases()["demo ring"]() if name == "ring" else scene(name)
-    system = Solver(made, Discretization(formulation, 8, 6)).equilibria.system
-    solver = StaticSolver(system)
-    state = system.at(solver.start(0.7 * made.span[0] + 0.3 * made.span[1], 0.4))
-    for form, load, ours in (
-        (system.equations.jacobian, True, system.state_matrix(load=True)),
-        (system.equations.jacobian, False, system.state_matrix()),
-        (system.equations.kinetic, False, system.metric_matrix()),
-    ):
-        state.assemble_into(ours, form, load=load)
-        ours.assemble()
-        values = ours.getValuesCSR()[2].copy()
-        ours.zeroEntries()
-        state.evaluate(lambda: np.zeros(0))  # takes the values
-        compat.assemble_matrix(ours, form.form, *system.maps(load))
-        ours.assemble()
-        theirs = ours.getValuesCSR()[2]
-        size = system.comm.allreduce(abs(theirs).max(), op=MPI.MAX)
-        assert abs(values - theirs).max() <= EXACT * size

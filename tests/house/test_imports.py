@@ -25,8 +25,6 @@ MATRICES = {
     "rodfem.linalg.compiler",
     "rodfem.linalg.factorization",
     "rodfem.linalg.selection",
-    "rodfem.linalg.piece",
-    "rodfem.linalg.pieces",
     "rodfem.linalg.matrices",
     "rodfem.linalg.householder",
     "rodfem.linalg.null_space",

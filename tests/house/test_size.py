@@ -14,13 +14,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 47790,
-    "files of Python": 364,
-    "lines of C": 1715,
-    "module constants with a number": 764,
-    "functions of a complexity above 10": 170,
-    "functions of six parameters or more": 102,
-    "places that warn": 54,
+    "lines of Python": 45323,
+    "files of Python": 337,
+    "lines of C": 1669,
+    "module constants with a number": 741,
+    "functions of a complexity above 10": 165,
+    "functions of six parameters or more": 95,
+    "places that warn": 53,
     "files that import internals of UFL and FFCx": 18,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)

@@ -1,4 +1,4 @@
-"""Factors on several ranks (on one: only the scalars are shared) against dense linear algebra on the same matrices."""
+"""MUMPS's factors on one rank and on several, against dense linear algebra on the same matrices."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from petsc4py import PETSc
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
+from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Mumps, Sizes
 from rodfem.linalg.matrices import gathered
-from rodfem.linalg.pieces import Pieces
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.inertia import Inertia
 
@@ -24,7 +24,6 @@ STATES = pytest.mark.parametrize(
     ("name", "state", "load"),
     [("cord", "plain", 30.0), ("cord", "buckled", 40.0), ("hemitropic", "plain", 0.25), ("hemitropic", "buckled", 0.2)],
 )
-PACKAGES = pytest.mark.parametrize("package", ["chain", "mumps"])
 SIGMAS = (-30.0, -3.0, -0.1, 0.0, 0.1, 2.0, 40.0)
 
 
@@ -35,10 +34,8 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
     return system, x
 
 
-def symmetric(system: System, package: str, sizes: Sizes | None = None) -> Pieces | Mumps:
+def symmetric(sizes: Sizes | None = None) -> Mumps:
     """LDL^t factors of matrices for unknowns of these natural sizes."""
-    if package == "chain":
-        return Pieces("cholesky", system.fields.dense_rows, sizes=sizes)
     return Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}, sizes=sizes)
 
 
@@ -47,7 +44,7 @@ def whole(vector: PETSc.Vec) -> np.ndarray:
     return np.concatenate(vector.comm.tompi4py().allgather(vector.array_r))
 
 
-def check(factors: Pieces | Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
+def check(factors: Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
     """Compare inertia, determinant and a solution with dense linear algebra."""
     dense, out = gathered(matrix).toarray(), right.duplicate()
     factors(matrix)
@@ -60,12 +57,11 @@ def check(factors: Pieces | Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
 
 @pytest.mark.few(2)
 @pytest.mark.versions
-@PACKAGES
 @FORMULATIONS
 @STATES
-def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float, package: str) -> None:
+def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float) -> None:
     system, x = at(name, state, formulation, load)
-    inertia, factors = Inertia(system), symmetric(system, package)
+    inertia, factors = Inertia(system), symmetric()
     right = inertia.seed(1)
     for sigma in SIGMAS:
         matrix = inertia.at(x).matrix
@@ -73,12 +69,11 @@ def test_inertia_and_solutions(name: str, state: str, formulation: str, load: fl
         check(factors, matrix, right)
 
 
-@PACKAGES
 @FORMULATIONS
-def test_inertia_beside_a_branch_point(formulation: str, package: str) -> None:
+def test_inertia_beside_a_branch_point(formulation: str) -> None:
     """The straight rod loses stability at 0.1143042145: eigenvalues are near zero there."""
     system, x = at("hemitropic", "plain", formulation, 0.1143042145)
-    inertia, factors = Inertia(system), symmetric(system, package)
+    inertia, factors = Inertia(system), symmetric()
     for sigma in (-1e-5, 1e-5):
         matrix = inertia.at(x).matrix
         matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
@@ -88,10 +83,9 @@ def test_inertia_beside_a_branch_point(formulation: str, package: str) -> None:
 
 
 @pytest.mark.versions
-@PACKAGES
-def test_many_right_hand_sides(package: str) -> None:
+def test_many_right_hand_sides() -> None:
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
-    inertia, factors = Inertia(system), symmetric(system, package)
+    inertia, factors = Inertia(system), symmetric()
     matrix = inertia.at(x).matrix
     matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     factors(matrix)
@@ -110,13 +104,12 @@ def test_many_right_hand_sides(package: str) -> None:
 
 
 @pytest.mark.versions
-@PACKAGES
-def test_natural_sizes(package: str) -> None:
+def test_natural_sizes() -> None:
     """What is factored in units of the unknowns has the inertia, the determinant and the solutions of the matrix."""
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
     inertia, sizes = Inertia(system), system.new_vector()
     sizes.array[:] = 10.0 ** np.random.default_rng(system.comm.rank).uniform(-3, 3, sizes.local_size)
-    factors = symmetric(system, package, lambda: sizes)
+    factors = symmetric(lambda: sizes)
     for sigma in (-3.0, 0.1):
         matrix = inertia.at(x).matrix
         matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
@@ -125,14 +118,13 @@ def test_natural_sizes(package: str) -> None:
 
 @pytest.mark.few(1)
 @pytest.mark.versions
-@PACKAGES
 @FORMULATIONS
 @pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])
-def test_matrix_without_symmetry(formulation: str, name: str, load: float, package: str) -> None:
+def test_matrix_without_symmetry(formulation: str, name: str, load: float) -> None:
     if name == "follower":
         formulation = "pointwise"
     system, x = at(name, "plain", formulation, load)
-    factors = Pieces("lu", system.fields.dense_rows) if package == "chain" else Mumps("lu", {8: 0})
+    factors = Mumps("lu", {8: 0})
     row = system.metric * x
     system.set_load(row, 1.0)
     matrix = system.at(x).jacobian(row)
@@ -144,49 +136,16 @@ def test_matrix_without_symmetry(formulation: str, name: str, load: float, packa
     np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
 
 
-def chain(n: int, sigma: float) -> PETSc.Mat:
-    """Chain of ``n`` masses between walls, shifted by ``sigma``, as a distributed matrix."""
-    matrix = PETSc.Mat().createAIJ((n, n), nnz=3, comm=MPI.COMM_WORLD)
-    matrix.setUp()
-    for i in range(*matrix.getOwnershipRange()):
-        for j in range(max(i - 1, 0), min(i + 2, n)):
-            matrix.setValue(i, j, 2.0 - sigma if i == j else -1.0)
-    matrix.assemble()
-    return matrix
-
-
-def frequencies(n: int) -> np.ndarray:
-    """Eigenvalues of the chain."""
-    return 2 - 2 * np.cos(np.pi * np.arange(1, n + 1) / (n + 1))
-
-
-def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
-    """At eigenvalues of all parts of the chain the whole is counted right, and solved with."""
-    n = 24
-    factors = Pieces("cholesky", 1)
-    exact = frequencies(n)
-    for sigma in np.unique(np.round([s for m in range(1, n) for s in frequencies(m)], 12)):
-        if abs(exact - sigma).min() < 1e-6:
-            continue
-        matrix = chain(n, float(sigma))
-        factors(matrix)
-        assert factors.inertia() == ((exact < sigma).sum(), 0)
-        right, out = matrix.createVecs()
-        right.set(1.0)
-        factors.solve(right, out)
-        assert (matrix * out - right).norm() < 1e-9 * out.norm()
-
-
-@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="nothing is cut on one rank")
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 @pytest.mark.parametrize(("formulation", "elements"), [("reduced", 5000), ("pointwise", 2000)])
-def test_long_rods_are_cut(formulation: str, elements: int) -> None:
-    """Their index, their eigenvalue nearest zero, and the left-most ones are those of MUMPS on one rank."""
+def test_long_rods(formulation: str, elements: int) -> None:
+    """Their index, their eigenvalue nearest zero, and the left-most ones are those of the elimination on one rank."""
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         solver = Solver(small_states.scene("cord"), Discretization(formulation, elements, 1), comm).equilibria
         system = solver.system
         for factors in (solver.inertia.factors, system.lu):
-            assert isinstance(factors, Pieces) == (comm.size > 1)
+            assert isinstance(factors, Mumps if comm.size > 1 else Chain)
         system.set_phase(None)
         x, outcome = solver.at_load(solver.start(20.0), 20.0)
         assert outcome.converged

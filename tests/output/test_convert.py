@@ -16,7 +16,7 @@ import rodfem
 from rodfem import Discretization, InputError, Plan
 from rodfem.app import console
 from rodfem.app.run import run
-from rodfem.output.convert import to_csv, to_netcdf, to_vtkhdf
+from rodfem.output.convert import to_csv, to_vtkhdf
 
 pytestmark = pytest.mark.alone
 
@@ -75,17 +75,6 @@ def test_tables(saved: Path, tmp_path: Path) -> None:
     assert [float(line["load"]) for line in lines] == branch["columns"]["load"]
     assert [float(line["energy"]) for line in lines] == branch["columns"]["energy"]
     assert [line["kind"] for line in csv.DictReader(special.open())] == [s["kind"] for s in branch["special"]]
-
-
-@pytest.mark.versions
-def test_netcdf(saved: Path, tmp_path: Path) -> None:
-    xarray = pytest.importorskip("xarray")
-    (path,) = to_netcdf(saved, tmp_path)
-    with h5py.File(saved / "states.h5") as file, xarray.open_dataset(path, engine="scipy") as found:
-        assert np.array_equal(found["r"], file["branches/first branch/r"]) and found.attrs["branch"] == "first branch"
-        assert found["r"].dims[:2] == ("row", "node") and np.array_equal(
-            found["load"], file["branches/first branch/load"]
-        )
 
 
 def test_command(saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -150,17 +150,6 @@ def put(name: str, value: Any) -> Callable[[h5py.File], None]:
     return change
 
 
-def elsewhere(name: str) -> Callable[[h5py.File], None]:
-    """The same dataset, but with its numbers in another file."""
-
-    def change(file: h5py.File) -> None:
-        shape = file[name].shape
-        del file[name]
-        file.create_dataset(name, shape=shape, dtype="f8", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
-
-    return change
-
-
 def attribute(name: str, value: Any) -> Callable[[h5py.File], None]:
     return lambda file: file.attrs.__setitem__(name, value)
 
@@ -176,9 +165,6 @@ STATES: list[tuple[bytes | Callable[[h5py.File], None], str]] = [
     (put("branches", 3.0), "states.h5"),
     (put(f"{HERE}/q", 3.0), "states.h5"),
     (put(f"{HERE}/q", "abc"), "states.h5"),
-    (put(f"{HERE}/s", h5py.SoftLink("/branches")), "has a link instead of 's'"),
-    (put(f"{HERE}/q", h5py.ExternalLink("/etc/passwd", "q")), "has a link instead of 'q'"),
-    (elsewhere(f"{HERE}/s"), "takes 's' from another file"),
     (put(f"{HERE}/s", np.full((50, 49), np.nan)), "states.h5"),
 ]
 LOADED: list[tuple[bytes | Callable[[h5py.File], None], str]] = [

@@ -3,7 +3,7 @@
 import numpy as np
 from ufl import derivative, dx, sin
 
-from rodfem.course.by_hand import angle, assemble, constant, nodes
+from lesson.by_hand import angle, assemble, constant, nodes
 
 theta = angle()
 F = constant(theta, 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import eigh
 from ufl import SpatialCoordinate, conditional, cos, derivative, ds, dx, lt
 
-from rodfem.course.by_hand import angle, assemble
+from lesson.by_hand import angle, assemble
 
 theta = angle()
 s = SpatialCoordinate(theta.function_space.mesh)[0]

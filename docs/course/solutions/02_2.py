@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import eigh
 from ufl import SpatialCoordinate, cos, derivative, dx
 
-from rodfem.course.by_hand import angle, assemble, nodes
+from lesson.by_hand import angle, assemble, nodes
 
 theta = angle()
 s = SpatialCoordinate(theta.function_space.mesh)[0]

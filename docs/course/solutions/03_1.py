@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import eigh
 from ufl import cos, derivative, dx, sin
 
-from rodfem.course.by_hand import angle, assemble, nodes
+from lesson.by_hand import angle, assemble, nodes
 
 theta = angle()
 unknown = nodes(theta) > 0

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import eigh
 from ufl import derivative, dx
 
-from rodfem.course.by_hand import angle, assemble, nodes
+from lesson.by_hand import angle, assemble, nodes
 
 
 def load(elements: int) -> float:

@@ -1,4 +1,4 @@
-"""Write a saved diagram for other programs: VTKHDF (ParaView), CSV, netCDF."""
+"""Write a saved diagram for other programs: VTKHDF (ParaView), CSV."""
 
 from __future__ import annotations
 

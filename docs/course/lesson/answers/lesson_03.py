@@ -2,7 +2,7 @@
 
 from math import pi, sqrt
 
-from rodfem.course.answer import Answer
+from lesson.answer import Answer
 
 ANSWERS = (
     Answer(

@@ -2,7 +2,7 @@
 
 from math import pi
 
-from rodfem.course.answer import Answer
+from lesson.answer import Answer
 
 CORD, HEMITROPIC = 5 * pi**2, 0.11430421452003
 

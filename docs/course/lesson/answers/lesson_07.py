@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from rodfem.course.answer import Answer
+from lesson.answer import Answer
 
 FLUID, WEIGHTS, STRINGS = 3.0, 4.0, 4.5
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from pkgutil import iter_modules
 
-from rodfem.course.answer import Answer
+from lesson.answer import Answer
 from rodfem.errors import InputError
 
 LESSONS = tuple(sorted(module.name for module in iter_modules(__path__)))

@@ -1,6 +1,6 @@
 """Answers of lesson 6: big rotations."""
 
-from rodfem.course.answer import Answer
+from lesson.answer import Answer
 
 GREENHILL = 8.986818915818128
 

@@ -1,6 +1,6 @@
 """Answers of lesson 5: branch points and imperfections."""
 
-from rodfem.course.answer import Answer
+from lesson.answer import Answer
 
 ANSWERS = (
     Answer(

@@ -2,7 +2,7 @@
 
 from math import acos, pi, sqrt
 
-from rodfem.course.answer import Answer
+from lesson.answer import Answer
 
 BECK, ZIEGLER = 20.0509536189738, 3.5 - sqrt(2)
 
