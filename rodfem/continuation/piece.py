@@ -29,10 +29,14 @@ LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Knot:
-    """A state of the branch: ``x``, the derivative of the curve in the place there, and its reduced stiffness."""
+    """A state of the branch: ``x``, the derivative of the curve in the place there, and its reduced stiffness.
+
+    The ``speed`` is the derivative of the place along the unit tangent.
+    """
 
     x: PETSc.Vec
     slope: PETSc.Vec
+    speed: float
     reduced: ReducedStiffness
 
 
@@ -66,7 +70,7 @@ class Piece:
         """Node at a state with its unit tangent; its reduced stiffness may be known."""
         reduced = reduced or self.condensation.at(x, tangent, self.phi)
         speed, Q = float(self.row.dot(tangent)), self.moving
-        knot = Knot(x, tangent * (1.0 / speed), reduced)
+        knot = Knot(x, tangent * (1.0 / speed), speed, reduced)
         return Node(self.place(x), Q.T @ reduced.H @ Q, Q.T @ reduced.rate @ Q / speed, reduced.far, knot)
 
     def curve(self, p: Node, q: Node, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:

@@ -101,7 +101,6 @@ class _Made:
     table: np.ndarray
     rate: float
     spread: float
-    modes: list[PETSc.Vec]
     others: np.ndarray
 
 
@@ -153,7 +152,7 @@ class SingularSystem:
         system.set_load(w, 1.0)
         Z, N = self._split(G)
         null = [combine(V, z) for z in Z.T]
-        r, bend = self._differences(x, w, DIFFERENCE / system.norm(w), null, equations)
+        r, bend = self._differences(x, w, DIFFERENCE / system.norm(w), null)
         y = [self._differences(x, v, DIFFERENCE, [v])[0][0] for v in null]
         rows, right = [], []
         for n in np.eye(m) if self.fold else N.T:
@@ -182,7 +181,6 @@ class SingularSystem:
             np.array([[bend.dot(null[0]), null[0].dot(r[0])], [null[0].dot(r[0]), null[0].dot(y[0])]]),
             rate / len(null),
             float(np.linalg.norm(inner - np.trace(inner) / len(null) * np.eye(len(null)), 2)),
-            V,
             np.linalg.eigvalsh(N.T @ (G + G.T) @ N) / 2,
         )
         self.Z = Z
@@ -198,13 +196,17 @@ class SingularSystem:
         return vectors[:, order[:k]], vectors[:, order[k:]]
 
     def _state(self, x: PETSc.Vec, step: PETSc.Vec, made: _Made) -> SingularState:
-        matrix, null = self.inertia.at(x).matrix, [v.copy() for v in made.null]
+        matrix, bordered = self.inertia.at(x).matrix, self._bordered
+        assert bordered is not None
+        bordered.factor(matrix, self.psi)
+        modes = [bordered.solve(None, e)[0] for e in np.eye(len(self.psi))]  # of this very state
+        null = [combine(modes, z) for z in self.Z.T]
         noise = NOISE * max(rounding(matrix, v, x) for v in null) + LEAST * self.inertia.scale
         simple = len(null) == 1 and not self.fold
         directions = self._directions(made.response, null[0], made.table) if simple else []
         orthonormalize(null, self.inertia.metric)
         load = self.system.scalar(x)
-        rest = made.rate, made.spread, made.modes, made.others, step
+        rest = made.rate, made.spread, modes, made.others, step
         return SingularState(x, load, null, made.response, made.beta, noise, directions, *rest)
 
     def _directions(self, w: PETSc.Vec, v: PETSc.Vec, table: np.ndarray) -> list[PETSc.Vec]:
@@ -220,26 +222,18 @@ class SingularSystem:
         return out
 
     def _differences(
-        self,
-        x: PETSc.Vec,
-        direction: PETSc.Vec,
-        h: float,
-        vectors: list[PETSc.Vec],
-        equations: PETSc.Vec | None = None,
+        self, x: PETSc.Vec, direction: PETSc.Vec, h: float, vectors: list[PETSc.Vec]
     ) -> tuple[list[PETSc.Vec], PETSc.Vec]:
-        """Derivatives of ``S v`` along a direction at ``x``, and the second one of ``F`` (from ``F``, if given)."""
+        """Derivatives of ``S v``, and of ``S w + F_lam`` with that direction w itself, along it at ``x``."""
         system, inertia = self.system, self.inertia
         out, bend = [system.new_vector() for _ in vectors], system.new_vector()
-        there = system.new_vector()
         for sign in (1.0, -1.0):
-            beside = x + direction * (sign * h)
-            matrix = inertia.at(beside).matrix
+            beside = inertia.at(x + direction * (sign * h))
             for image, v in zip(out, vectors, strict=True):
-                image.axpy(sign / (2 * h), matrix * v)
-            if equations is not None:
-                system.at(beside).residual(there)
-                bend.axpy(1.0 / h**2, there)
-                bend.axpy(-1.0 / h**2, equations)
+                image.axpy(sign / (2 * h), beside.matrix * v)
+            bend.axpy(sign / (2 * h), beside.matrix * direction)
+            bend.axpy(sign / (2 * h), beside.border)
+        system.set_load(bend, 0.0)
         return out, bend
 
 

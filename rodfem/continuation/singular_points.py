@@ -23,7 +23,7 @@ from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize
 from rodfem.stability.inertia import Index
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
-from rodfem.tolerances import round_off
+from rodfem.tolerances import TINY, round_off
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
@@ -197,7 +197,7 @@ def load_uncertainty(solver: BranchSolver, found: SingularState) -> float:
     matrix = solver.inertia.at(found.x)
     doubt = max(matrix.noise(v) for v in found.vectors) + found.spread
     moved = abs(solver.system.scalar(found.last))
-    return moved + (doubt / abs(found.rate) if abs(found.rate) * abs(found.load) > doubt else 0.0)
+    return moved + doubt / max(abs(found.rate), TINY)
 
 
 def _tangent(solver: BranchSolver, slope: PETSc.Vec, found: SingularState, *, fold: bool) -> PETSc.Vec:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import inf
 
 import numpy as np
+from petsc4py import PETSc
 
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
@@ -31,6 +32,8 @@ from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedSti
 
 DIP = 0.1
 """Eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most."""
+HALVINGS = 6
+"""Bisections after which a mode that passes zero is among those nearest zero."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is taken to stay zero."""
 ASIDE = 0.02
@@ -120,12 +123,14 @@ class SpecialSearch:
         return self._condensations[point.mesh]
 
     def _regular(self, point: Point) -> bool:
-        """Whether no more eigenvalues are zero than all along."""
-        return point.zero <= min(p.zero for p in self._open)
+        """Whether no more eigenvalues are zero than all along, to working accuracy."""
+        if point.zero <= min(p.zero for p in self._open):
+            return True
+        self._prepare(point)
+        return self._reduced(point).zero <= min(self._reduced(p).zero for p in self._open)
 
     def _shown(self, *, ended: bool = False) -> list[SpecialPoint]:
         a, b = self._open[0], self._open[-1]
-        self.undecided = min(a.zero, b.zero)
         found = self._between(a, b, ended=ended)
         self._open = [b]
         return found
@@ -141,33 +146,57 @@ class SpecialSearch:
         return known[1]
 
     def _nodes(self, a: Point, b: Point) -> tuple[Piece, Node, Node]:
-        """The piece from ``a`` to ``b`` with its ends; a new border where the last one has become that of others."""
-        if self._mesh != b.mesh:
-            self._forget()
-            self._mesh = b.mesh
-        for attempt in (0, 1):
-            phi = self._phi = self._on(b).border(b.x if attempt else a.x) if self._phi is None else self._phi
-            first, last = self._reduced(a), self._reduced(b)
-            if first.far == last.far and max(first.rotated, last.rotated) < ROTATED:
+        """The piece from ``a`` to ``b`` with its ends, and a border with all modes that pass zero between them.
+
+        Where the last one has become that of others, or lacks one, it is made anew: of the modes nearest zero at the one
+        end or the other, else of those where the index changes.
+        """
+        phi = self._prepare(a)
+        piece, p, q = self._ends(a, b, phi)
+        for x in (a.x, b.x, None):
+            if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
                 break
-            if not attempt:
-                self._forget()
-        piece = Piece(self._on(b), a, b, phi)
-        assert a.tangent is not None
-        assert b.tangent is not None
-        still = min(first.zero, last.zero)
+            self._forget()
+            self._phi = self._on(b).border(self._changing(piece, p, q) if x is None else x)
+            piece, p, q = self._ends(a, b, self._phi)
+        first, still = p.kept.reduced, min(n.kept.reduced.zero for n in (p, q))
         if still:
             values, vectors = np.linalg.eigh(first.H)
             piece.leave_out(vectors[:, np.argsort(abs(values))[:still]])
-        return piece, piece.node(a.x, a.tangent, first), piece.node(b.x, b.tangent, last)
+            p, q = (piece.node(n.kept.x, n.kept.slope * n.kept.speed, n.kept.reduced) for n in (p, q))
+        return piece, p, q
+
+    def _prepare(self, row: Point) -> np.ndarray:
+        """The border, on the mesh of a row, made there unless there is one."""
+        if self._mesh != row.mesh:
+            self._forget()
+            self._mesh = row.mesh
+        if self._phi is None:
+            self._phi = self._on(row).border(row.x)
+        return self._phi
+
+    def _ends(self, a: Point, b: Point, phi: np.ndarray) -> tuple[Piece, Node, Node]:
+        piece = Piece(self._on(b), a, b, phi)
+        assert a.tangent is not None
+        assert b.tangent is not None
+        return piece, piece.node(a.x, a.tangent, self._reduced(a)), piece.node(b.x, b.tangent, self._reduced(b))
+
+    def _changing(self, piece: Piece, p: Node, q: Node) -> PETSc.Vec:
+        """A state near which the index changes between two nodes."""
+        for _ in range(HALVINGS):
+            middle = piece.solve(p, q, (p.s + q.s) / 2)
+            if middle is None:
+                break
+            p, q = (middle, q) if middle.index == p.index else (p, middle)
+        return p.kept.x
 
     def _between(self, a: Point, b: Point, *, ended: bool = False) -> list[SpecialPoint]:
         """Special points between two rows, of which those between are singular."""
         piece, p, q = self._nodes(a, b)
-        least = min(a.zero, b.zero)
+        self.undecided = piece.still + piece.solver.system.active_drifts(b.x)
         off = ASIDE * (q.s - p.s)
-        p = p if a.zero <= least else piece.solve(p, q, p.s + off) or p
-        q = q if b.zero <= least else piece.solve(p, q, q.s - off) or q
+        p = p if p.kept.reduced.zero <= piece.still else piece.solve(p, q, p.s + off) or p
+        q = q if q.kept.reduced.zero <= piece.still or not ended else piece.solve(p, q, q.s - off) or q
         out: list[SpecialPoint] = []
         pieces = [(p, q)]
         turn = piece.turn(p, q)
@@ -183,7 +212,8 @@ class SpecialSearch:
         misses: list[Node] = []
         for begin, end in pieces:
             for crossing in crossings(begin, end, piece.solve, piece.solver.inertia.tolerance, misses):
-                special = self._located(piece, of_crossing(piece, crossing), ended=ended)
+                turns = piece.turn(*crossing.piece) is not None
+                special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
                 if special is None:
                     self._steps.ask(a, b)
                     self.observer.warn(missing(a.load, b.load))
@@ -216,9 +246,10 @@ class SpecialSearch:
         special.test_function = "slope"
         return special
 
-    def _located(self, piece: Piece, at: Candidate, *, ended: bool) -> SpecialPoint | None:
+    def _located(self, piece: Piece, at: Candidate, *, turns: bool, ended: bool) -> SpecialPoint | None:
         """The fold or branch point of a crossing; None where there is no singular state.
 
+        Whether the load ``turns`` back in its piece tells the fold of this branch from that of another one.
         Raises :class:`Gap` for an imperfection that is not known, unless the branch has ``ended``.
         """
         solver = piece.solver
@@ -229,7 +260,7 @@ class SpecialSearch:
             return special_point(piece, at, found, fold=False)
         gap = self._open_gap(piece, at, found, ended=ended) if found is not None else None
         fold = solved(solver, at, fold=True)
-        if fold is not None:
+        if fold is not None and (gap is None or turns):
             return special_point(piece, at, fold, fold=True)
         if found is None:
             return None

@@ -29,7 +29,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.linalg.chain import Chain
+from rodfem.fem.system import dense_columns
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import shared
 from rodfem.stability.bordered import Bordered
@@ -88,6 +88,7 @@ class Condensation:
         self.solver, self.system, self.inertia = solver, solver.system, solver.inertia
         self.made = 0
         self._bordered: dict[int, Bordered] = {}
+        self._columns: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
 
     def border(self, x: PETSc.Vec, count: int = MODES) -> np.ndarray:
         """Modes nearest zero at a state, (own rows, count), fewer if there are no more."""
@@ -165,14 +166,13 @@ class Condensation:
 
     def _solved(self, factors: Factors, B: np.ndarray) -> np.ndarray:
         """``S^-1 B``."""
-        if isinstance(factors, Chain) and not factors.resorted:
-            return factors.solve_columns(B)
-        out = []
-        for column in B.T:
-            y = self.system.new_vector()
-            factors.solve(self.vector(column), y)
-            out.append(y.array_r.copy())
-        return np.stack(out, axis=1)
+        k = B.shape[1]
+        if k not in self._columns:
+            self._columns[k] = dense_columns(self.system, k), dense_columns(self.system, k)
+        right, out = self._columns[k]
+        right.getDenseArray()[:] = B
+        factors.solve_all(right, out)
+        return np.array(out.getDenseArray())
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
         """Vector of own rows."""
