@@ -19,7 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from rodfem.problem.roles import functions_of
+from rodfem.errors import SceneError
+from rodfem.problem.kinds import number_of
+from rodfem.problem.local_state import STATES, some_places, trials
+from rodfem.problem.roles import Role, functions_of
 from rodfem.problem.scene import Scene
 
 VALUES = (bool, int, float, complex, str, bytes, type(None))
@@ -35,8 +38,34 @@ def digest(functions: Iterable[Callable[..., Any]]) -> str:
 
 def digest_of(scene: Scene) -> str:
     """Sixteen hexadecimal digits that are equal for scenes that state the same rod."""
-    parts = [*_stated(scene), repr(scene.numbers), digest(function for _, function, _ in functions_of(scene))]
+    parts = [*_stated(scene), repr(_values(scene)), digest(function for _, function, _ in functions_of(scene))]
     return hashlib.sha1("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def _values(scene: Scene) -> list[tuple[str, list[float]]]:
+    """Values of each function of a scene by its words: at some constants and states, nan where it is undefined."""
+    return [(what, list(_numbers(scene, function, role))) for what, function, role in functions_of(scene)]
+
+
+def _numbers(scene: Scene, function: Callable[..., Any], role: Role) -> Iterator[float]:
+    if role.call == "f(c)":
+        for c in trials(scene, function):
+            values = function(c)
+            yield from (np.nan if x is None else number_of(x) for x in (values if role.size else [values]))
+        return
+    for i, (q, r, *_) in enumerate(STATES):
+        x, c = some_places(scene, i)[role.along or role.call == "W(v, k, c)"], scene.constants()
+        try:
+            if role.call == "W(v, k, c)":
+                yield number_of(function(x.v, x.k, c))
+            elif role.call == "of(r, q)":
+                yield number_of(function(scene.length * np.array(r), np.array(q)))
+            elif role.call == "start(s)":
+                yield from np.ravel(function(np.array(scene.interval)))
+            else:
+                yield number_of(function(x, c))
+        except SceneError:  # undefined there: a state that the rod need not take
+            yield np.nan
 
 
 def _stated(value: Any) -> Iterator[str]:
