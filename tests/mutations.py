@@ -1492,8 +1492,8 @@ FAULTS = {
     ),
     "straight-rods-have-no-stiffness": Fault(
         "rodfem/fem/quadrature_check.py",
-        "yield np.array([first, moved - first, *inertia])",
-        "yield np.array([first, first, *inertia])",
+        "np.array([first, moved - first])",
+        "np.array([first, first])",
         "tests/fem/test_quadrature_check.py",
     ),
     "quadrature-of-halves-alone": Fault(
@@ -1504,8 +1504,8 @@ FAULTS = {
     ),
     "masses-are-integrated": Fault(
         "rodfem/fem/quadrature_check.py",
-        "[] if equations.massless else",
-        "[] if True else",
+        "if equations.even:",
+        "if True:",
         "tests/fem/test_quadrature_check.py",
     ),
     "rules-as-good-as-they-are": Fault(

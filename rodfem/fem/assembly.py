@@ -97,10 +97,13 @@ class Assembler:
     """
 
     def __init__(self, form: Any, cells: Cells, *, inside: bool = False) -> None:
-        """Take the kernels of a dolfinx form; of its integrals over cells alone, ``inside`` of them."""
+        """Take the kernels of a dolfinx form; ``inside`` those of its integrals over cells alone, for all ``cells``."""
         self.form, self._code = form, _code()
         ffi, size = self._code.ffi, cells.dofs.shape[1]
-        integrals = [x for x in compat.integrals(form) if x.kind == compat.CELL or not inside]
+        integrals = compat.integrals(form)
+        if inside:
+            every = np.arange(len(cells.dofs), dtype=np.int32)[:, None]
+            integrals = [x._replace(entities=every) for x in integrals if x.kind == compat.CELL]
         memory = self._memory = Memory(ffi)
         held = memory.keep("integrals", ffi.new("Integral[]", len(integrals)))
         for i, (c, x) in enumerate(zip(held, integrals, strict=True)):

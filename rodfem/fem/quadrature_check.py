@@ -46,7 +46,7 @@ REMEDY = "no error is estimated; use breaks=(...) where a function jumps or has 
 
 
 class Pieces:
-    """Forms of a ``system`` on its own cells, each cut into equal pieces.
+    """Forms of a ``system`` on its own cells, each cut into equal pieces: values are (pieces, cells, n).
 
     Attributes
     ----------
@@ -61,44 +61,56 @@ class Pieces:
         self.fields, self.equations = system.fields, system.equations
         own = slice(0, self.fields.owned_cells)
         self.dofs, self._x = self.equations.cells.dofs[own], self.equations.cells.x[own]
-        self._cells = Cells(np.empty_like(self._x), np.arange(self.dofs.size, dtype=np.int32).reshape(self.dofs.shape))
         numbers = {int(dof): i for i, dof in enumerate(self.dofs[0])}
         self.rows = {name: np.vectorize(numbers.get)(dofs[0]) for name, dofs in self.fields.dofs.items()}
         d = self.fields.discretization
         self.points = self.equations.quadrature_degree(d.degree) // 2 + 1
         self.number = max(LEAST, 2 ** round(np.log2(POINTS / d.elements / self.points)))
-        self._basis = cache(self._tabulated)
-        self._form = cache(lambda form: Assembler(form.form, self._cells, inside=True))
+        self._cells, self._bases, self._form = cache(self._cut), cache(self._tabulated), cache(self._assembler)
 
-    def __call__(
-        self, form: Assembler, values: np.ndarray, pieces: int, places: Places | None = None
-    ) -> Iterator[np.ndarray]:
-        """Assemble a form on each of so many pieces: yields (cells, n), or a scalar where there are no ``places``.
+    def vectors(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
+        """A linear form, whose parameters have been taken, where the unknown has these ``values`` (cells, n)."""
+        every = self._cells(pieces).dofs
+        return self._assembled(form, values, pieces, vector_places(every, np.arange(every.size)))
 
-        Parameters
-        ----------
-        form
-            Form of the equations whose parameters have been taken.
-        values
-            Values of the unknown by cell and degree of freedom of the cell, (cells, n).
-        pieces, places
-            Number of pieces, and where the entries of vectors (cells, n) are.
-        """
-        mine, first, size = self._form(form), self._x[:, :1], self._x[:, 1:] - self._x[:, :1]
+    def rigid(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
+        """A bilinear form times a change of one in all rotations and positions."""
+        every = self._cells(pieces).dofs
+        moving = [rows.ravel() for name, rows in self.rows.items() if name in (self.fields.turning.name, "r")]
+        chosen = np.where(np.isin(np.arange(every.shape[1]), np.concatenate(moving)), 0, -1)
+        places = Places(every, np.zeros_like(every), np.broadcast_to(chosen, (len(every), 1, every.shape[1])))
+        return self._assembled(form, values, pieces, places)
+
+    def integral(self, form: Assembler, values: np.ndarray, pieces: int) -> float:
+        """A functional on the cells of this rank."""
+        return float(self._assembled(form, values, pieces, None))
+
+    def _assembled(self, form: Assembler, values: np.ndarray, pieces: int, places: Places | None) -> np.ndarray:
+        bases, mine = self._bases(pieces), self._form(form, pieces)
+        local = values @ bases.transpose(0, 2, 1)
+        out = np.zeros(1 if places is None else local.size)
         mine.constants = form.constants
-        for piece in range(pieces):
-            self._cells.x[:] = first + size * (np.array([piece, piece + 1])[:, None] / pieces)
-            basis, out = self._basis(piece, pieces), np.zeros(1 if places is None else values.size)
-            mine.add((values @ basis.T).ravel(), places, out)
-            yield out[0] if places is None else out.reshape(values.shape) @ basis
+        mine.add(local.ravel(), places, out)
+        return out[0] if places is None else out.reshape(local.shape) @ bases
 
-    def _tabulated(self, piece: int, pieces: int) -> np.ndarray:
-        """Values of the basis of a cell at the nodes of a piece of it, (n, n)."""
-        out = np.eye(self.dofs.shape[1])
+    def _assembler(self, form: Assembler, pieces: int) -> Assembler:
+        return Assembler(form.form, self._cells(pieces), inside=True)
+
+    def _cut(self, pieces: int) -> Cells:
+        ends = (np.arange(pieces)[:, None] + np.array([0.0, 1.0])) / pieces
+        first, size = self._x[:, :1], self._x[:, 1:] - self._x[:, :1]
+        x = first + size * ends[:, None, :, None]
+        dofs = np.arange(pieces * self.dofs.size, dtype=np.int32).reshape(-1, self.dofs.shape[1])
+        return Cells(np.ascontiguousarray(x.reshape(-1, 2, 3)), dofs)
+
+    def _tabulated(self, pieces: int) -> np.ndarray:
+        """Values of the basis of a cell at the nodes of its pieces, (pieces, n, n)."""
+        out = np.tile(np.eye(self.dofs.shape[1]), (pieces, 1, 1))
         for block in self.fields.blocks:
-            values = compat.lagrange_basis(block.degree, (piece + compat.nodes(block.degree)) / pieces)
+            nodes = compat.nodes(block.degree)
+            values = [compat.lagrange_basis(block.degree, (piece + nodes) / pieces) for piece in range(pieces)]
             for rows in self.rows[block.name].T:
-                out[np.ix_(rows, rows)] = values
+                out[:, rows[:, None], rows] = values
         return out
 
 
@@ -108,37 +120,29 @@ class QuadratureCheck:
     def __init__(self, system: System) -> None:
         """Choose the rows that are compared: of rotations, strains and positions."""
         self.system, self._pieces = system, Pieces(system)
-        fields, shape = system.fields, self._pieces.dofs.shape
-        names = (fields.turning.name, "v", "r")
-        self._rows = {name: self._pieces.rows[name].ravel() for name in names if name in fields.dofs}
-        every = np.arange(self._pieces.dofs.size).reshape(shape)
-        rigid = np.concatenate([rows for name, rows in self._rows.items() if name != "v"])
-        columns = np.where(np.isin(np.arange(shape[1]), rigid), 0, -1)
-        self._vectors = vector_places(every, every.ravel())
-        self._sums = Places(every, np.zeros(shape), np.broadcast_to(columns, (shape[0], 1, shape[1])))
+        names = (system.fields.turning.name, "v", "r")
+        self._rows = {name: self._pieces.rows[name].ravel() for name in names if name in system.fields.dofs}
 
     def __call__(self, x: PETSc.Vec) -> str:
         """Return a clause on where the equations are not integrated in a state ``x``; empty for nowhere."""
-        state, elements = self.system.at(x), self.system.fields.discretization.elements
+        state, elements, number = self.system.at(x), self.system.fields.discretization.elements, self._pieces.number
         self.system.equations.take(state.line)
         values = [local[self._pieces.dofs] for local in (state.local, self._moved(state.local))]
-        own, halves, thirds = (sum(self._terms(values, pieces)) for pieces in (1, 2, 3))
-        true, size = np.zeros_like(own), np.zeros_like(own)
-        for terms in self._terms(values, self._pieces.number):
-            true, size = true + terms, size + abs(terms)
+        fine = self._terms(values, number)
+        true, size = fine.sum(axis=1), abs(fine).sum(axis=1)
+        off = [self._terms(values, pieces).sum(axis=1) - true for pieces in (1, 2, 3)]
         found = []
         for rows in self._rows.values():
-            first, second, third, sizes = (
-                abs(y[..., rows]).max(axis=2) for y in (own - true, halves - true, thirds - true, size)
-            )
+            first, second, third, sizes = (abs(y[..., rows]).max(axis=2) for y in (*off, size))
             largest = self._largest(sizes)
             least = SEEN * largest + TINY
-            least[:2] += NOISE * self._pieces.number * elements * largest[1] / MOTION[0]
+            least[:2] += NOISE * number * elements * largest[1] / MOTION[0]
             allowed = np.maximum(0.5**self._pieces.points * self._largest(first), least)
             for term, errors in enumerate(np.maximum(second, third) / allowed[:, None]):
                 cell = int(errors.argmax())
                 if errors[cell] > 1:
-                    found.append((errors[cell], self._place(values, term, cell, rows, least[term])))
+                    parts = fine[term, :, cell, rows].T
+                    found.append((errors[cell], self._place(values, term, cell, rows, parts, least[term])))
         if not (every := [each for part in self.system.comm.allgather(found) for each in part]):
             return ""
         _, (a, b, low, high) = max(every)
@@ -182,13 +186,13 @@ class QuadratureCheck:
         """Largest absolute value in each of some arrays, of all ranks."""
         return np.max(self.system.comm.allgather([abs(x).max() for x in values]), axis=0)
 
-    def _terms(self, values: list[np.ndarray], pieces: int) -> Iterator[np.ndarray]:
-        """Yield what is compared, on each piece: the residual, its change by the motion, inertia; (terms, cells, n)."""
+    def _terms(self, values: list[np.ndarray], pieces: int) -> np.ndarray:
+        """What is compared: the residual, its change by the motion, inertia; (terms, pieces, cells, n)."""
         equations = self.system.equations
-        forms = [(equations.residual, x, self._vectors) for x in values]
-        forms += [] if equations.massless else [(equations.kinetic, values[0], self._sums)]
-        for first, moved, *inertia in zip(*(self._pieces(f, x, pieces, p) for f, x, p in forms), strict=True):
-            yield np.array([first, moved - first, *inertia])
+        first, moved = (self._pieces.vectors(equations.residual, x, pieces) for x in values)
+        if equations.even:
+            return np.array([first, moved - first])
+        return np.array([first, moved - first, self._pieces.rigid(equations.kinetic, values[0], pieces)])
 
     def _moved(self, local: np.ndarray) -> np.ndarray:
         """Local values after a small motion, with no curvature at one place of the rod and no strain at another."""
@@ -207,20 +211,19 @@ class QuadratureCheck:
         return out
 
     def _place(
-        self, values: list[np.ndarray], term: int, cell: int, rows: np.ndarray, least: float
+        self, values: list[np.ndarray], term: int, cell: int, rows: np.ndarray, fine: np.ndarray, least: float
     ) -> tuple[float, float, float, float]:
-        """Ends of a cell, and of the smallest part of it that an error above the ``least`` comes from."""
+        """Ends of a cell, and of the smallest part of it that an error above the ``least`` comes from.
 
-        def on(pieces: int) -> np.ndarray:
-            return np.array([terms[term, cell, rows] for terms in self._terms(values, pieces)])
-
-        fine, pieces, place = on(self._pieces.number), 1, 0
-        while pieces < self._pieces.number:
-            parts = fine.reshape(2 * pieces, -1, len(rows)).sum(axis=1)
-            errors = abs(on(2 * pieces) - parts).max(axis=1)[2 * place : 2 * place + 2]
-            if errors.max() <= least:
+        ``fine`` are the rows of a term of that cell, of all its pieces.
+        """
+        pieces, place = 1, 0
+        while pieces < len(fine):
+            halves = self._terms(values, 2 * pieces)[term, :, cell, rows].T
+            errors = abs(halves - fine.reshape(2 * pieces, -1, len(rows)).sum(axis=1)).max(axis=1)
+            if errors[2 * place : 2 * place + 2].max() <= least:
                 break
-            pieces, place = 2 * pieces, 2 * place + int(errors.argmax())
+            pieces, place = 2 * pieces, 2 * place + int(errors[2 * place : 2 * place + 2].argmax())
         a, b = self.system.fields.vertices[cell].tolist()
         low, high = (a + (b - a) * part / pieces for part in (place, place + 1))
         return (*sorted((a, b)), *sorted((low, high)))
