@@ -19,18 +19,23 @@ class Quadrature:
         self._by_mesh: dict[int, QuadratureCheck] = {}
 
     def examine(self, branch: Branch) -> None:
-        """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so."""
-        points = [branch.points[0], *(special.point for special in branch.special)]
-        found = [self._check(point)(point.x) for point in points]
-        for special, words in zip(branch.special, found[1:], strict=True):
-            if words:
-                special.error_estimate = special.ordinate_error = special.point.estimate = float("nan")
-                special.omega2_error = float("nan")
-                special.resolved = None
-                special.note = "; ".join(filter(None, (special.note, "not estimated: see the warnings")))
-        if any(self._check(point).kink(point.x) for point in points):
+        """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so.
+
+        Of a state that the mesh does not resolve its bar says so.
+        """
+        first = branch.points[:1] if branch.parent is None else []
+        found = [(point, self._check(point)(point.x)) for point in first]
+        for special in branch.special:
+            point = special.point
+            if special.resolved is False or not (words := self._check(point)(point.x)):
+                continue
+            found.append((point, words))
+            special.error_estimate = special.ordinate_error = point.estimate = special.omega2_error = float("nan")
+            special.resolved = None
+            special.note = "; ".join(filter(None, (special.note, "not estimated: see the warnings")))
+        if any(self._check(point).kink(point.x) for point in [*first, *(special.point for special in branch.special)]):
             self._kinks(branch)
-        for point, words in zip(points, found, strict=True):
+        for point, words in found:
             if words and not point.kink:
                 self.observer.warn(f"{branch.name}: at {self.load} = {point.load:.6g} {words}")
                 return

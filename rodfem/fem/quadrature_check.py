@@ -2,14 +2,14 @@ r"""Whether the quadrature of the elements integrates the equations in a state.
 
 The residual is assembled once more on equal pieces of each element, on which the state is the same polynomial: the rule
 of the element on each piece is a composite rule of many points.  The rows are those of the element's own test
-functions.  An error bar assumes that the rule is far better on halves of the elements.  With the errors ``e_1`` of the
-elements and ``e_2`` of their halves, the largest ones along the rod, as the composite rule has them, elements of degree
-k integrate the equations where
+functions.  An error bar assumes that the rule is far better on smaller elements.  With the errors ``e`` of the
+elements, and ``e'`` of their halves or their thirds, the largest ones along the rod, as the composite rule has them, a
+rule of n points integrates the equations where
 
-    e_2 <= max(2^-k e_1, 1e-8 of the residual):
+    e' <= max(2^-n e, 1e-8 of the residual):
 
-of a smooth function ``e_2 / e_1`` is ``4^-(k+1)``, of a kink 1/4, of a jump 1/2, of a layer between the points 1.  What
-is narrower than the distance of the points of the composite rule, a four thousandth of the rod, is not seen.
+of a smooth function ``e' / e`` is ``4^-n`` or less, of a kink 1/4, of a jump 1/2, of a layer between the points 1.
+What is narrower than the distance of the points of the composite rule, a four thousandth of the rod, is not seen.
 
 The residual of a straight rod does not have its bending stiffness in it.  The change of the residual in a small smooth
 motion has, and is compared in the same way; so is the inertia in a translation and a rotation.
