@@ -1528,8 +1528,8 @@ FAULTS = {
     ),
     "special-points-keep-their-bars": Fault(
         "rodfem/diagram/quadrature.py",
-        "            if words:\n",
-        "            if False:\n",
+        "special.ordinate_error = point.estimate = special.omega2_error",
+        "special.omega2_error",
         "tests/diagram/test_kinks.py tests/fem/test_quadrature_check.py",
     ),
     "loci-have-bars-at-kinks": Fault(
