@@ -96,11 +96,14 @@ class Assembler:
         The form for other compiled code, and the address of what assembles it.
     """
 
-    def __init__(self, form: Any, cells: Cells) -> None:
-        """Take the kernels of a dolfinx form."""
+    def __init__(self, form: Any, cells: Cells, *, inside: bool = False) -> None:
+        """Take the kernels of a dolfinx form; ``inside`` those of its integrals over cells alone, for all ``cells``."""
         self.form, self._code = form, _code()
         ffi, size = self._code.ffi, cells.dofs.shape[1]
         integrals = compat.integrals(form)
+        if inside:
+            every = np.arange(len(cells.dofs), dtype=np.int32)[:, None]
+            integrals = [x._replace(entities=every) for x in integrals if x.kind == compat.CELL]
         memory = self._memory = Memory(ffi)
         held = memory.keep("integrals", ffi.new("Integral[]", len(integrals)))
         for i, (c, x) in enumerate(zip(held, integrals, strict=True)):

@@ -46,8 +46,8 @@ class Equations:
         ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square rotation).
     kinetic
         Kinetic metric of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``.
-    massless
-        Whether that is without any term.
+    massless, even
+        Whether that is without any term, and without the arclength in it.
     energy
         Stored energy ``int W ds``.
     potential
@@ -141,6 +141,7 @@ class Equations:
             kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
         kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
         self.massless = apply_algebra_lowering(kinetic).empty()
+        self.even = not extract_type(kinetic, ufl.SpatialCoordinate)
         self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
         others = {"energy": W * dx, "metric": metric * dx, "kinetic": kinetic}
         if scene.conservative:

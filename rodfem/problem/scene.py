@@ -27,7 +27,6 @@ from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.plane import check_plane
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.start import check_continuity
-from rodfem.problem.unchanged import numbers_of
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
 from rodfem.problem.values import Symbol
@@ -279,12 +278,6 @@ class Scene(Contribution):
         check_scene(self)
         check_plane(self)
         check_continuity(self)
-        _ = self.numbers  # kept from now on: see :mod:`rodfem.problem.unchanged`
-
-    @cached_property
-    def numbers(self) -> list[tuple[str, list[float]]]:
-        """Values of each function, by its words, when the scene was made."""
-        return numbers_of(self)
 
     @property
     def sides(self) -> tuple[End, End]:
