@@ -125,6 +125,8 @@ def traced(
             recorder.warn(doubt)
         if plan.accuracy is None or not scene.conservative:
             _warn(recorder, sharp_along(scene, found.system))
+        if plan.error_bars:
+            _warn(recorder, found.system.equations.known.rough())
         if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
