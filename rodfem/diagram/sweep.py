@@ -123,7 +123,8 @@ class Sweep:
         if fast.doubt:
             self.observer.warn(fast.doubt)
         between = np.linspace(fast.low, fast.high, FAST, endpoint=False).ravel()
-        own = np.unique([*np.linspace(a, b, LOADS), *between])
+        stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
+        own = np.unique([*np.linspace(a, b, LOADS), *between, *stops])
         own = np.unique([*own, *fast.beside(np.unique([*own, *self._asked]))])
         apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
         loads = np.unique([*apart, *self._asked])
@@ -148,6 +149,8 @@ class Sweep:
                 state = x if steps is None else steps.to(load)
                 if latest is not None and (why := self._lost_convexity(latest.x, state) or self._dependent(state)):
                     return why
+                if steps and load in stops:
+                    steps.known = steps.known[-1:]
                 latest = self._point(state)
                 steps = steps or LoadSteps(self.solver, latest, self.span)
                 for notice in self.solver.notices():
