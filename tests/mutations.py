@@ -147,6 +147,18 @@ FAULTS = {
         "double moved = step[i], value = x[i];",
         "tests/diagram/test_stiff_units.py",
     ),
+    "rows-of-a-table-in-an-element-do-not-count": Fault(
+        "rodfem/fem/known.py",
+        "*table.knots[(table.knots > a) & (table.knots < b)], b])",
+        "b])",
+        "tests/problem/test_tables.py",
+    ),
+    "beyond-a-corner-the-tangent-is-that-before-it": Fault(
+        "rodfem/continuation/follow.py",
+        "_turn(solver, point, beside)",
+        "_turn(solver, point, -beside)",
+        "tests/problem/test_tables.py",
+    ),
     "out-of-the-range": Fault(
         "rodfem/continuation/follow.py",
         "(made.load - last.load) * last.slope > 0:",

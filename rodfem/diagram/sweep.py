@@ -112,7 +112,9 @@ class Sweep:
     def _sweep(self, branch: Branch) -> str:
         """Compute the points of a branch, load by load, and the special points between them; why it ends early."""
         a, b = self.span
-        apart = [load for load in np.linspace(a, b, LOADS) if all(abs(load - at) > self._least for at in self._asked)]
+        stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
+        own = np.unique([*np.linspace(a, b, LOADS), *stops])
+        apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
         loads = np.unique([*apart, *self._asked])
         loads = loads if a < b else loads[::-1]
         x, _ = first_state(self.solver, a)
@@ -133,6 +135,8 @@ class Sweep:
                 state = x if steps is None else steps.to(load)
                 if latest is not None and (why := self._lost_convexity(latest.x, state) or self._dependent(state)):
                     return why
+                if steps and load in stops:
+                    steps.known = steps.known[-1:]
                 latest = self._point(state)
                 steps = steps or LoadSteps(self.solver, latest, self.span)
                 for notice in self.solver.notices():

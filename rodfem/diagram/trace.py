@@ -103,6 +103,8 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         if doubt := round_off_of_strains(scene):
             recorder.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
             plan = replace(plan, error_bars=False)  # two meshes have that round-off alike: no bar would hold it
+        if plan.error_bars and (doubt := found.system.equations.known.rough()):
+            recorder.warn(doubt)
         if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 

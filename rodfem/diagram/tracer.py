@@ -14,7 +14,7 @@ from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.convexity_between import lost_in_step
-from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
+from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow, since_stop
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END, USER
@@ -203,7 +203,13 @@ class Tracer:
                 if item.stretch <= 0:
                     self._end_at_zero_stretch(branch, previous, item)
                     return True
-                reason = self._between(branch, previous, item, self._own(branch, history[-4:]), closed=bool(last))
+                reason = self._between(
+                    branch,
+                    previous,
+                    item,
+                    self._own(branch, since_stop(history, self.scene.stops)[-4:]),
+                    closed=bool(last),
+                )
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
                 history[:] = [p for p in history if p.arclength <= self.specials.settled]

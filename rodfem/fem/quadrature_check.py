@@ -66,6 +66,7 @@ class Pieces:
         d = self.fields.discretization
         self.points = self.equations.quadrature_degree(d.degree) // 2 + 1
         self.number = max(LEAST, 2 ** round(np.log2(POINTS / d.elements / self.points)))
+        self._load = numbers[int(self.fields.copies[0, -1])]
         self._cells, self._bases, self._form = cache(self._cut), cache(self._tabulated), cache(self._assembler)
 
     def vectors(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
@@ -94,7 +95,7 @@ class Pieces:
         return out[0] if places is None else out.reshape(local.shape) @ bases
 
     def _assembler(self, form: Assembler, pieces: int) -> Assembler:
-        return Assembler(form.form, self._cells(pieces), inside=True)
+        return Assembler(form.form, self._cells(pieces), self.equations.known.cut(pieces), self._load, inside=True)
 
     def _cut(self, pieces: int) -> Cells:
         ends = (np.arange(pieces)[:, None] + np.array([0.0, 1.0])) / pieces

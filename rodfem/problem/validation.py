@@ -261,6 +261,7 @@ def check_scene(scene: Scene) -> None:
     if scene.planar not in (None, "e1", "e2"):
         raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
     check_energy(scene)
+    _ = scene.tables
     check_places(scene)
     check_results(scene)
     check_expressions(scene)
