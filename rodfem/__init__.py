@@ -32,6 +32,7 @@ finds and classifies the points where it is lost, follows what branches off, and
   an :class:`Attachment` at any point (:mod:`rodfem.forms.loads` has potentials).  Loads without a potential make
   ``Scene.conservative`` False: then frequencies are computed, and flutter.
 * **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
+* **Tables**: :func:`tabulated` is a function of the arclength through rows of numbers, :func:`path` one of the load.
 * **Ordinate**: the number that a diagram shows, at a point or an integral over the rod (its energy, its twist).
 * **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
   of two of them.
@@ -80,6 +81,8 @@ _HOMES = {
     "Ordinate": "problem.scene",
     "Inertia": "problem.scene",
     "section": "problem",
+    "tabulated": "problem.tabulated",
+    "path": "problem.path",
     "Discretization": "fem.fields",
     "Plan": "diagram.plan",
     "StepControl": "continuation.step_control",

@@ -239,6 +239,11 @@ def integrals(form: Any) -> list[Integral]:
     return found
 
 
+def coefficients(form: Any) -> list[str]:
+    """Names of the functions that the kernels of a compiled form read, in their order."""
+    return [function.name for function in getattr(form, "_cpp_object", form).coefficients]
+
+
 def pack_constants(form: Any) -> np.ndarray:
     """Values of the constants of a compiled form, one after the other."""
     return np.asarray(dolfinx.cpp.fem.pack_constants(getattr(form, "_cpp_object", form)))

@@ -168,7 +168,7 @@ def pieces_of(scene: Scene) -> np.ndarray:
     The centreline is as accurate as a load at vertices only, and far less inside of elements.
     """
     a, b = scene.interval
-    inner = [s for s in (*scene.joints, *scene.ordinate.places) if min(s - a, b - s) > SAME_PLACE * scene.length]
+    inner = [s for s in (*scene.vertices, *scene.ordinate.places) if min(s - a, b - s) > SAME_PLACE * scene.length]
     out = [a]
     for s in sorted(inner):
         if not same_place(s, out[-1], scene.length):

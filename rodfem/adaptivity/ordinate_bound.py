@@ -26,7 +26,8 @@ class OrdinateBound:
         """Tabulate what is needed at the place of the ordinate, or the integrand."""
         self.coarse, self.richer = coarse, richer
         self._inside = Inside(coarse, richer)
-        self._integrals = IntegralOrdinate(coarse), IntegralOrdinate(richer)
+        integral = not coarse.system.scene.ordinate.places
+        self._integrals = [IntegralOrdinate(shape.system) for shape in (coarse, richer)] if integral else []
 
     def __call__(self, x: PETSc.Vec, again: PETSc.Vec, left: float, rho: float) -> float:
         """Return a bound of the error of the ordinate of a state.
@@ -41,8 +42,7 @@ class OrdinateBound:
             Part of the error that is left in it.
         """
         value = self.coarse.ordinate(x)
-        first, second = self._integrals
-        if not first.exists:
+        if not self._integrals:
             return bound(value, self.richer.ordinate(again), left, rho, self._inside.change(x, again))
-        here, there = first(x), second(again)
+        here, there = (of(y) for of, y in zip(self._integrals, (x, again), strict=True))
         return abs(value - here.value) + here.left + there.left + bound(here.value, there.value, left, rho)

@@ -15,8 +15,6 @@ from rodfem.continuation.kinds import CROSSES, GAP
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
-from rodfem.problem.fast_load import FastLoad
-from rodfem.problem.fast_plane import FastPlane
 
 AHEAD = 1e-9
 """Arclength after which a curve that begins on a bound shows whether it leaves the plane."""
@@ -44,25 +42,11 @@ class Half:
 class Tracer:
     """Follows a curve from a node in the direction of its tangent."""
 
-    def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl, p: np.ndarray) -> None:
-        """Follow a ``criterion`` in a ``plane``.
-
-        ``steps`` are relative to its bounds, and no longer than the functions of the scene allow on the two lines
-        through ``p`` (2,).
-        """
+    def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl) -> None:
+        """Follow a ``criterion`` in a ``plane``, with ``steps`` relative to its bounds."""
         self.criterion, self.plane, self.steps = criterion, plane, steps
         self.points = Codim2Points(criterion, plane)
-        scene = plane.system.scene
         self.convexity = Convexity(plane.system, *plane.names)
-        values = dict(zip(plane.names, map(float, p), strict=True))
-        spans = [(float(low), float(high)) for low, high in plane.bounds]
-        self.fast = [FastLoad(scene, span, name, **values) for name, span in zip(plane.names, spans, strict=True)]
-        self.oblique = FastPlane(scene, plane.names)
-
-    @property
-    def doubt(self) -> str:
-        """Sentences on functions that change too fast with a parameter to be followed; empty for none."""
-        return " ".join(filter(None, [fast.doubt for fast in self.fast]))
 
     def run(self, start: LocusPoint) -> Half:
         """Follow to an end."""
@@ -76,7 +60,6 @@ class Tracer:
             return half
         while len(history) < self.steps.most:
             last = history[-1]
-            step = min(step, *(fast.room(*at) for fast, *at in zip(self.fast, last.p, last.dp, strict=True)))
             try:
                 # beyond a sharp bend the polynomial through the last nodes has another tangent than the curve
                 node, moved, bound = self._next(history if failures < FAILURES else history[-1:], step)
@@ -153,8 +136,6 @@ class Tracer:
         """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""
         last = history[-1]
         p, x, dp, dx = predict(history, last.s + step)
-        if what := self.oblique.unfollowed(last.p, p):
-            raise ConvergenceError(f"the {what} changes too fast with both parameters, or jumps")
         over = self.plane.outside(p)
         if over is None:
             node = self._after(last, self.criterion.correct(p, x, (dp, dx), last, 0.5 * step))
@@ -219,35 +200,16 @@ class Tracer:
     def _between(self, half: Half, history: list[LocusPoint], node: LocusPoint) -> str:
         """Insert what lies between the last node of a history and the next one; a reason if the curve ends there."""
         last, before = history[-1], history[-2] if len(history) > 1 else None
-        nodes, marks, count = list[LocusPoint](), dict[int, str](), len(half.nodes)
-        ended = ""
-        for stop in (*self._turns(last, node), node):
-            rows, ended = self.points.between(last, stop, before)
-            for row, kind in rows:
-                if kind:
-                    marks[count + len(nodes)] = kind
-                nodes.append(row)
-            if ended:
-                break
-            if last.rest != stop.rest:
-                marks[count + len(nodes)] = self.criterion.others
-            elif last.orientation != stop.orientation:
-                marks[count + len(nodes)] = CROSSES
-            if stop is not node:
-                nodes.append(stop)
-            last, before = stop, last
-        half.nodes += nodes  # all at once: a step that fails half-way is tried again
-        half.marks |= marks
+        rows, ended = self.points.between(last, node, before)  # a step that fails there is tried again
+        for row, kind in rows:
+            if kind:
+                half.marks[len(half.nodes)] = kind
+            half.nodes.append(row)
+        if not ended and last.rest != node.rest:
+            half.marks[len(half.nodes)] = self.criterion.others
+        elif not ended and last.orientation != node.orientation:
+            half.marks[len(half.nodes)] = CROSSES
         return ended
-
-    def _turns(self, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
-        """Points between two nodes where a function of a parameter has an extremum: other eigenvalues may, too."""
-        found = list[LocusPoint]()
-        for which, fast in enumerate(self.fast):
-            for value in fast.beside(np.array([a.p[which], b.p[which]])):
-                if (a.p[which] - value) * (b.p[which] - value) < 0:
-                    found += self.points.at_value(a, b, which, value)
-        return sorted(found, key=lambda n: n.s)
 
     def _closes(self, start: LocusPoint, a: LocusPoint, b: LocusPoint) -> bool:
         """Whether the curve passes its beginning again between two nodes."""

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from rodfem.codim2.criterion import Criterion
 from rodfem.codim2.curve import Half, Tracer
 from rodfem.codim2.locus import Locus, Mark
-from rodfem.codim2.locus_errors import Errors, criterion_of, errors_of, hidden_changes, sharp_rows, without_smoothness
+from rodfem.codim2.locus_errors import Errors, criterion_of, errors_of, not_integrated
 from rodfem.codim2.others import NEAREST, UNSTABLE, all_looked_at, unstable
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import null_vectors
@@ -38,8 +38,6 @@ from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
-SHARP = 9
-"""Number of points at which it is asked whether the elements resolve what changes along the rod."""
 BESIDE = 1e-3
 """Distance of a load beside a divergence load at which the unstable eigenvalues are counted, over the bounds."""
 
@@ -108,22 +106,17 @@ def locus(
                 f"The {special.kind} at {scene.load} = {p[0]:.8g} has no locus in {scene.load} and {parameter}: it is "
                 f"not found again there ({trouble}); use more elements."
             ) from trouble
-        tracer = Tracer(criterion, plane, steps, p)
+        tracer = Tracer(criterion, plane, steps)
         found = _both_sides(tracer, first)
         crossings = _crossings(tracer, found, first, float(p[1]))
         errors = errors_of(solver, special.kind, plane, found.nodes, found.marks, error_bars)
         lower = _lower_side(solver, plane, special, first)
         if doubtful or special.resolved is False:
             errors = errors._replace(unresolved=list(range(len(found.nodes))))
-        reasons = without_smoothness(solver, plane, found.nodes, errors.error)
-        hidden = hidden_changes(solver, plane, found.nodes)
+        doubt = not_integrated(solver, plane, found.nodes, errors.error)
         nearest = _nearest(solver, criterion, plane, first)
-        rows, sharp = sharp_rows(solver, plane, found.nodes, SHARP)
-        errors.error[rows] = np.nan
-        errors = errors._replace(unresolved=sorted({*errors.unresolved, *rows}))
     located = _locus(solver, special, (plane.names, bounds), found, crossings, errors, lower)
-    said = [tracer.doubt, sharp, hidden, nearest, reasons.sentence if reasons else ""]
-    located.note = " ".join(f"Locus of the {special.kind}: {words}" for words in said if words)
+    located.note = " ".join(f"Locus of the {special.kind}: {words}" for words in (doubt, nearest) if words)
     return located
 
 

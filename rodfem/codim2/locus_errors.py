@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,12 +18,9 @@ from rodfem.codim2.parameter_plane import LocusPoint, Plane
 from rodfem.codim2.singular import Singular
 from rodfem.continuation.kinds import FLUTTER, FOLD
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fem.nonsmooth import Nonsmooth, Reasons
-from rodfem.fem.sharpness import inside_element, sharp_along
-from rodfem.fem.stiffnesses_at import StiffnessesAt
+from rodfem.errors import ConvergenceError
+from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.transfer import Transfer, halved, richer_system
-from rodfem.problem.jumps import unbroken
 
 CUSP = 1e-3
 """Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
@@ -118,8 +113,8 @@ def _changed(indicator: SmoothnessIndicator, x: PETSc.Vec, found: LocusPoint, mo
     return max(changes)
 
 
-def without_smoothness(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> Reasons:
-    """Take the errors of points in whose states an energy is not smooth within elements away, and say why.
+def not_integrated(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> str:
+    """Take the errors away of points at which the mesh does not integrate the equations; a clause on the first.
 
     Parameters
     ----------
@@ -128,62 +123,12 @@ def without_smoothness(solver: StaticSolver, plane: Plane, nodes: Sequence[Locus
     nodes, error
         Its rows and their errors (n, 2), which are changed.
     """
-    nonsmooth, reasons = Nonsmooth(solver.shape), Reasons([], [])
+    check, said = QuadratureCheck(solver.system), ""
     for row in np.flatnonzero(np.isfinite(error[:, 0])):
-        solver.system.line = plane.along(nodes[row].p, 0)
-        if here := nonsmooth(nodes[row].x):
+        node = nodes[row]
+        solver.system.line = plane.along(node.p, 0)
+        if words := check(node.x):
             error[row] = np.nan
-            reasons += here
-    return reasons
-
-
-def sharp_rows(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], rows: int) -> tuple[list[int], str]:
-    """Numbers of the nodes at whose parameters something changes too steeply along the rod, and a sentence on it.
-
-    It is looked at for so many ``rows``, at about equal distances, each for those that it is nearest to; of the scene's
-    own values the diagram has told.
-
-    Parameters
-    ----------
-    solver, plane, nodes
-        What found the locus in a plane, and its points.
-    rows
-        Number of points at which it is looked at.
-    """
-    scene, found, said = solver.system.scene, list[int](), ""
-    seen = np.unique(np.linspace(0, len(nodes) - 1, rows).round().astype(int))
-    nearest = seen[np.argmin(abs(np.arange(len(nodes))[:, None] - seen), axis=1)]
-    for row in seen:
-        values = dict(zip(plane.names, map(float, nodes[row].p), strict=True))
-        parameters = {name: replace(p, value=values.get(name, p.value)) for name, p in scene.parameters.items()}
-        try:
-            there = replace(scene, parameters=parameters)
-        except SceneError:  # of the scene's own load, which is another one here
-            continue
-        inside = partial(inside_element, there, solver.system)
-        if words := unbroken(there, inside) or sharp_along(there, solver.system):
-            found += np.flatnonzero(nearest == row).tolist()
-            said = said or f"At {plane.names[1]} = {values[plane.names[1]]:.6g}: {words}"
-    return found, said
-
-
-def hidden_changes(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint]) -> str:
-    """Sentence on an energy that softens and stiffens again between two nodes, in state and parameters; or empty.
-
-    Other eigenvalues may vanish there that none of the nodes shows.
-
-    Parameters
-    ----------
-    solver, plane, nodes
-        What found the locus in a plane, and its points.
-    """
-    found = StiffnessesAt(solver.shape)([n.x for n in nodes], [plane.along(n.p, 0) for n in nodes])
-    for row, what in found.items():
-        a, b = (
-            ", ".join(f"{name} = {v:.6g}" for name, v in zip(plane.names, n.p, strict=True))
-            for n in nodes[row : row + 2]
-        )
-        return (
-            f"Between {a} and {b} the {what} stiffens or softens and changes back: the curve may be another one there."
-        )
-    return ""
+            where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(plane.names, node.p, strict=True))
+            said = said or f"at {where} {words}"
+    return said

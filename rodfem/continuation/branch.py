@@ -48,8 +48,8 @@ class Point:
         Number of eigenvalues whose sign is not decided: they are not among the negative ones, and the index is between
         ``negative`` and ``negative + undecided``.  Symmetries, and what vanishes at a special point, are decided.
     kink
-        Names of the functions on a kink of which the state is: there ``negative`` is the index on one side only, and
-        stability is undecided.  Empty where it is on none.
+        What has a kink at the very state, the equations: there ``negative`` is the index on one side only, and
+        stability is undecided.  Empty where nothing has.
     slope
         The load's component of the tangent.
     drift, error

@@ -8,8 +8,11 @@ where it does not.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from math import copysign
+
+from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch import Point
@@ -39,23 +42,27 @@ def follow(
 ) -> Iterator[Point | str]:
     """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
 
-    ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
+    ``bounds`` are the least and the greatest load; the branch ends exactly on them, and has a point exactly at each
+    stop of the scene, where the tangent of the point becomes that of the other side.  The caller appends (and may
     insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
     point.  ``solver`` has the mesh, ``steps`` chooses the lengths of steps.
     """
     system, step = solver.system, steps.begin()
     span = abs(system.scene.span[1] - system.scene.span[0])
-    low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
+    ends, stops = bounds, system.scene.stops
     solver.corrector.restart()
     missed, failures = "", 0
     while len(points) < steps.most:
         last = points[-1]
         if len(points) % PILE == 0:
             compat.destroy_garbage(system.comm)
+        below, above = ([s for s in stops if sign * (s - last.load) > SAME_LOAD * span] for sign in (-1, 1))
+        bounds = max([ends[0], *below]), min([ends[1], *above])
+        low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
         most = min(reach(last), steps.largest)
         step = min(step, most)
         # beyond a sharp bend the polynomial through the last points has another tangent than the branch
-        known = points if failures < FAILURES or last.tangent is None else [last]
+        known = since_stop(points, stops) if failures < FAILURES or last.tangent is None else [last]
         if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
             known = [replace(last, tangent=solver.tangent(solver.row(last.tangent), at=last.x))]
         made = solver.step(known, last.arclength + step, (low, high), 0.5 * step)
@@ -64,9 +71,14 @@ def follow(
             if abs(last.load - bound) < SAME_LOAD * span and (made.load - last.load) * last.slope > 0:
                 yield END_OF_RANGE  # the row is there, and the branch goes on out of the range
                 return
-            point = _to_load(solver, points, made.load, bound, step, steps.smallest)
+            beside = 0.0 if bound in ends else copysign(ON_BOUND * span, made.load - last.load)
+            point = _to_load(solver, known, made.load, bound, step, steps.smallest, beside)
             if point is not None:
                 yield point
+                if beside:
+                    _turn(solver, point, beside)
+                    step, missed, failures = steps.begin(), "", 0
+                    continue
                 yield END_OF_RANGE
                 return
             missed = f"; no state is found at {bound:.6g}: let the range end elsewhere if that is a bifurcation"
@@ -75,7 +87,7 @@ def follow(
             point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energies)
             if steps.accepts(last, point):
                 yield point
-                order = 2 if len(known) == 1 else min(len(points) - 1, 3) + 1
+                order = 2 if len(known) == 1 else min(len(known), 3) + 1
                 step, missed, failures = steps.after(step, made.outcome.moved, order), "", 0
                 continue
         step, failures = step / 2, failures + 1
@@ -88,6 +100,27 @@ def follow(
     yield f"{steps.most} points reached"
 
 
+def since_stop(points: list[Point], stops: Sequence[float]) -> list[Point]:
+    """The points of a branch since it was at one of the loads ``stops``, that one included."""
+    if not stops:
+        return points
+    return points[max((i for i, point in enumerate(points) if point.load in stops), default=0) :]
+
+
+def _moved(solver: BranchSolver, x: PETSc.Vec, by: float) -> PETSc.Vec:
+    """The state ``x`` at a load that differs ``by`` so much."""
+    out = x.copy()
+    solver.system.set_load(out, solver.system.scalar(x) + by)
+    return out
+
+
+def _turn(solver: BranchSolver, point: Point, ahead: float) -> None:
+    """Give a point at a stop the tangent, and the work of the load, of the side ``ahead``."""
+    x = _moved(solver, point.x, ahead)
+    point.tangent = solver.load_tangent(x, ahead > 0)
+    point.slope, point.conjugate = solver.system.scalar(point.tangent), solver.energies(x).conjugate
+
+
 def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float) -> bool:
     """Whether a step from ``last`` that changes the load ends on a bound of the range, but for round-off."""
     near = min(abs(bound - load) for bound in bounds)
@@ -95,12 +128,19 @@ def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float
 
 
 def _to_load(
-    solver: BranchSolver, points: list[Point], beyond: float, load: float, step: float, least: float
+    solver: BranchSolver,
+    points: list[Point],
+    beyond: float,
+    load: float,
+    step: float,
+    least: float,
+    beside: float = 0.0,
 ) -> Point | None:
     """Last point of a branch, exactly at ``load``; None where it is not accepted as any other point of the branch is.
 
     ``beyond`` is the load that a whole step leads to.  The step to ``load`` is a part of it, of length ``least`` or
-    more, and Newton's method may go half as far from the prediction.
+    more, and Newton's method may go half as far from the prediction.  Tangent and work of the load are those at a load
+    ``beside`` it, on the side from which the branch comes.
     """
     last, system = points[-1], solver.system
     fraction = (load - last.load) / (beyond - last.load)
@@ -110,7 +150,9 @@ def _to_load(
     x, outcome = solver.at_load(x, load, reach=0.5 * length)
     if not outcome.converged:
         return None
-    tangent = solver.load_tangent(x, beyond > last.load)
+    before = _moved(solver, x, -beside) if beside else x
+    tangent = solver.load_tangent(before, beyond > last.load)
+    energies = solver.energies(x)._replace(conjugate=solver.energies(before).conjugate)
     if not row.dot(tangent) > ALIGNED:
         return None
-    return solver.point(x, last.arclength + system.distance(last.x, x), tangent, outcome)
+    return solver.point(x, last.arclength + system.distance(last.x, x), tangent, outcome, energies=energies)

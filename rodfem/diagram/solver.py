@@ -24,7 +24,7 @@ from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization, check_number
-from rodfem.fem.kinks_at import KinksAt
+from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.system import System
 from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
@@ -150,8 +150,8 @@ class Solver:
         return SoftStates(solver, lambda: Enriched(solver))
 
     @cached_property
-    def _kinks(self) -> KinksAt:
-        return KinksAt(self.equilibria.shape)
+    def _quadrature(self) -> QuadratureCheck:
+        return QuadratureCheck(self.equilibria.system)
 
     @cached_property
     def _sweep(self) -> Sweep:
@@ -168,7 +168,7 @@ class Solver:
     def point(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
         if not isinstance(self.equilibria, BranchSolver):
-            return replace(self._sweep.at(x), kink=self._kinks(x).kink)
+            return replace(self._sweep.at(x), kink=self._quadrature.kink(x))
         return self.examined(self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True)))
 
     def examined(self, point: Point, *, compare: bool = False, special: SpecialPoint | None = None) -> Point:
@@ -176,7 +176,7 @@ class Solver:
 
         ``special`` is the fold or branch point that is there, if any.
         """
-        point.kink = self._kinks(point.x).kink
+        point.kink = self._quadrature.kink(point.x)
         if isinstance(self.equilibria, BranchSolver):
             # by itself a state is on no branch: a tangent at a singular one is any null vector
             tangent, point.tangent = point.tangent, None if special is None else special.point.tangent
@@ -243,7 +243,7 @@ class Solver:
         self._check_number(number)
         verdict = assess(self.equilibria, x, method, number)
         if not isinstance(self.equilibria, BranchSolver):
-            return replace(verdict, kink=self._kinks(x).kink)
+            return replace(verdict, kink=self._quadrature.kink(x))
         special = point if isinstance(point, SpecialPoint) and point.kind.singular else None
         found = self.examined(self.equilibria.point(x, 0.0, None), compare=True, special=special)
         return replace(verdict.at(found), uncompared=self._soft.uncompared)

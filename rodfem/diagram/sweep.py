@@ -27,17 +27,15 @@ from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load
-from rodfem.diagram.hidden_changes import HiddenChanges
-from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.load_steps import LoadSteps
 from rodfem.diagram.missed_loads import missed_loads
 from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
+from rodfem.diagram.quadrature import Quadrature
 from rodfem.diagram.sweep_errors import SweepErrors
-from rodfem.diagram.unfollowed import OFTEN, Unfollowed
+from rodfem.diagram.unfollowed import Unfollowed
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
-from rodfem.problem.fast_load import FastLoad
 from rodfem.stability.census import census
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
@@ -49,8 +47,6 @@ LOADS = 101
 """Number of loads at which a range is sampled."""
 ONE_LOAD = 1e-12
 """Distance of two loads, over the greatest, up to which they are one: a step between them would be round-off."""
-FAST = 4
-"""Number of loads in each range in which a cubic tells what the load does, where that changes fast."""
 
 
 class Sweep:
@@ -65,7 +61,7 @@ class Sweep:
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span, self.units = plan.over(solver.system.scene), solver.system.scene.units
         self._least = ONE_LOAD * max(map(abs, self.span))
-        self._asked, self._extrema, self._fast = list[float](), set[float](), list[tuple[float, float]]()
+        self._asked = list[float]()
         for load in plan.at:
             known = (other for other in (*self.span, *self._asked) if abs(load - other) <= self._least)
             self._asked.append(next(known, load))
@@ -101,17 +97,14 @@ class Sweep:
         last = branch.points[-1]
         branch.special.append(self.solver.given(END, last))
         branch.renumber()
-        warn, kinks = self.observer.warn, Kinks([self.solver], self.observer, self._load)
-        kinks.index(branch)
-        HiddenChanges([self.solver], self.observer, self._load).examine(branch)
         if self.plan.error_bars:
             self._error_bars(branch)
-            kinks.error_bars(branch)
+        Quadrature([self.solver], self.observer, self._load).examine(branch)
         self._within_bars(branch)
         self.observer.finished(branch)
-        with without("Whether frequencies stay zero was not examined", comm, warn):
+        with without("Whether frequencies stay zero was not examined", comm, self.observer.warn):
             self._family(last)
-        with without("The asymmetry of the tangent matrix was not measured", comm, warn):
+        with without("The asymmetry of the tangent matrix was not measured", comm, self.observer.warn):
             self._asymmetry(last)
         self.finished()
         return self.branches
@@ -119,16 +112,10 @@ class Sweep:
     def _sweep(self, branch: Branch) -> str:
         """Compute the points of a branch, load by load, and the special points between them; why it ends early."""
         a, b = self.span
-        fast = FastLoad(self.solver.system.scene, self.span)
-        if fast.doubt:
-            self.observer.warn(fast.doubt)
-        between = np.linspace(fast.low, fast.high, FAST, endpoint=False).ravel()
-        own = np.unique([*np.linspace(a, b, LOADS), *between])
-        own = np.unique([*own, *fast.beside(np.unique([*own, *self._asked]))])
+        stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
+        own = np.unique([*np.linspace(a, b, LOADS), *stops])
         apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
         loads = np.unique([*apart, *self._asked])
-        self._extrema = {float(loads[abs(loads - turn).argmin()]) for turn in (*fast.turns, *fast.smooth)}
-        self._fast = fast.ranges_below(OFTEN * abs(b - a) / (LOADS - 1))
         loads = loads if a < b else loads[::-1]
         x, _ = first_state(self.solver, a)
         branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])
@@ -148,6 +135,8 @@ class Sweep:
                 state = x if steps is None else steps.to(load)
                 if latest is not None and (why := self._lost_convexity(latest.x, state) or self._dependent(state)):
                     return why
+                if steps and load in stops:
+                    steps.known = steps.known[-1:]
                 latest = self._point(state)
                 steps = steps or LoadSteps(self.solver, latest, self.span)
                 for notice in self.solver.notices():
@@ -192,9 +181,7 @@ class Sweep:
         for row in rows:
             point, before, self.last = row.point, self.last, row
             self._record(point, row.found, on_the_way=True)
-            last, turn = point.load == self.span[1], point.load in self._extrema
-            fast = any(low <= point.load <= high for low, high in self._fast)
-            self.unfollowed.look(point, last=last, turn=turn, fast=fast)
+            self.unfollowed.look(point, last=point.load == self.span[1])
             if before is not None:
                 self._between(branch, before, row)
             branch.points.append(point)

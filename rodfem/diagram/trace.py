@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 from mpi4py import MPI
 
@@ -19,13 +18,10 @@ from rodfem.diagram.frequency_rows import FREQUENCIES
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import Sweep
-from rodfem.diagram.waves import check_waves
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
-from rodfem.fem.sharpness import inside_element, sharp_along
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
-from rodfem.problem.jumps import unbroken
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains
 from rodfem.ranks import end_together
@@ -100,8 +96,6 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         with clock("setup"):
             mesh = _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
-            if plan.accuracy is None:
-                check_waves(found, plan.over(scene), recorder.warn)
         asked = as_asked(found.system, plan)
         recorder.system(found.system, plan.accuracy)
         if unused := _not_used(discretization, plan):
@@ -109,10 +103,8 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         if doubt := round_off_of_strains(scene):
             recorder.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
             plan = replace(plan, error_bars=False)  # two meshes have that round-off alike: no bar would hold it
-        if doubt := unbroken(scene, partial(inside_element, scene, found.system, adaptive=plan.accuracy is not None)):
+        if plan.error_bars and (doubt := found.system.equations.known.rough()):
             recorder.warn(doubt)
-        if plan.accuracy is None or not scene.conservative:
-            _warn(recorder, sharp_along(scene, found.system))
         if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
@@ -129,9 +121,6 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         diagram.warnings, diagram.notes, diagram.asked = recorder.warnings, recorder.notes, asked
         try:
             tracer.run()
-            if plan.accuracy is not None and scene.conservative:
-                for number in sorted({point.mesh for branch in diagram for point in branch.points}):
-                    _warn(recorder, sharp_along(scene, tracer.solvers[number].system))
         except BaseException as trouble:  # an interrupt, too: nothing that has been computed is lost
             if diagram.branches:
                 trouble.diagram = diagram  # type: ignore[attr-defined]
@@ -169,8 +158,3 @@ def _not_used(given: Discretization, plan: Plan) -> str:
         f"  The accuracy chooses the meshes, not elements={given.elements} and degree={given.degree}: "
         "give vertices, too, for a mesh to begin with."
     )
-
-
-def _warn(observer: Observer, doubt: str) -> None:
-    if doubt:
-        observer.warn(doubt)

@@ -13,7 +13,7 @@ from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.convexity_between import lost_in_step
-from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
+from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow, since_stop
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END, USER
@@ -29,17 +29,15 @@ from rodfem.diagram.branch_ends import (
 )
 from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.finders import FINDERS
-from rodfem.diagram.hidden_changes import HiddenChanges
 from rodfem.diagram.images import image_of
-from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
+from rodfem.diagram.quadrature import Quadrature
 from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
 from rodfem.diagram.step import Step
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
-from rodfem.problem.fast_load import FastLoad
 from rodfem.tolerances import DRIFT
 
 NO_CONVERGENCE = "no convergence"
@@ -70,14 +68,10 @@ class Tracer:
         self.gaps = Gaps(self.meshes)
         self.zeros = PersistentZeros(observer, self.high - self.low)
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
-        self.fast = FastLoad(self.scene, self.span)
-        if self.fast.doubt:
-            observer.warn(self.fast.doubt)
         self.finders = [finder(plan) for finder in FINDERS]
         self.invariants: dict[int, Invariants] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
-        self.kinks = Kinks(self.meshes.solvers, observer, self.scene.load)
-        self.hidden = HiddenChanges(self.meshes.solvers, observer, self.scene.load)
+        self.quadrature = Quadrature(self.meshes.solvers, observer, self.scene.load)
 
     @property
     def solvers(self) -> Sequence[BranchSolver]:
@@ -188,7 +182,7 @@ class Tracer:
         Otherwise both are as before a step that was too long, and are to be gone on with.
         """
         self.specials.resume(history)
-        for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self._reach):
+        for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
                 branch.ended = self._rest(branch) or item
                 if branch.ended.startswith(NO_CONVERGENCE):
@@ -208,7 +202,13 @@ class Tracer:
                 if item.stretch <= 0:
                     self._end_at_zero_stretch(branch, previous, item)
                     return True
-                reason = self._between(branch, previous, item, self._own(branch, history[-4:]), closed=bool(last))
+                reason = self._between(
+                    branch,
+                    previous,
+                    item,
+                    self._own(branch, since_stop(history, self.scene.stops)[-4:]),
+                    closed=bool(last),
+                )
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
                 history[:] = [p for p in history if p.arclength <= self.specials.settled]
@@ -223,10 +223,6 @@ class Tracer:
                 branch.ended = self._rest(branch) or "closed loop"
                 return True
         return True
-
-    def _reach(self, point: Point) -> float:
-        """Largest step from a point: by what is known of the branch, and by how fast the load acts."""
-        return min(self.specials.reach(point), self.fast.reach(point))
 
     @staticmethod
     def _own(branch: Branch, rows: Sequence[Point]) -> list[Point]:
@@ -400,8 +396,7 @@ class Tracer:
             self._error_bars(branch)
             merge_doubles(branch)
         self._soft_modes(branch)
-        self.kinks.index(branch)
-        self.hidden.examine(branch)
+        self.quadrature.examine(branch)
         branch.image = image_of(branch, self.solver)
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
@@ -423,4 +418,3 @@ class Tracer:
                     with self.without(f"No error was estimated at {self.scene.load} = {special.point.load:.8g}"):
                         self.meshes.richer(special.point.mesh).estimate(special)
                 self.control.label(special)
-            self.kinks.error_bars(branch)

@@ -37,20 +37,17 @@ class Unfollowed:
         self._rows, self._said = 0, False
         self._stable: Point | None = None
 
-    def look(self, point: Point, *, last: bool, turn: bool, fast: bool) -> None:
-        """Look at the ``point`` of the next row, if it is the ``last`` or one's turn, or at the last that was stable.
-
-        At a ``turn``, an extremum of what the load does, or where that changes ``fast``, something may come and go.
-        """
+    def look(self, point: Point, *, last: bool) -> None:
+        """Look at the ``point`` of the next row, if it is the ``last`` or it is time, or at the last stable one."""
         self._rows += 1
         if self._said:
             return
         if point.negative and self._stable is not None:
             self._examine(self._stable, MANY)
             self._stable = None
-        rarely, often = (last or turn or self._rows % every == 1 for every in (RARELY, OFTEN))
+        rarely, often = (last or self._rows % every == 1 for every in (RARELY, OFTEN))
         largest = MANY if rarely else LARGEST
-        looked = (often or fast) and not self._said and self._examine(point, largest, said=last)
+        looked = often and not self._said and self._examine(point, largest, said=last)
         self._stable = None if looked or point.negative else point
 
     def _examine(self, point: Point, largest: int, *, said: bool = True) -> bool:

@@ -25,12 +25,24 @@ typedef struct {
 } Integral;
 
 typedef struct {
+    int dof;             /* where the load is among the values of the unknown */
+    int pieces, size;    /* of its table; numbers of a row of that */
+    const double *line;  /* what it is called with, at load zero, and the slope in the load */
+    const double *rows;  /* pieces x size: where a piece begins, then the coefficients of its cubics */
+} Path;
+
+typedef struct {
     int rank, size;      /* of its tensor; degrees of freedom of a cell */
+    int own;             /* values of the unknown that its kernels read: size, or 0 */
     int integrals;
     const Integral *integral;
     const double *x;     /* coordinates, cells x 2 x 3 */
     const int *dofs;     /* cells x size */
-    double *tensor, *w;  /* room: (2 size)^rank, 2 size */
+    int tables, paths, pieces;  /* further values of a cell, of tables; number of paths; values of their pieces */
+    const double *table; /* cells x tables */
+    const Path *path;
+    double *piece;       /* room: pieces */
+    double *tensor, *w;  /* room: (2 size)^rank, 2 (size + tables + pieces) */
 } Form;
 
 typedef struct {
@@ -43,14 +55,32 @@ typedef struct {
 static long assembled; /* forms since the module was loaded */
 PUBLIC long assemblies(void) { return assembled; }
 
+/* Lay the pieces of the paths of the load where the values u have it.  */
+static void lay(const Form *form, const double *u)
+{
+    double *to = form->piece;
+    for (int i = 0; i < form->paths; i++) {
+        const Path *path = &form->path[i];
+        double t = path->line[0] + path->line[1] * u[path->dof];
+        int low = 0, high = path->pieces;
+        while (high - low > 1) {
+            int middle = low + (high - low) / 2;
+            if (path->rows[(size_t)middle * path->size] > t) high = middle; else low = middle;
+        }
+        memcpy(to, path->rows + (size_t)low * path->size, path->size * sizeof(double));
+        to += path->size;
+    }
+}
+
 /* Add the form for the values u to out.  Returns 1 where an interior facet couples more than the cell of its first side,
    which no place is for.  */
 PUBLIC int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out)
 {
     const uint8_t permutations[2] = {0, 0};
     assembled++;
-    int n = form->size;
+    int n = form->size, known = form->tables + form->pieces;
     double coordinates[12];
+    lay(form, u);
     for (int k = 0; k < form->integrals; k++) {
         const Integral *integral = &form->integral[k];
         int sides = integral->kind == 4 ? 2 : 1, m = sides * n;
@@ -61,7 +91,10 @@ PUBLIC int assemble(const Form *form, const Places *places, const double *u, con
             for (int side = 0; side < sides; side++) {
                 int cell = entity[2 * side];
                 const int *dofs = form->dofs + (size_t)cell * n;
-                for (int i = 0; i < n; i++) form->w[side * n + i] = u[dofs[i]];
+                double *to = form->w + sides * form->own + side * known;
+                for (int i = 0; i < form->own; i++) form->w[side * n + i] = u[dofs[i]];
+                memcpy(to, form->table + (size_t)cell * form->tables, form->tables * sizeof(double));
+                memcpy(to + form->tables, form->piece, form->pieces * sizeof(double));
                 memcpy(coordinates + 6 * side, form->x + (size_t)cell * 6, 6 * sizeof(double));
             }
             double *a = form->tensor;

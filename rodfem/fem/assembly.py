@@ -18,6 +18,7 @@ from rodfem.linalg.compiled import Memory, buffer, module
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
+    from rodfem.fem.known import Known
 
 KERNEL_ARGUMENTS = 6
 """Number of arguments of a kernel of FFCx; since release 0.10 it takes custom data as well."""
@@ -86,7 +87,9 @@ class Cells:
 
 
 class Assembler:
-    """A compiled ``form`` whose coefficient, where it has one, is the unknown; on the cells of this rank.
+    """A compiled ``form`` whose coefficients, where it has some, are the unknown and what is ``known`` besides.
+
+    It is assembled on the cells of this rank.
 
     Attributes
     ----------
@@ -96,25 +99,41 @@ class Assembler:
         The form for other compiled code, and the address of what assembles it.
     """
 
-    def __init__(self, form: Any, cells: Cells) -> None:
-        """Take the kernels of a dolfinx form."""
+    def __init__(self, form: Any, cells: Cells, known: Known, load: int, *, inside: bool = False) -> None:
+        """Take the kernels of a dolfinx form; ``inside`` those of its integrals over cells alone, for all ``cells``.
+
+        Otherwise ``cells`` are those of this rank.  ``known`` is what the form reads beside the unknown, and ``load``
+        the local degree of freedom of the load.
+        """
         self.form, self._code = form, _code()
         ffi, size = self._code.ffi, cells.dofs.shape[1]
         integrals = compat.integrals(form)
+        if inside:
+            every = np.arange(len(cells.dofs), dtype=np.int32)[:, None]
+            integrals = [x._replace(entities=every) for x in integrals if x.kind == compat.CELL]
         memory = self._memory = Memory(ffi)
         held = memory.keep("integrals", ffi.new("Integral[]", len(integrals)))
         for i, (c, x) in enumerate(zip(held, integrals, strict=True)):
             c.kernel, c.custom = int(ffi.cast("uintptr_t", x.kernel)), len(ffi.typeof(x.kernel).args) > KERNEL_ARGUMENTS
             c.kind, c.count, c.entities = x.kind, len(x.entities), memory.array(i, x.entities)
         sides = 1 + any(x.kind == compat.INTERIOR for x in integrals)
+        pieces = sum(rows.shape[1] for rows in known.rows)
+        tables, names = known.along.shape[1], compat.coefficients(form)
         arrays = {
             "x": cells.x,
             "dofs": cells.dofs,
             "tensor": np.zeros((sides * size) ** form.rank),
-            "w": np.zeros(sides * size),
+            "w": np.zeros(sides * (size + tables + pieces)),
+            "table": known.along,
+            "piece": np.zeros(pieces),
         }
         pointers = {name: memory.array(name, array) for name, array in arrays.items()}
-        numbers = {"rank": form.rank, "size": size, "integrals": len(integrals), "integral": held}
+        paths = memory.keep("paths", ffi.new("Path[]", len(known.rows)))
+        for c, rows, line in zip(paths, known.rows, known.lines, strict=True):
+            c.dof, (c.pieces, c.size) = load, rows.shape
+            memory.point(c, line=line, rows=rows)
+        numbers = {"rank": form.rank, "size": size, "own": size * (names != [known.name]), "integrals": len(integrals)}
+        numbers |= {"integral": held, "tables": tables, "paths": len(known.rows), "pieces": pieces, "path": paths}
         self.pointer = ffi.new("Form *", numbers | pointers)
         self.function = int(ffi.cast("uintptr_t", ffi.addressof(self._code.lib, "assemble")))
         self.constants = np.zeros(0)

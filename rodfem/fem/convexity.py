@@ -17,7 +17,6 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from rodfem.fem import form_compiler
-from rodfem.fem.literals import with_constants
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature, strain
 
@@ -68,7 +67,7 @@ class Convexity:
         if self.varies:
             points = np.append(points, np.linspace(0.0, 1.0, GRID))
         self.places = len(points)
-        vector = with_constants(ufl.as_vector(entries), f.mesh)
+        vector = e.compilable(ufl.as_vector(entries))
         self.evaluate = form_compiler.expression(vector, points.reshape(-1, 1), f.mesh, f.owned_cells)
 
     def holds(self, x: PETSc.Vec) -> bool:

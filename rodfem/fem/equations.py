@@ -17,6 +17,7 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, Places, matrix_places, vector_places
 from rodfem.fem.fields import Fields
+from rodfem.fem.known import Known
 from rodfem.fem.literals import with_constants
 from rodfem.fem.parameters import Line, load_line
 from rodfem.forms import inertia, lagrangian
@@ -46,8 +47,8 @@ class Equations:
         ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square rotation).
     kinetic
         Kinetic metric of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``.
-    massless
-        Whether that is without any term.
+    massless, even
+        Whether that is without any term, and without the arclength in it.
     energy
         Stored energy ``int W ds``.
     potential
@@ -73,8 +74,11 @@ class Equations:
         forms = self._derive(fields)
         self._taken: Line | None = None
         self.cells = Cells.of(fields)
+        load = int(fields.copies[0, -1])
         compiled = form_compiler.compile_forms(list(forms.values()), fields.mesh.comm)
-        assemblers = {name: Assembler(form, self.cells) for name, form in zip(forms, compiled, strict=True)}
+        assemblers = {
+            name: Assembler(form, self.cells, self.known, load) for name, form in zip(forms, compiled, strict=True)
+        }
         self._assemblers = list(assemblers.values())
         self.jacobian, self.residual, self.energy, self.metric, self.kinetic = self._assemblers[:5]
         self.potential, self.ordinate = assemblers.get("potential"), assemblers.get("ordinate")
@@ -107,6 +111,7 @@ class Equations:
         dx_nodes = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * k - 1, "quadrature_rule": "GLL"})
         self.measures = point_measures(mesh, [*scene.interval, *scene.joints])
 
+        self.known = Known(fields, self.quadrature_degree(k) // 2)
         f = self.unknowns = self._named(ufl.split(u))
         c = self.constants = self._constants(f.load)
         v = strain(scene.free_strains, self.components(f.v, len(scene.free_strains)))
@@ -129,7 +134,7 @@ class Equations:
             if of.nodal:
                 L += sum(term * (measure or dx_nodes) for term in of.lagrangian(site))
         work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
-        first = ufl.derivative(with_constants(L, mesh), u, test) - with_constants(work, mesh)
+        first = ufl.derivative(self.compilable(L), u, test) - self.compilable(work)
         second = ufl.derivative(first, u, trial)
         metric = (inertia.rotation_metric(a.q, b.q) if scene.normal is None else a.turned * b.turned) / length
         if f.r is not None:
@@ -141,7 +146,8 @@ class Equations:
             kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
         kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
         self.massless = apply_algebra_lowering(kinetic).empty()
-        self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
+        self.even = not extract_type(kinetic, ufl.SpatialCoordinate)
+        self.uniform = not (extract_type(first, ufl.SpatialCoordinate) or scene.joints or self.known.tables)
         others = {"energy": W * dx, "metric": metric * dx, "kinetic": kinetic}
         if scene.conservative:
             others["potential"] = potential
@@ -149,7 +155,7 @@ class Equations:
                 others["loads"] = sum(loads)
         if not scene.ordinate.places:
             others["ordinate"] = (0.0 * c.s + scene.ordinate.of(along, c)) * dx
-        return {"jacobian": second, "residual": first} | {name: with_constants(x, mesh) for name, x in others.items()}
+        return {"jacobian": second, "residual": first} | {name: self.compilable(x) for name, x in others.items()}
 
     @classmethod
     def compile_ahead(cls, fields: Fields) -> None:
@@ -161,9 +167,14 @@ class Equations:
         if line is self._taken:
             return
         self.base.value[:], self.direction.value[:] = line.origin, line.direction
+        self.known.take(line)
         for form in self._assemblers:
             form.pack_constants()
         self._taken = line
+
+    def compilable(self, form: Any) -> Any:
+        """A form, or an expression, with what is known in the place of tables, and constants in that of numbers."""
+        return with_constants(self.known.put(form), self.fields.mesh)
 
     # --- the functional --------------------------------------------------------------------------------------------
 
@@ -243,7 +254,9 @@ class Equations:
     def _constants(self, load: Any, s: float | None = None) -> Constants:
         """Named constants as functions of the load, along the rod or at arclength ``s``."""
         values = {name: self.base[i] + self.direction[i] * load for i, name in enumerate(self.names)}
-        return Constants(s=ufl.SpatialCoordinate(self.fields.mesh)[0] if s is None else s, **values)
+        place = ufl.SpatialCoordinate(self.fields.mesh)[0]
+        self.known.names |= {value: name for name, value in {"s": place, **values}.items()}
+        return Constants(s=place if s is None else s, **values)
 
     def lift(self, c: Constants) -> Any:
         """Linear in s and equal to the ends' positions: the unknown ``r`` is what comes on top, zero where held."""

@@ -184,7 +184,9 @@ class Fields:
         """
         check_mesh(scene, discretization, comm.size)
         self.formulation = formulations.chosen(discretization.formulation, scene)
-        self.discretization = replace(discretization, formulation=self.formulation.name)
+        least = 1 if discretization.vertices else len(scene.vertices) + 1
+        elements = max(discretization.elements, least)
+        self.discretization = replace(discretization, formulation=self.formulation.name, elements=elements)
         self.scene, self.comm = scene, comm
         self.turning = turning_of(scene)
         self.blocks = blocks_of(scene, self.formulation, discretization.degree)
@@ -206,7 +208,7 @@ class Fields:
     def _mesh(self) -> Any:
         """Mesh with the vertices that the discretisation gives, or of elements of nearly equal size; each at joints."""
         scene, elements, given = self.scene, self.discretization.elements, self.discretization.vertices
-        pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
+        pieces = np.array([scene.interval[0], *scene.vertices, scene.interval[1]])
         mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
         uniform = np.linspace(*scene.interval, elements + 1)
         if given is not None:

@@ -9,20 +9,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.quadrature_at import AT_ONCE, POINTS, composite
-from rodfem.fem.shape import Shape
-from rodfem.fem.state_along import StateAlong
-from rodfem.problem.gradients import is_polynomial
-from rodfem.problem.pointwise import LocalState, along_rod
-from rodfem.problem.values import Values, scalar
-
-PIECES, MOST = 16, 256
-"""Numbers of pieces of an element, of 8 points each, to begin with and at most."""
-ENOUGH = 1e-14
-"""Change of the integral with twice the pieces, relative to that of the absolute value, below which it is known."""
+from rodfem.fem.quadrature_check import Pieces
+from rodfem.fem.system import System
 
 
 class Integral(NamedTuple):
@@ -33,41 +23,18 @@ class Integral(NamedTuple):
 
 
 class IntegralOrdinate:
-    """Ordinate of the scene of a ``shape`` by a composite rule, where it is an integral; collective over its ranks.
+    """Ordinate of the scene of a ``system`` by a composite rule, where it is an integral; collective over its ranks."""
 
-    Attributes
-    ----------
-    exists
-        Whether the ordinate is an integral of what is no polynomial in the strains, positions and rotations.
-    """
-
-    def __init__(self, shape: Shape) -> None:
-        """Write the integrand in symbols of the state at a place."""
-        scene, self.shape = shape.system.scene, shape
-        self.exists = not scene.ordinate.places
-        if self.exists:
-            self._at = LocalState(scene)
-            of = scalar(scene.ordinate.of(along_rod(scene, self._at), self._at.constants))
-            self.exists, self._of = not is_polynomial(of, self._at.units), Values(of)
+    def __init__(self, system: System) -> None:
+        """Cut the elements."""
+        self.system, self._pieces = system, Pieces(system)
 
     def __call__(self, x: PETSc.Vec) -> Integral:
         """Return the integral of a state ``x``."""
-        along = StateAlong(self.shape, x, self._at)
-        pieces, last = PIECES, np.inf
-        while True:
-            value, size = self._integral(along, pieces)
-            left = abs(value - last)
-            if left <= ENOUGH * size or pieces == MOST:
-                return Integral(value, left)
-            pieces, last = 2 * pieces, value
-
-    def _integral(self, along: StateAlong, pieces: int) -> tuple[float, float]:
-        """Integral by so many pieces of each element, and that of the absolute value."""
-        rule, block = composite(pieces, POINTS), max(1, AT_ONCE // (POINTS * pieces))
-        value = size = 0.0
-        for first in range(0, along.elements, block):
-            last = min(first + block, along.elements)
-            weights = np.diff(along.ends[first : last + 1])[:, None] * rule.weights[:, 0]
-            values = self._of(along(rule.places, first, last)).reshape(weights.shape)
-            value, size = value + float((weights * values).sum()), size + float((weights * abs(values)).sum())
-        return value, size
+        state, form = self.system.at(x), self.system.equations.ordinate
+        assert form is not None
+        self.system.equations.take(state.line)
+        values, number = state.local[self._pieces.dofs], self._pieces.number
+        mine = [self._pieces.integral(form, values, pieces) for pieces in (2 * number, number)]
+        value, coarse = (float(self.system.comm.allreduce(part)) for part in mine)
+        return Integral(value, abs(value - coarse))

@@ -19,7 +19,6 @@ import ufl
 from petsc4py import PETSc
 
 from rodfem.fem import form_compiler
-from rodfem.fem.literals import with_constants
 from rodfem.fem.shape import Shape
 from rodfem.forms.kinematics import curvature, strain
 from rodfem.forms.rotation import rotation
@@ -40,7 +39,7 @@ class Resultants:
         self.places = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
         vector = ufl.as_vector(self._components())
         self._evaluate = form_compiler.expression(
-            with_constants(vector, mesh), self.places.reshape(-1, 1), mesh, fields.owned_cells
+            shape.system.equations.compilable(vector), self.places.reshape(-1, 1), mesh, fields.owned_cells
         )
 
     def at(self, x: PETSc.Vec) -> dict[str, np.ndarray]:

@@ -64,6 +64,7 @@ class Evaluation(NodalValues):
             return
         self.fields.u.x.array[:] = self.local
         equations.take(self.line)
+        equations.known.lay(self.load)
         equations.held = self
 
     def _add(self, form: Assembler, places: Places | None, out: np.ndarray) -> None:

@@ -43,7 +43,6 @@ from rodfem.linalg.matrices import shared, times
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.problem.scene import Scene
-from rodfem.problem.unchanged import check_unchanged
 from rodfem.timing import Clock
 
 FEW = 4000
@@ -94,10 +93,8 @@ class System:
         """Compile the forms and allocate all matrices once; on a given mesh, with known symmetries if they are.
 
         The ``scene`` on the mesh of ``discretization`` is shared among the ranks of ``comm``; ``clock`` measures times;
-        ``mesh`` and ``symmetries`` are those of another system of the scene.  Raises :class:`SceneError` for a scene
-        whose functions have changed since it was made.
+        ``mesh`` and ``symmetries`` are those of another system of the scene.
         """
-        check_unchanged(scene)
         self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)

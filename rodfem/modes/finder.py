@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from rodfem.adaptivity.ordinate_bound import bound
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
-from rodfem.fem.nonsmooth import Nonsmooth, Reasons
+from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.linalg.matrices import rounding
 from rodfem.modes.eigenmotions import Eigenmotions, stack
@@ -32,7 +32,7 @@ class ModeFinder(Eigenmotions):
         """Keep the solver of the equilibria; ``error_bars`` are from a second, richer discretisation."""
         super().__init__(solver)
         self.error_bars = error_bars
-        self._nonsmooth = Nonsmooth(solver.shape) if error_bars else None
+        self._quadrature = QuadratureCheck(solver.system)
         self._richer: tuple[StaticSolver, Assessor, Transfer] | None = None
 
     def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
@@ -40,15 +40,14 @@ class ModeFinder(Eigenmotions):
         verdict = self.assessor(x, method, number)
         sample = self.motions.sample(x)
         found, noise = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
-        errors, reasons = np.full(len(found["value"]), np.nan), Reasons([], [])
+        errors = np.full(len(found["value"]), np.nan)
         values = found["value"][: len(found["value"]) - found["motion"].count(SYMMETRY)]
-        if self._nonsmooth is not None:
-            reasons = self._nonsmooth(x)
-        if self.error_bars and not reasons:
+        note = self._quadrature(x) if self.error_bars else ""
+        if self.error_bars and not note:
             errors[: len(values)] = self._errors(x, values, noise)
         unit = sample["q"] / np.linalg.norm(sample["q"], axis=1, keepdims=True)
         state = {"load": self.system.scalar(x), "s": sample["s"], "r": sample["r"], "q": unit}
-        return verdict, Modes(**state, error=errors, note=reasons.sentence if reasons else "", **found)
+        return verdict, Modes(**state, error=errors, note=note, **found)
 
     def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> tuple[dict[str, Any], np.ndarray]:
         """Modes from the vectors of a verdict, orthonormal in the mass, the symmetries', and round-off of those."""

@@ -55,7 +55,7 @@ MEANING = {
     "error": "size of the last Newton correction",
     "mesh": "number of the discretisation in meshes",
     "undecided": "number of eigenvalues whose sign is not decided: the index is negative, or greater by up to so many",
-    "kink": "functions on a kink of which the state is: the index is that of one side, stability is undecided",
+    "kink": "what has a kink at the very state (equations): the index is that of one side, stability is undecided",
     "soft": "eigenvalues near zero by name: what moves",
     "soft_value": "their values, in the metric",
     "soft_uncertainty": "bounds of the errors of these by round-off, and by the mesh where there are error bars",

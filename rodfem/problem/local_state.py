@@ -193,9 +193,9 @@ def trials(scene: Scene, function: OfConstants) -> Iterator[Constants]:
         yield from (scene.constants(load, s) for s in places)
 
 
-def asked_for(scene: Scene) -> set[str]:
-    """Names of the constants that the equations of a scene ask for."""
-    c, asked = watched(scene.constants())
+def asked_for(scene: Scene, c: Constants | None = None) -> set[str]:
+    """Names of the constants ``c``, by default the scene's own, that the equations of a scene ask for."""
+    c, asked = watched(c or scene.constants())
     for _, function, role in functions_of(scene):
         if role.call == "f(c)":
             function(c)

@@ -14,12 +14,13 @@ import ufl
 from ufl.classes import Abs, Conditional, Division, Product, ScalarValue, Sqrt, Sum, Zero
 
 from rodfem.errors import SceneError
+from rodfem.forms.kinematics import strain
+from rodfem.forms.rotation import rotation
 from rodfem.problem.end import SIDES
-from rodfem.problem.local_state import STATES, Constants, place, trials
-from rodfem.problem.pointwise import LocalState, Places, along_rod
+from rodfem.problem.local_state import STATES, Constants, Place, place, trials
 from rodfem.problem.roles import functions_of
 from rodfem.problem.symbols import symbols
-from rodfem.problem.values import Values
+from rodfem.problem.values import Symbol, Values
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -29,6 +30,17 @@ ASIDE = 1e-3
 """Displacement over length, strain or rotation out of the plane, to either side, at which energies are tried."""
 PUSHES = 1e-12
 """Difference between the two sides of the plane, relative to the values there, that is round-off."""
+Places = dict[Symbol, np.ndarray]
+
+
+class LocalState:
+    """Symbols of a state at a place: quaternion ``q``, ``r``, free strains ``v``, curvatures ``k``; and constants."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Make symbols for a place of a ``scene``."""
+        self.q, self.r, self.k = ([Symbol() for _ in range(n)] for n in (4, 3, 3))
+        self.v = [Symbol() for _ in scene.free_strains]
+        self.constants = Constants(s=Symbol(), **{name: Symbol() for name in scene.parameters})
 
 
 def check_plane(scene: Scene) -> None:
@@ -107,7 +119,7 @@ def _check_loads(scene: Scene, normal: int, anywhere: Constants) -> None:
 
 def _check_functions_of_states(scene: Scene, normal: int) -> None:
     at = LocalState(scene)
-    x, c, sides = along_rod(scene, at), at.constants, _sides(scene, normal, at)
+    x, c, sides = _along_rod(scene, at), at.constants, _sides(scene, normal, at)
     point = place(x.q, x.R, x.s, x.r, length=x.length)
     energies = [("stored energy", scene.energy(x.v, x.k, c))]
     energies += [
@@ -121,6 +133,13 @@ def _check_functions_of_states(scene: Scene, normal: int) -> None:
                 f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
                 "are not alike to it; leave that out, or planar out of the scene."
             )
+
+
+def _along_rod(scene: Scene, at: LocalState) -> Place:
+    """Place of the whole rod, of the symbols ``at`` it."""
+    q, r, k = (ufl.as_vector(x) for x in (at.q, at.r, at.k))
+    v, R = strain(scene.free_strains, at.v), rotation(q)
+    return place(q, R, at.constants.s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
 
 
 def _sides(scene: Scene, normal: int, at: LocalState) -> tuple[Places, Places]:

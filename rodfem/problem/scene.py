@@ -27,7 +27,7 @@ from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.plane import check_plane
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.start import check_continuity
-from rodfem.problem.unchanged import numbers_of
+from rodfem.problem.table import Table, tables_of
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
 from rodfem.problem.values import Symbol
@@ -38,6 +38,8 @@ ASIDE = 1e-6
 
 SHORTEST = 1e-15
 """Length of a rod above which dolfinx makes a mesh of it: the round-off of one."""
+FEW = 64
+"""Knots of tables below which elements meet at each: where there are more, an element has several."""
 FARTHEST = 1e9
 """Arclength, over the rod's length, beyond which round-off of arclengths is seen."""
 
@@ -279,12 +281,11 @@ class Scene(Contribution):
         check_scene(self)
         check_plane(self)
         check_continuity(self)
-        _ = self.numbers  # kept from now on: see :mod:`rodfem.problem.unchanged`
 
     @cached_property
-    def numbers(self) -> list[tuple[str, list[float]]]:
-        """Values of each function, by its words, when the scene was made."""
-        return numbers_of(self)
+    def tables(self) -> list[tuple[Table, str]]:
+        """Tables among its functions, each with the constant that it is called with."""
+        return tables_of(self)
 
     @property
     def sides(self) -> tuple[End, End]:
@@ -317,8 +318,23 @@ class Scene(Contribution):
     @property
     def joints(self) -> tuple[float, ...]:
         """Arclengths inside the rod that must be element boundaries, in ascending order; one for what is one place."""
-        places = sorted({*self.breaks, *(part.s for part in self.parts if part.s is not None)})
-        inner = [s for s in places if self.is_inside(s)]
+        return self._apart({*self.breaks, *(part.s for part in self.parts if part.s is not None)})
+
+    @property
+    def stops(self) -> tuple[float, ...]:
+        """Loads at which a piecewise linear path has a corner: a branch has a row there, and no step across."""
+        paths = [table for table, name in self.tables if name == self.load]
+        return tuple(sorted({load for table in paths for load in table.corners}))
+
+    @property
+    def vertices(self) -> tuple[float, ...]:
+        """Joints, and the knots of piecewise linear tables where these are few: there elements of a mesh meet."""
+        knots = {s for table, name in self.tables if name == "s" for s in table.corners}
+        return self._apart({*self.joints, *(knots if len(knots) < FEW else ())})
+
+    def _apart(self, places: set[float]) -> tuple[float, ...]:
+        """Places inside the rod in ascending order, one for what is one place."""
+        inner = [s for s in sorted(places) if self.is_inside(s)]
         apart = [not i or not same_place(inner[i - 1], s, self.length) for i, s in enumerate(inner)]
         return tuple(s for s, new in zip(inner, apart, strict=True) if new)
 

@@ -20,8 +20,7 @@ from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
-from rodfem.problem.jumps import extremes
-from rodfem.problem.kinds import check_scalar, real, reals
+from rodfem.problem.kinds import check_scalar, number_of, real, reals
 from rodfem.problem.local_state import (
     STATES,
     asked_for,
@@ -33,7 +32,6 @@ from rodfem.problem.local_state import (
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
 from rodfem.problem.symbols import check_expressions
-from rodfem.problem.values import Symbol
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -249,13 +247,12 @@ def trouble_with_inertia(scene: Scene, load: float | None) -> str:
 
 
 def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
-    """Masses and rotary inertias of a scene at a ``load``, by default its own: of the rod the extremes along it."""
-    c = scene.constants(load)
+    """Masses and rotary inertias of a scene at a ``load``, by default its own: of the rod at its samples."""
+    c, along = scene.constants(load), [scene.constants(load, s) for s in scene.samples()]
     carried = [float(x.mass(c)) for x in scene.attachments if x.mass]
     turned = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    along = scene.constants(load, s := Symbol())
-    carried += extremes(scene.inertia.rho_A(along), s, scene)
-    turned += [x for of_axis in scene.inertia.rho_I(along) for x in extremes(of_axis, s, scene)]
+    carried += [number_of(scene.inertia.rho_A(there)) for there in along]
+    turned += [number_of(x) for there in along for x in scene.inertia.rho_I(there)]
     return carried, turned
 
 
@@ -264,6 +261,7 @@ def check_scene(scene: Scene) -> None:
     if scene.planar not in (None, "e1", "e2"):
         raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
     check_energy(scene)
+    _ = scene.tables
     check_places(scene)
     check_results(scene)
     check_expressions(scene)

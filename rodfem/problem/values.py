@@ -45,7 +45,6 @@ OPERATIONS: dict[Any, Callable[..., Any]] = {
     classes.NotCondition: np.logical_not,
     classes.Atan2: np.arctan2,
 }
-BESSEL = {classes.BesselJ: "jv", classes.BesselY: "yv", classes.BesselI: "iv", classes.BesselK: "kv"}
 
 
 class Symbol(classes.Variable):  # type: ignore[misc]
@@ -68,9 +67,8 @@ class Values:
 
     def __init__(self, expression: Any) -> None:
         """List the nodes of the expression."""
-        self.expression = scalar(expression)
+        self.expression = expand_indices(apply_algebra_lowering(ufl.as_ufl(expression)))
         self._nodes = list(unique_post_traversal(self.expression))
-        self.symbols = [node for node in self._nodes if isinstance(node, Symbol)]
 
     def __call__(self, places: dict[Symbol, np.ndarray]) -> np.ndarray:
         """Values at places, each given by the arrays of its symbols: all of one length; nan where there is none."""
@@ -93,19 +91,10 @@ class Values:
             return float("nan")
 
 
-def scalar(expression: Any) -> Any:
-    """Return a scalar expression without indices, made of scalars alone."""
-    return expand_indices(apply_algebra_lowering(ufl.as_ufl(expression)))
-
-
 def _value(node: Any, known: dict[Any, Any]) -> Any:
     kind = type(node)
     if kind in OPERATIONS:
         return OPERATIONS[kind](*(known[x] for x in node.ufl_operands))
-    if kind in BESSEL:
-        from scipy import special  # takes a tenth of a second to load
-
-        return getattr(special, BESSEL[kind])(*(known[x] for x in node.ufl_operands))
     if isinstance(node, classes.MathFunction):
         name = node._name
         function = OTHER_NAMES[name] if name in OTHER_NAMES else getattr(np, name)

@@ -62,7 +62,7 @@ class Verdict:
     soft
         Eigenvalues near zero in the metric, by name: those of :meth:`rodfem.Solver.assess`.
     kink
-        Names of the functions on a kink of which the state is, by :meth:`rodfem.Solver.assess`: the numbers are those
+        What has a kink at the very state, the equations, by :meth:`rodfem.Solver.assess`: the numbers are those
         of one side, and stability is undecided.
     uncompared
         Why :meth:`rodfem.Solver.assess` could not compare the index with that of a richer mesh; empty where it did.

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import ufl
-from hard.paths import MESH, bends, floats, imperfect, peak, snapping
+from hard.paths import MESH, bends, floats, imperfect, snapping
 from hard.two_freedoms import scene as two_freedoms
 
 from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, trace
@@ -70,17 +70,6 @@ def test_a_ring_under_loads_that_follow(given: tuple[float, int]) -> None:
     """As under a pressure that has a potential: no end holds its rotation, and Newton's method went round at random."""
     found = floats(given)
     assert found.right and not found.said
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("width", [1e-2, pytest.param(1e-3, marks=pytest.mark.long), 1e-6])
-def test_a_peak_of_the_load_between_rows(width: float) -> None:
-    """The load is critical on either side of its peak; of one that is too narrow to be followed it is said."""
-    found = peak(width)
-    if width < 1e-4:
-        assert any("changes too fast" in words for words in found.said)
-    else:
-        assert found.right and not found.said and len(found.ratios) == 2
 
 
 def following(scene: Scene) -> Scene:

@@ -7,7 +7,6 @@ from hard.bifurcations import opposite, opposite_other
 from hard.planes import MESH, Draw, Plane, drawn
 
 from rodfem import Plan, trace
-from rodfem.continuation import determinants
 from rodfem.continuation.kinds import BRANCH_POINT
 
 pytestmark = pytest.mark.alone
@@ -126,13 +125,6 @@ def test_up_to_five_crossings(name: str) -> None:
     number, seed, shallow = HARDER[name]
     found = drawn(number, seed, 5, shallow).measured()
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
-
-
-@pytest.mark.few(1)
-def test_a_search_that_ends_at_a_row_is_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the low modes alone: those of the first three rows fall to the end of the step, beside which two pass zero."""
-    monkeypatch.setattr(determinants, "without_growth", lambda *given: None)
-    assert drawn(34, 5, 5, 1e-6).measured().right
 
 
 @pytest.mark.long

@@ -69,7 +69,7 @@ def test_bars_hold_or_there_are_none() -> None:
     told = {width: {load: deflection(load, width) for load in LOADS} for width in (3e-3, 1e-1)}
     for width, mesh in ((3e-3, (7, 4)), (3e-3, (8, 6)), (1e-1, (7, 4)), (1e-1, (8, 6))):
         found = bent(layer(width), mesh)
-        said = [x for x in found.warnings if "too sharply" in x or "has a kink" in x]
+        said = [x for x in found.warnings if "does not integrate the equations" in x]
         assert len(said) == (width < 1e-2), found.warnings
         for load, ordinate, bar in ordinates(found):
             assert isnan(bar) if width < 1e-2 else abs(ordinate - told[width][load]) <= bar < 1e-4
@@ -85,7 +85,7 @@ def test_an_absolute_value_by_other_names(power: Any) -> None:
     below = next(s for s in found[0].special if s.point.load == 0.5)
     assert isfinite(below.ordinate_error)  # the curvature is below 1 everywhere
     assert all(isnan(bar) for _, _, bar in ordinates(found))
-    assert any("stored energy has a kink in the state inside of the rod" in said for said in found.warnings)
+    assert any("does not integrate the equations" in said for said in found.warnings)
 
 
 def lateral(threshold: float) -> Diagram:
@@ -112,11 +112,11 @@ def test_loci_and_modes_have_no_bar_beyond_a_kink(tmp_path: Path) -> None:
         special = found.special("branch point")[0]
         locus = found.locus(special, "C", (0.9, 1.1))
         assert np.isfinite(locus.error).any() != kink
-        assert ("Locus of the branch point: the stored energy has a kink" in locus.note) == kink
+        assert ("does not integrate the equations" in locus.note) == kink
         assert (locus.note in locus.text()) and Locus.read(_saved(locus, tmp_path)).note == locus.note
         modes = found.modes(special)
         assert np.isfinite(modes.error).any() != kink
-        assert ("the stored energy has a kink in the state" in modes.note) == kink
+        assert ("does not integrate the equations" in modes.note) == kink
 
 
 def _saved(locus: Locus, folder: Path) -> Path:
@@ -175,5 +175,5 @@ def test_a_foundation_of_constant_force_has_a_kink() -> None:
         potential=lambda x, c: 0.1 * abs(x.r[1]),
     )  # fmt: skip
     found = trace(rod, Discretization(elements=4, degree=4), Plan(depth=0))
-    assert any("has a kink at the very state" in said for said in found.warnings)
+    assert any("have a kink at the very state" in said for said in found.warnings)
     assert all(point.stable is not True for point in found[0].points)

@@ -49,17 +49,6 @@ def dent(width: float) -> Measured:
     return compare(singular(diagram[0]), expected, said(diagram))
 
 
-def aside(width: float) -> Measured:
-    """The stiffness of a second freedom is ``1 - 2 exp(-t^2)``, ``t = (u - 0.5123)/width``; the first one is ``P``."""
-
-    def potential(u: Any, f2: Any, c: Any) -> Any:
-        t = (u - 0.5123) / width
-        return u * u / 2 - c.P * u + (1 - 2 * ufl.exp(-t * t)) * f2 / 2 + f2**2 / 4
-
-    diagram, at = run(scene(potential, (0.0, 1.0)), MESH), width * log(2) ** 0.5
-    return compare(singular(diagram[0]), [Change(0.5123 - at, 0, 1), Change(0.5123 + at, 1, 0)], said(diagram))
-
-
 def cusp(a: float) -> Measured:
     """``u^3 + a u = P`` without a fold."""
     model = scene(lambda u, f2, c: 0.25 * u**4 + 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-0.1, 0.1), a=a)

@@ -59,19 +59,19 @@ STIFFNESS = (
         (4.0, 2.0, 1.2, 0.8, 0.6),
     ),
     Case(
-        "a stiffness that varies on any scale", "layers, peaks and tails of 1e-8 to 0.2 of the rod, ripple in step "
-        "with the elements", SAID, "Magnus' expansion of fourth order, on graded pieces", "number of a random draw",
-        uneven.stiffness, (193, 432, 3), (*range(40), 193, 290, 378, 393, 432, 458),
+        "a stiffness that varies along the rod", "layers, peaks, tails and ripple as wide as an element", EXACT,
+        "Magnus' expansion of fourth order, on graded pieces", "number of a random draw", uneven.stiffness,
+        (3, 4), tuple(range(10)),
     ),
     Case(
-        "a weight that varies on any scale", "the same, of a force along the rod", SAID,
+        "a weight that varies along the rod", "the same, of a force along the rod", EXACT,
         "Magnus' expansion of fourth order, on graded pieces", "number of a random draw", uneven.weight,
-        (7,), tuple(range(20)),
+        (7,), tuple(range(10)),
     ),
     Case(
-        "a foundation that varies on any scale", "the same, of springs along the rod", SAID,
+        "a foundation that varies along the rod", "the same, of springs along the rod", EXACT,
         "Magnus' expansion of fourth order, on graded pieces", "number of a random draw", uneven.bed,
-        (5,), tuple(range(20)),
+        (5,), tuple(range(10)),
     ),
     Case(
         "metres and newtons of a molecule, and of a pipeline", "entries of the matrix from 1e-30 to 1e9", f"{EXACT}; "
@@ -98,11 +98,6 @@ BIFURCATIONS = (
         "a dent of a spring", "a bend that is sharper than a step, and a straight branch on both sides", SAID,
         "1 - 2 exp(-t^2), t = (u - 0.5123)/d", "width d", bifurcations.dent, (1e-2, 3e-4),
         (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5),
-    ),
-    Case(
-        "a dent beside the path", "the branch is a straight line, and no row shows that a second freedom softens", SAID,
-        "1 - 2 exp(-t^2), t = (u - 0.5123)/d", "width d", bifurcations.aside, (1e-2, 1e-4),
-        (1e-1, 1e-2, 1e-3, 1e-4, 1e-6),
     ),
     Case(
         "a cusp", "a tangent that is nearly vertical, and no fold", EXACT,
@@ -232,11 +227,6 @@ SWEEPS = (
         paths.bends, (1e-3, 1e-7), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
     ),
     Case(
-        "a peak of the load between two rows", "nothing of it is seen at any row", SAID,
-        "cos(P^(1/2)) = -1/4, the thrust 1 + 3 exp(-x^2)", "width of the peak", paths.peak, (1e-2, 1e-3, 1e-6),
-        (0.3, 0.1, 1e-2, 1e-3, 1e-4, 1e-6),
-    ),
-    Case(
         "a floating ring under loads that follow", "nothing holds it, and Newton's method may turn it at random",
         "every state to 1e-6; or a sentence that says where its path could not be followed", "that under a pressure "
         "with a potential", "waves of natural curvature, elements", paths.floats, ((1e-3, 8), (1e-1, 6)),
@@ -245,18 +235,6 @@ SWEEPS = (
 )  # fmt: skip
 TO_ITS_BAR = "every row within its uncertainty, and the curve ends, with a sentence, where its special point does"
 LOCI = (
-    Case(
-        "a peak of a locus between two steps", "on both sides the curve is a straight line, and steps are long",
-        "every row on the curve, to 1e-9, with its turning point; or a sentence that says what is not followed",
-        "P = 1 + exp(-t^2), t = (b - 0.5123)/d", "width d, in bounds of 1", loci.peak, (3e-3,),
-        (0.1, 1e-2, 3e-3, 1e-3, 1e-4, 1e-6),
-    ),
-    Case(
-        "a ridge across the plane", "on the lines of either parameter through the start it is elsewhere",
-        "every row on the curve, to 1e-9, with its turning points; or a sentence that says what is not followed",
-        "P = 1 + b + exp(-t^2)/2, t = (P - 3 b)/d", "width d, in bounds of 1", loci.ridge, (2e-2,),
-        (0.1, 2e-2, 5e-3, 2e-3, 1e-4),
-    ),
     *(
         Case(
             f"a gap between two loci of {kind}s", "a step leads across it to the other curve, which is a locus, too",

@@ -9,7 +9,6 @@ from typing import Any
 
 import classics
 import numpy as np
-import ufl
 from diagram.test_close_critical_loads import BECK
 from hard.case import Measured, run
 from hard.two_freedoms import scene as two_freedoms
@@ -50,41 +49,6 @@ def beyond(locus: Locus, exact: np.ndarray) -> float:
     error, left = locus.error[:, 0], locus.located_to[:, 0]
     known = np.where(np.isfinite(error), error, left + np.nanmax(error))
     return float((abs(locus.values[:, 0] - exact) / known).max())
-
-
-def peak(width: float) -> Measured:
-    """Branch points ``P = 1 + exp(-t^2)``, ``t = (b - 0.5123)/width``, on a straight line but for a peak of 1."""
-
-    def exact(b: Any, exp: Callable[[Any], Any]) -> Any:
-        return 1 + exp(-(((b - 0.5123) / width) ** 2))
-
-    potential = lambda u, f2, c: (exact(c.b, ufl.exp) - c.P) * u * u / 2 + u**4 / 4 + f2 / 2  # noqa: E731
-    diagram = run(two_freedoms(potential, (0.0, 1.5), b=0.1), UNIFORM, error_bars=False)
-    found = diagram.locus(diagram.special("branch point")[0], "b", (0.0, 1.0), (0.0, 4.0))
-    (P, b), g = found.values.T, exact(found.values[:, 1], np.exp)
-    distance = abs(P - g) / np.hypot(1.0, 2 * (g - 1) * (b - 0.5123) / width**2)
-    turns = [mark.kind for mark in found.marks] == ["turns in P"]
-    off = max(distance.max(), 2.0 - P.max())
-    return Measured(off if turns else inf, 1e-9, (*words(found), *filter(None, [found.note])))
-
-
-def ridge(width: float) -> Measured:
-    """Branch points on ``P = 1 + b``, but for a ridge ``exp(-t^2)/2``, ``t = (P - 3 b)/width``: up, back, and up again.
-
-    On lines ``P = 1.1`` and ``b = 0.1`` through the start it is elsewhere.
-    """
-
-    def exact(P: Any, b: Any, exp: Callable[[Any], Any]) -> Any:
-        return 1 + b + exp(-(((P - 3 * b) / width) ** 2)) / 2 - P
-
-    potential = lambda u, f2, c: exact(c.P, c.b, ufl.exp) * u * u / 2 + u**4 / 4 + f2 / 2  # noqa: E731
-    diagram = run(two_freedoms(potential, (1.0, 1.2), b=0.1), UNIFORM, error_bars=False)
-    found = diagram.locus(diagram.special("branch point")[0], "b", (0.0, 1.0), (0.0, 4.0))
-    P, b = found.values.T
-    slope = 2 * (P - 3 * b) / width**2 * (exact(P, b, np.exp) + P - 1 - b)
-    distance = abs(exact(P, b, np.exp)) / np.hypot(1 + slope, 1 + 3 * slope)
-    whole = [mark.kind for mark in found.marks] == ["turns in P", "turns in b", "turns in b", "turns in P"]
-    return Measured(float(distance.max()) if whole else inf, 1e-9, (*words(found), *filter(None, [found.note])))
 
 
 def gap(kind: str, width: float) -> Measured:

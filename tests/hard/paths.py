@@ -1,17 +1,16 @@
-"""Hard because a sweep may lose its path: before a fold, past an imperfect bifurcation, on an orbit, at a peak."""
+"""Hard because a sweep may lose its path: before a fold, past an imperfect bifurcation, on an orbit."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
-from math import acos, inf, log, pi, sqrt
+from math import inf, pi
 from typing import Any
 
 import classics
 import ufl
-from hard.case import Change, Measured, compare, run, said
+from hard.case import Measured, run, said
 from hard.snapping import RANGE, extremes, turning
 
 from rodfem import Diagram, Discretization, Ordinate, Ring, Scene, clamped, free
@@ -82,31 +81,3 @@ def floats(given: tuple[float, int]) -> Measured:
     ended = swept[0].ended == traced[0].ended == "end of range"
     apart = max((abs(x - y) / y for x, y in zip(a, b, strict=True)), default=inf) if len(a) == len(b) else inf
     return Measured(apart if ended else inf, SAME, said(swept))
-
-
-PEAK = 2.525
-"""Parameter at which the thrust is greatest, between two rows."""
-
-
-def peaked(width: float) -> Scene:
-    """The column under a thrust ``1 + 3 exp(-((P - PEAK)/width)^2)``."""
-
-    def thrust(part: float) -> Callable[[Any], Any]:
-        return lambda c: (0.0, 0.0, -part * (1 + 3 * ufl.exp(-(((c.P - PEAK) / width) ** 2))))
-
-    ends = clamped(), free(force=thrust(0.8), follower=thrust(0.2))
-    return replace(imperfect(lambda c: 0.0, 5.0), ends=ends)
-
-
-def critical(width: float) -> tuple[float, float]:
-    """Where the thrust is that at which the column diverges, ``cos P^(1/2) = -1/4``."""
-    half = width * sqrt(log(3 / (acos(-1 / 4) ** 2 - 1)))
-    return PEAK - half, PEAK + half
-
-
-def peak(width: float) -> Measured:
-    """Both divergence loads beside the peak."""
-    diagram = run(peaked(width), MESH)
-    indices = (0, 1), (1, 0)
-    expected = [Change(load, *index) for load, index in zip(critical(width), indices, strict=True)]
-    return compare(diagram.special("divergence"), expected, said(diagram))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from hard import loci, loci_codim2
-from hard.case import Case, Measured
+from hard.case import Case
 from hard.cases import CASES
 from hard.test_hard_cases import APART, value_of
 
@@ -30,20 +29,6 @@ def test_a_gap_that_is_not_resolved_is_said(kind: str, width: float) -> None:
     """Narrower than the least step: the curve ends before it, or a crossing is said to be one or such a gap."""
     found = loci.gap(kind, width)
     assert any("no convergence" in said or f"within {GAP:g}" in said for said in found.said)
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize(
-    ("measure", "width", "words"),
-    [
-        (loci.peak, 1e-4, "no convergence with steps of 1e-06"),
-        (loci.peak, 1e-6, "changes too fast with b about b = 0.512"),
-        pytest.param(loci.ridge, 5e-3, "no convergence with steps of 1e-06", marks=pytest.mark.long),
-    ],
-)
-def test_a_peak_that_is_not_followed_is_said(measure: Callable[[float], Measured], width: float, words: str) -> None:
-    found = measure(width)
-    assert not found.right and any(words in said for said in found.said)
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""Columns on which something varies along themselves on any scale: layers, peaks, long tails and ripple, at random.
+"""Columns on which something varies along themselves: layers, peaks, long tails and ripple, at random.
 
 Small deflections of a column follow linear equations ``y' = A(s) y``.  They are carried over short pieces by Magnus'
 expansion of fourth order (Iserles & Norsett 1999), which are graded about the place where the column varies.
@@ -20,8 +20,8 @@ from scipy.special import erf
 
 from rodfem import Discretization, Scene
 
-MESHES = ((8, 3), (10, 4), (14, 5), (20, 3))
-LEAST, MOST = -8.0, -0.7
+MESHES = ((8, 6), (10, 5), (14, 4), (20, 3))
+LEAST, MOST = -0.9, -0.5
 """Decimal exponents of the width of a layer or a peak."""
 KINDS = {
     "layer": lambda s, c, f: f.erf((s - c.p) / c.w),
@@ -52,7 +52,7 @@ class Drawn:
         self.a, self.p = float(10 ** random.uniform(-3, -0.2)), float(random.uniform(0.05, 0.95))
         self.w = float(10 ** random.uniform(LEAST, MOST))
         if self.kind == "ripple":  # in step with the elements, or nearly so
-            self.w = 1 / (self.mesh[0] * float(random.choice([0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 5.0, 9.3])))
+            self.w = 1 / (self.mesh[0] * float(random.choice([0.2, 0.25, 0.3, 0.5])))
         self.bed = float(10 ** random.uniform(1, 3))
 
     def __call__(self, s: np.ndarray) -> np.ndarray:

@@ -14,14 +14,14 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 45323,
-    "files of Python": 337,
-    "lines of C": 1669,
-    "module constants with a number": 741,
-    "functions of a complexity above 10": 165,
-    "functions of six parameters or more": 95,
-    "places that warn": 53,
-    "files that import internals of UFL and FFCx": 18,
+    "lines of Python": 43479,
+    "files of Python": 322,
+    "lines of C": 1702,
+    "module constants with a number": 683,
+    "functions of a complexity above 10": 159,
+    "functions of six parameters or more": 96,
+    "places that warn": 46,
+    "files that import internals of UFL and FFCx": 13,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
 INTERNALS = ("ufl.", "ffcx.")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from literature.test_classics import CRITICAL, TORQUE, cantilever, root
+from problem.test_tables import buckling
 from rows import verify
 from scipy.linalg import expm
 from scipy.optimize import fsolve
@@ -133,6 +134,8 @@ def expected() -> dict[str, list[float]]:
         "bow": [sag(0.2)],
         "pressed": [(1 + sqrt(1 - 16 * pi**2 / 1000)) / 2],
         "untwistable": [pi**2],
+        "measured": [buckling(page()["stiffness"].at, page()["rows"], 1)],
+        "machine": [1 + 2 * (pi**2 / 4 - 2)],
         "in_plane": [4.62463226448],
         "other": [coiled_tip(12.0, 20.0)],
     }

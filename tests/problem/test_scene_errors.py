@@ -345,7 +345,6 @@ def turns(s: np.ndarray, count: int) -> np.ndarray:
     [
         (held(right=free(follower=lambda c: (0, 0, c.F))), "give it an inertia"),
         ({"inertia": Inertia(rho_A=lambda c: -1.0)}, "-1 is negative"),
-        ({"inertia": Inertia(rho_A=lambda c: (c.s - 0.31) ** 2 - 1e-5)}, "-1e-05 is negative"),
         (
             held(right=clamped(lambda c: (0, 0, 1))) | {"inertia": Inertia(rho_I=lambda c: (1.0, -2.0, 1.0))},
             "-2 is negative",

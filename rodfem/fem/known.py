@@ -1,0 +1,195 @@
+r"""What the compiled forms read beside the unknown: tables along the rod, and pieces of paths of the load.
+
+Both are values of one discontinuous function, of which a cell has its own.  A table ``f`` along the rod is its
+projection on polynomials on each element, of the degree ``p`` for which the rule of the element has ``p + 1`` points::
+
+    int (f - f_h) P_j ds = 0,    P_j the Legendre polynomials of the element, j = 0 ... p,
+
+by a rule on each piece of the table.  The rule of the element is exact for ``f_h P_j`` as well: whatever has degree
+``p`` or less is integrated against all rows of the table, also where these are many in an element.  The error is of
+second order in what polynomials miss of ``f``.
+
+A path of the load is one cubic between two rows.  Its coefficients are the values that a cell has, and what assembles a
+form lays there those of the piece in which the load is: derivatives with respect to the load are UFL's.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from numpy.polynomial import legendre
+from ufl.algorithms.map_integrands import map_integrand_dags
+from ufl.classes import PositiveRestricted
+from ufl.corealg.multifunction import MultiFunction
+from ufl.corealg.traversal import unique_pre_traversal
+
+from rodfem import compat
+from rodfem.problem.table import Entry, Table
+from rodfem.tolerances import TINY
+
+if TYPE_CHECKING:
+    from rodfem.fem.fields import Fields
+    from rodfem.fem.parameters import Line
+
+POINTS = 3
+"""Points of the rule of a piece of a table beyond half the degree of the polynomials: exact for cubics times these."""
+PLACES, BEYOND = 50, 0.1
+"""Places of an element at which a polynomial stays in the range of a table, and how far beyond a bound it may be."""
+UNSEEN = 1e-11
+"""Part of the square of a table that elements need not see."""
+
+
+class Known:
+    """Tables of a scene as a dolfinx Function.
+
+    Attributes
+    ----------
+    function
+        All values, None where the scene has no table.
+    tables, paths
+        Tables along the rod; and paths, each with the name of its constant.
+    along
+        Values of the tables in each local cell, (cells, values), in the order in which a cell has them.
+    rows
+        For each path where its pieces begin, and their coefficients, (pieces, size).
+    lines
+        For each path its constant at zero load, and the slope in the load, (paths, 2).
+    """
+
+    name = "known"
+    """Name of the function, by which compiled forms have it."""
+
+    def __init__(self, fields: Fields, degree: int) -> None:
+        """Make the function on the mesh of ``fields``, of which tables have a ``degree`` on each element."""
+        found, self._fields, cells = fields.scene.tables, fields, len(fields.vertices)
+        self._degree = degree
+        self.tables = list(dict.fromkeys(table for table, name in found if name == "s"))
+        self.paths = [(table, name) for table, name in found if name != "s"]
+        self.names: dict[Any, str] = {}
+        self.lines = np.zeros((len(self.paths), 2))
+        self.rows = [np.hstack([t.knots[:-1, None], t.pieces.reshape(len(t.pieces), -1)]) for t, _ in self.paths]
+        sizes = sum(len(t.rows[0]) for t in self.tables), sum(rows.shape[1] for rows in self.rows)
+        parts = [(False, d, size) for d, size in zip((degree, 0), sizes, strict=True) if size]
+        self.function = None
+        self.along, self._dofs = np.zeros((cells, 0)), np.zeros((cells, 0), dtype=int)
+        if not parts:
+            return
+        space = compat.mixed_space(fields.mesh, parts)
+        self.function = compat.fem.Function(space, name=self.name, dtype=compat.REAL)
+        self._dofs = compat.cell_dofs(space, cells)
+        self._values = []
+        for part, (_, _, size) in zip(ufl.split(self.function), parts, strict=True):
+            self._values += [part] if size == 1 else [part[i] for i in range(size)]
+        if self.tables:
+            self.along = np.array([self._at_nodes(a, b, degree) for a, b in fields.vertices.tolist()])
+        self.function.x.array[self._dofs[:, : self.along.shape[1]]] = self.along
+
+    def rough(self) -> str:
+        """Sentence on a table that varies within elements as the error bar's halves do not see it; empty for none."""
+        vertices, k = self._fields.all_vertices(), self._fields.discretization.degree
+        halves = np.sort(np.concatenate([vertices, (vertices[1:] + vertices[:-1]) / 2]))
+        for table in self.tables:
+            size = np.ptp(vertices) * (table.rows**2).mean()
+            meshes = (vertices, k - 1), (halves, k)
+            own, left = (sum(_moments(table, a, b, p)[1] for a, b in pairwise(x)) / size for x, p in meshes)
+            if left > max(own / 4, UNSEEN):
+                return (
+                    f"The {table.what} varies by {left**0.5:.1g} of its size within the elements of the error bar: a "
+                    f"stiffness that does so changes loads by about {left:.0e} of themselves, which no bar holds; give "
+                    "the Discretization vertices at its rows, or more elements, or the table means of several rows."
+                )
+        return ""
+
+    def cut(self, pieces: int) -> Known:
+        """The same on equal pieces of each element, those of the first piece of all elements before others."""
+        out, nodes = copy(self), compat.nodes(self._degree)
+        values = self.along.reshape(len(self.along), self._degree + 1, -1)
+        bases = [compat.lagrange_basis(self._degree, (piece + nodes) / pieces) for piece in range(pieces)]
+        out.along = np.concatenate([(basis @ values).reshape(len(values), -1) for basis in bases])
+        return out
+
+    def _at_nodes(self, a: float, b: float, p: int) -> np.ndarray:
+        """Values of all tables at the nodes of an element from ``a`` to ``b``, which may be the left one."""
+        polynomials = legendre.legvander((2 * compat.nodes(p) - 1) * np.sign(b - a), p)
+        return np.hstack([polynomials @ _bounded(t, min(a, b), max(a, b), p) for t in self.tables]).ravel()
+
+    def take(self, line: Line) -> None:
+        """Let the constants of paths be those of a ``line``."""
+        for i, (_, name) in enumerate(self.paths):
+            number = list(line.scene.parameters).index(name)
+            self.lines[i] = line.origin[number], line.direction[number]
+
+    def lay(self, load: float) -> None:
+        """Put the pieces of paths at a ``load`` where dolfinx reads them."""
+        if self.function is not None and self.paths:
+            places = self.lines @ (1.0, load)
+            pieces = [rows[path.piece(t)] for rows, (path, _), t in zip(self.rows, self.paths, places, strict=True)]
+            self.function.x.array[self._dofs[:, self.along.shape[1] :]] = np.concatenate(pieces)
+
+    def put(self, form: Any) -> Any:
+        """Return a form, or an expression, with the function in the place of the entries of tables."""
+        if self.function is None or not isinstance(form, (ufl.Form, ufl.core.expr.Expr)):
+            return form
+        return map_integrand_dags(_Put(self), form, compress=False)
+
+    def value(self, entry: Entry) -> Any:
+        """Expression of the function that an ``entry`` stands for."""
+        at, place, m = entry.ufl_operands[0], 0, len(entry.table.rows[0])
+        for table, name in [*((table, "s") for table in self.tables), *self.paths]:
+            size = len(table.rows[0]) * (1 if name == "s" else 4) + (name != "s")
+            if table is entry.table and name == self.names[at]:
+                break
+            place += size
+        values = self._values[place : place + size]
+        if name == "s":
+            return values[entry.number]
+        if any(isinstance(node, PositiveRestricted) for node in unique_pre_traversal(at)):
+            values = [value("+") for value in values]
+        t, (a, b, c, d) = at - values[0], values[1 + entry.number :: m]
+        return a + t * (b + t * (c + t * d))
+
+
+def _knots(table: Table, a: float, b: float) -> np.ndarray:
+    """Knots of a table on an element, with its ends."""
+    return np.array([a, *table.knots[(table.knots > a) & (table.knots < b)], b])
+
+
+def _bounded(table: Table, a: float, b: float, p: int) -> np.ndarray:
+    """Legendre coefficients (p + 1, m) of a table on an element, drawn to its mean as far as they leave its range.
+
+    A stiffness stays positive, whatever it does within an element (Zhang and Shu, J. Comput. Phys. 229 (2010)).
+    """
+    coefficients, _ = _moments(table, a, b, p)
+    rows = table.at(_knots(table, a, b))
+    off = legendre.legvander(np.linspace(-1.0, 1.0, PLACES), p)[:, 1:] @ coefficients[1:]
+    for sign in (-1.0, 1.0):
+        most, bound = (sign * off).max(axis=0, initial=TINY), (sign * rows).max(axis=0)
+        room = bound + BEYOND * abs(bound) - sign * coefficients[0]
+        coefficients[1:] *= np.clip(room / most, 0.0, 1.0)
+    return coefficients
+
+
+def _moments(table: Table, a: float, b: float, p: int) -> tuple[np.ndarray, float]:
+    """Legendre coefficients (p + 1, m) of a table on an element, and the integral of the square of what they miss."""
+    ends = _knots(table, a, b)
+    x, w = legendre.leggauss(p // 2 + POINTS)
+    half = np.diff(ends)[:, None] / 2
+    s, weights = (ends[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+    basis, values = legendre.legvander((2 * s - a - b) / (b - a), p), table.at(s)
+    coefficients = (2 * np.arange(p + 1)[:, None] + 1) * ((basis * weights[:, None]).T @ values) / (b - a)
+    return coefficients, float(weights @ ((values - basis @ coefficients) ** 2).sum(axis=1))
+
+
+class _Put(MultiFunction):
+    expr = MultiFunction.reuse_if_untouched
+
+    def __init__(self, known: Known) -> None:
+        super().__init__()
+        self.known = known
+
+    def variable(self, o: Any, at: Any, label: Any) -> Any:
+        return self.known.value(o) if isinstance(o, Entry) else self.reuse_if_untouched(o, at, label)

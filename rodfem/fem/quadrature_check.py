@@ -1,0 +1,230 @@
+r"""Whether the quadrature of the elements integrates the equations in a state.
+
+The residual is assembled once more on equal pieces of each element, on which the state is the same polynomial: the rule
+of the element on each piece is a composite rule of many points.  The rows are those of the element's own test
+functions.  An error bar assumes that the rule is far better on smaller elements.  With the errors ``e`` of the
+elements, and ``e'`` of their halves or their thirds, the largest ones along the rod, as the composite rule has them, a
+rule of n points integrates the equations where
+
+    e' <= max(2^-n e, 1e-8 of the residual):
+
+of a smooth function ``e' / e`` is ``4^-n`` or less, of a kink 1/4, of a jump 1/2, of a layer between the points 1.
+What is narrower than the distance of the points of the composite rule, a four thousandth of the rod, is not seen.
+
+The residual of a straight rod does not have its bending stiffness in it.  The change of the residual in a small smooth
+motion has, and is compared in the same way; so is the inertia in a translation and a rotation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cache
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem import compat
+from rodfem.fem.assembly import Assembler, Cells, Places, vector_places
+from rodfem.fem.state import Evaluation
+from rodfem.fem.system import System
+from rodfem.tolerances import TINY
+
+POINTS, LEAST = 4096, 4
+"""Points of the composite rule along the rod, about, and least number of pieces of an element."""
+SEEN = 1e-8
+"""Error relative to the residual that is none: equilibria are solved for to 1e-10."""
+NOISE = 100 * float(np.finfo(float).eps)
+"""The same relative to the residual in a strain of one, for each piece of the rod: round-off of curvatures."""
+MOTION = 1e-3 * np.array([1.0, 0.7, 0.45])
+"""Sizes of the components of the motion: rotations in radian, strains, displacements over the length."""
+LITTLE, FELT = 1e-3, 1e-6
+"""Part of it in which a kink shows, and least difference of the changes in two opposite motions, over their size."""
+TURN, SHIFT = 0.382, 0.618
+"""Where, over the length, the motion has no curvature, and where no strain and no displacement."""
+REMEDY = "no error is estimated; use breaks=(...) where a function jumps or has a kink, and shorter elements elsewhere."
+"""End of a sentence on what is not integrated."""
+
+
+class Pieces:
+    """Forms of a ``system`` on its own cells, each cut into equal pieces: values are (pieces, cells, n).
+
+    Attributes
+    ----------
+    dofs, rows
+        Local degrees of freedom of each cell, (cells, n), and which of these n each field has.
+    points, number
+        Points of the rule of an element, and number of pieces that make a rule of :data:`POINTS`.
+    """
+
+    def __init__(self, system: System) -> None:
+        """Keep the cells of this rank."""
+        self.fields, self.equations = system.fields, system.equations
+        own = slice(0, self.fields.owned_cells)
+        self.dofs, self._x = self.equations.cells.dofs[own], self.equations.cells.x[own]
+        numbers = {int(dof): i for i, dof in enumerate(self.dofs[0])}
+        self.rows = {name: np.vectorize(numbers.get)(dofs[0]) for name, dofs in self.fields.dofs.items()}
+        d = self.fields.discretization
+        self.points = self.equations.quadrature_degree(d.degree) // 2 + 1
+        self.number = max(LEAST, 2 ** round(np.log2(POINTS / d.elements / self.points)))
+        self._load = numbers[int(self.fields.copies[0, -1])]
+        self._cells, self._bases, self._form = cache(self._cut), cache(self._tabulated), cache(self._assembler)
+
+    def vectors(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
+        """A linear form, whose parameters have been taken, where the unknown has these ``values`` (cells, n)."""
+        every = self._cells(pieces).dofs
+        return self._assembled(form, values, pieces, vector_places(every, np.arange(every.size)))
+
+    def rigid(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
+        """A bilinear form times a change of one in all rotations and positions."""
+        every = self._cells(pieces).dofs
+        moving = [rows.ravel() for name, rows in self.rows.items() if name in (self.fields.turning.name, "r")]
+        chosen = np.where(np.isin(np.arange(every.shape[1]), np.concatenate(moving)), 0, -1)
+        places = Places(every, np.zeros_like(every), np.broadcast_to(chosen, (len(every), 1, every.shape[1])))
+        return self._assembled(form, values, pieces, places)
+
+    def integral(self, form: Assembler, values: np.ndarray, pieces: int) -> float:
+        """A functional on the cells of this rank."""
+        return float(self._assembled(form, values, pieces, None))
+
+    def _assembled(self, form: Assembler, values: np.ndarray, pieces: int, places: Places | None) -> np.ndarray:
+        bases, mine = self._bases(pieces), self._form(form, pieces)
+        local = values @ bases.transpose(0, 2, 1)
+        out = np.zeros(1 if places is None else local.size)
+        mine.constants = form.constants
+        mine.add(local.ravel(), places, out)
+        return out[0] if places is None else out.reshape(local.shape) @ bases
+
+    def _assembler(self, form: Assembler, pieces: int) -> Assembler:
+        return Assembler(form.form, self._cells(pieces), self.equations.known.cut(pieces), self._load, inside=True)
+
+    def _cut(self, pieces: int) -> Cells:
+        ends = (np.arange(pieces)[:, None] + np.array([0.0, 1.0])) / pieces
+        first, size = self._x[:, :1], self._x[:, 1:] - self._x[:, :1]
+        x = first + size * ends[:, None, :, None]
+        dofs = np.arange(pieces * self.dofs.size, dtype=np.int32).reshape(-1, self.dofs.shape[1])
+        return Cells(np.ascontiguousarray(x.reshape(-1, 2, 3)), dofs)
+
+    def _tabulated(self, pieces: int) -> np.ndarray:
+        """Values of the basis of a cell at the nodes of its pieces, (pieces, n, n)."""
+        out = np.tile(np.eye(self.dofs.shape[1]), (pieces, 1, 1))
+        for block in self.fields.blocks:
+            nodes = compat.nodes(block.degree)
+            values = [compat.lagrange_basis(block.degree, (piece + nodes) / pieces) for piece in range(pieces)]
+            for rows in self.rows[block.name].T:
+                out[:, rows[:, None], rows] = values
+        return out
+
+
+class QuadratureCheck:
+    """Tells where the quadrature of a ``system`` does not integrate the equations in a state; collective."""
+
+    def __init__(self, system: System) -> None:
+        """Choose the rows that are compared: of rotations, strains and positions."""
+        self.system, self._pieces = system, Pieces(system)
+        names = (system.fields.turning.name, "v", "r")
+        self._rows = {name: self._pieces.rows[name].ravel() for name in names if name in system.fields.dofs}
+
+    def __call__(self, x: PETSc.Vec) -> str:
+        """Return a clause on where the equations are not integrated in a state ``x``; empty for nowhere."""
+        state, elements, number = self.system.at(x), self.system.fields.discretization.elements, self._pieces.number
+        self.system.equations.take(state.line)
+        values = [local[self._pieces.dofs] for local in (state.local, self._moved(state.local))]
+        fine = self._terms(values, number)
+        true, size = fine.sum(axis=1), abs(fine).sum(axis=1)
+        off = [self._terms(values, pieces).sum(axis=1) - true for pieces in (1, 2, 3)]
+        found = []
+        for rows in self._rows.values():
+            first, second, third, sizes = (abs(y[..., rows]).max(axis=2) for y in (*off, size))
+            largest = self._largest(sizes)
+            least = SEEN * largest + TINY
+            least[:2] += NOISE * number * elements * largest[1] / MOTION[0]
+            allowed = np.maximum(0.5**self._pieces.points * self._largest(first), least)
+            for term, errors in enumerate(np.maximum(second, third) / allowed[:, None]):
+                cell = int(errors.argmax())
+                if errors[cell] > 1:
+                    parts = fine[term, :, cell, rows].T
+                    found.append((errors[cell], self._place(values, term, cell, rows, parts, least[term])))
+        if not (every := [each for part in self.system.comm.allgather(found) for each in part]):
+            return ""
+        _, (a, b, low, high) = max(every)
+        return (
+            f"the quadrature of the element from {a:.6g} to {b:.6g} does not integrate the equations about s = "
+            f"{(low + high) / 2:.6g}, within {high - low:.1g}: {REMEDY}"
+        )
+
+    def kink(self, x: PETSc.Vec) -> str:
+        """Return what has a kink at the very state ``x``, as beside a support to one side: the equations, or nothing.
+
+        The changes of the residual in two opposite motions add up to what is proportional to the motion at a kink, and
+        to its square elsewhere.  Where the residual jumps its changes are not proportional to the motion.
+        """
+        state, dofs = self.system.at(x), [self.system.fields.dofs[name] for name in self._rows]
+        dofs += [copies for _, copies in self._positions()]
+        here, motion = state.covector(), self._moved(state.local) - state.local
+
+        def changes(size: float) -> tuple[np.ndarray, np.ndarray]:
+            """Largest sum of the changes in two opposite motions, and largest change, by kind of row."""
+            ahead, back = (
+                Evaluation(state.equations, state.local + sign * size * motion, state.line).covector() - here
+                for sign in (1.0, -1.0)
+            )
+            return self._largest([ahead[rows] + back[rows] for rows in dofs]), self._largest(
+                [ahead[rows] for rows in dofs]
+            )
+
+        (uneven, change), (more, larger) = changes(LITTLE), changes(4 * LITTLE)
+        bent = (uneven > FELT * change) & (abs(more - 4 * uneven) < uneven)
+        return "equations" if (bent | (larger < 2 * change)).any() else ""
+
+    def _positions(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Scalars that are positions: yields the component of each, and its degrees of freedom."""
+        fields = self.system.fields
+        for unknown, copies in zip(fields.unknown_scalars, fields.copies.T, strict=False):
+            if not unknown.multiplier:
+                yield unknown.component, copies
+
+    def _largest(self, values: Iterable[np.ndarray]) -> np.ndarray:
+        """Largest absolute value in each of some arrays, of all ranks."""
+        return np.max(self.system.comm.allgather([abs(x).max() for x in values]), axis=0)
+
+    def _terms(self, values: list[np.ndarray], pieces: int) -> np.ndarray:
+        """What is compared: the residual, its change by the motion, inertia; (terms, pieces, cells, n)."""
+        equations = self.system.equations
+        first, moved = (self._pieces.vectors(equations.residual, x, pieces) for x in values)
+        if equations.even:
+            return np.array([first, moved - first])
+        return np.array([first, moved - first, self._pieces.rigid(equations.kinetic, values[0], pieces)])
+
+    def _moved(self, local: np.ndarray) -> np.ndarray:
+        """Local values after a small motion, with no curvature at one place of the rod and no strain at another."""
+        scene, fields, out = self.system.scene, self.system.fields, local.copy()
+        for block in fields.blocks:
+            dofs, t = fields.dofs[block.name], (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
+            if block.name == fields.turning.name:
+                out[dofs] = fields.turning.turned(local[dofs], (t[..., None] - TURN) ** 2 * MOTION)
+            elif block.name in ("v", "r"):
+                unit = scene.length if block.name == "r" else 1.0
+                out[dofs] += unit * (t[..., None] - SHIFT) * MOTION[: block.size]
+        for component, copies in self._positions():
+            out[copies] += scene.length * MOTION[component]
+        for dofs in fields.out_of_plane(scene.normal).values():
+            out[dofs] = local[dofs]
+        return out
+
+    def _place(
+        self, values: list[np.ndarray], term: int, cell: int, rows: np.ndarray, fine: np.ndarray, least: float
+    ) -> tuple[float, float, float, float]:
+        """Ends of a cell, and of the smallest part of it that an error above the ``least`` comes from.
+
+        ``fine`` are the rows of a term of that cell, of all its pieces.
+        """
+        pieces, place = 1, 0
+        while pieces < len(fine):
+            halves = self._terms(values, 2 * pieces)[term, :, cell, rows].T
+            errors = abs(halves - fine.reshape(2 * pieces, -1, len(rows)).sum(axis=1)).max(axis=1)
+            if errors[2 * place : 2 * place + 2].max() <= least:
+                break
+            pieces, place = 2 * pieces, 2 * place + int(errors[2 * place : 2 * place + 2].argmax())
+        a, b = self.system.fields.vertices[cell].tolist()
+        low, high = (a + (b - a) * part / pieces for part in (place, place + 1))
+        return (*sorted((a, b)), *sorted((low, high)))

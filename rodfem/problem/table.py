@@ -1,0 +1,173 @@
+"""Functions that a scene has as tables: piecewise cubics of one of its constants, or of the arclength.
+
+With a number a table returns numbers.  In the equations it returns an :class:`Entry`, an expression of UFL that stands
+for the value; :mod:`rodfem.fem.known` says what the compiled forms read there.  So a table of ten thousand rows is no
+longer an expression than one of two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from ufl.classes import Indexed, Label, Sum, Variable
+from ufl.core.expr import Expr
+
+from rodfem.errors import SceneError
+from rodfem.problem.local_state import Constants, asked_for
+from rodfem.problem.roles import UnnamedError
+from rodfem.tolerances import NEGLIGIBLE
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+
+CONSTANTS = Variable, Indexed, Sum
+"""Expressions that stand for an arclength, or for a constant: in the equations ``base + direction * load``."""
+
+
+class Table:
+    """Piecewise cubic through ``rows`` (n, m) at increasing ``knots`` (n,); linear in between unless ``smooth``.
+
+    Attributes
+    ----------
+    pieces
+        Coefficients of powers 0 to 3 of the distance from the knot at which a piece begins, (n - 1, 4, m).
+    """
+
+    def __init__(self, what: str, x: Any, values: Any, *, smooth: bool) -> None:
+        """Check and interpolate ``values`` at ``x``; ``what`` names the table in sentences.
+
+        Raises :class:`SceneError` for what is no table.
+        """
+        self.what = what
+        self.knots, rows = _floats(f"first column of the {what}", x), _floats(f"values of the {what}", values)
+        if self.knots.ndim != 1 or len(self.knots) < 2 or rows.shape[:1] != self.knots.shape or rows.ndim > 2:
+            raise SceneError(
+                f"The {what} has the shapes {self.knots.shape} and {rows.shape}: give n numbers, two or more, and as "
+                "many rows, (n,) or (n, m)."
+            )
+        steps = np.diff(self.knots)
+        if not steps.min() > 0:
+            raise SceneError(
+                f"The first column of the {what} does not increase from row {int(np.argmin(steps > 0))} (from 0) to "
+                "the next: sort the rows, each place once."
+            )
+        self.scalar, self.rows = rows.ndim == 1, self.adjusted(rows.reshape(len(rows), -1))
+        slopes = np.diff(self.rows, axis=0) / steps[:, None]
+        self.pieces = np.stack([self.rows[:-1], slopes, 0 * slopes, 0 * slopes], axis=1)
+        if smooth:
+            from scipy.interpolate import CubicSpline  # takes a tenth of a second to load
+
+            self.pieces = np.moveaxis(CubicSpline(self.knots, self.rows).c[::-1], 0, 1).copy()
+        bent = abs(np.diff(slopes, axis=0)).max(axis=1) > NEGLIGIBLE * abs(slopes).max()
+        self.corners: list[float] = [] if smooth else self.knots[1:-1][bent].tolist()
+        self._labels = [Label() for _ in slopes[0]]
+
+    def adjusted(self, rows: np.ndarray) -> np.ndarray:
+        """The rows as they are interpolated."""
+        return rows
+
+    def piece(self, x: Any) -> Any:
+        """Number of the piece that holds ``x``, the next one at a knot; beyond the ends the first or the last one."""
+        return np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.pieces) - 1)
+
+    def at(self, x: np.ndarray) -> np.ndarray:
+        """Values at ``x`` (k,), in as many rows: (k, m)."""
+        i = self.piece(x)
+        a, b, c, d = np.moveaxis(self.pieces[i], 1, 0)
+        t = (x - self.knots[i])[:, None]
+        return np.asarray(a + t * (b + t * (c + t * d)))
+
+    def __call__(self, x: Any) -> Any:
+        """Value at ``x``, a number or a constant of the scene: a number or an expression, or a tuple of them.
+
+        Raises :class:`UnnamedError` for another expression.
+        """
+        if (isinstance(x, _Named) and not x.name) or (isinstance(x, Expr) and not isinstance(x, CONSTANTS)):
+            raise UnnamedError(
+                f"calls the {self.what} with an expression: call it with c.s, or with one constant alone."
+            )
+        if isinstance(x, _Named):
+            x.calls.append((self, x.name))
+        if isinstance(x, Expr):
+            values = tuple(Entry(x, self, i) for i in range(len(self._labels)))
+        else:
+            values = tuple(self.at(np.array([float(x)]))[0].tolist())
+        return values[0] if self.scalar else values
+
+
+class Entry(Variable):  # type: ignore[misc]
+    """Component ``number`` of a ``table`` at an expression, which is its first operand.
+
+    It is a Variable to UFL, which lets it pass everywhere; two of one table at one expression are the same.
+    """
+
+    __slots__ = ("number", "table")
+
+    def __init__(self, at: Any, table: Table, number: int) -> None:
+        """Stand for the value ``at`` an expression."""
+        super().__init__(at, table._labels[number])
+        self.table, self.number = table, number
+
+    def _ufl_expr_reconstruct_(self, at: Any, label: Any) -> Entry:
+        return Entry(at, self.table, self.number)
+
+    def evaluate(self, *arguments: Any, **options: Any) -> float:
+        """Value where the expression is a number."""
+        at = float(self.ufl_operands[0].evaluate(*arguments, **options))
+        return float(self.table.at(np.array([at]))[0, self.number])
+
+
+class _Named(float):
+    """A constant that knows its ``name``, and notes the ``calls`` of tables; what is computed of it has no name."""
+
+    name = ""
+    calls: list[tuple[Table, str]]
+
+
+def _computed(operation: str) -> Callable[..., Any]:
+    def operate(*operands: float) -> Any:
+        value = getattr(float, operation)(*operands)
+        return value if value is NotImplemented else _Named(value)
+
+    return operate
+
+
+for _operation in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv", "pow", "rpow", "neg", "abs"):
+    setattr(_Named, f"__{_operation}__", _computed(f"__{_operation}__"))
+
+
+def tables_of(scene: Scene) -> list[tuple[Table, str]]:
+    """Tables that the functions of a ``scene`` call, each with the name of what they call it with, as ``s``.
+
+    Raises :class:`SceneError` where they do not have what they are called with.
+    """
+    calls: list[tuple[Table, str]] = []
+    c = Constants(**{name: _Named(value) for name, value in vars(scene.constants()).items()})
+    for name, value in vars(c).items():
+        value.name, value.calls = name, calls
+    asked_for(scene, c)
+    for table, name in calls:
+        value = float(vars(c)[name])
+        needed = scene.interval if name == "s" else scene.span if name == scene.load else (value, value)
+        low, high, beside = *sorted(needed), NEGLIGIBLE * np.ptp(table.knots)
+        if low < table.knots[0] - beside or high > table.knots[-1] + beside:
+            raise SceneError(
+                f"The {table.what} has rows from {name} = {table.knots[0]:g} to {table.knots[-1]:g}, but is needed "
+                f"from {low:g} to {high:g}: give rows for all of that."
+            )
+    return list(dict.fromkeys(calls))
+
+
+def _floats(what: str, values: Any) -> np.ndarray:
+    """Array of finite floats; raises :class:`SceneError`."""
+    try:
+        out = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise SceneError(f"The {what} are no numbers: give an array, as numpy.loadtxt returns it.") from None
+    if not np.isfinite(out).all():
+        row = next(iter(np.argwhere(~np.isfinite(out))[:, :1].ravel()), 0)
+        raise SceneError(f"Row {row} (from 0) of the {what} is not finite: leave rows without a value out.")
+    return out

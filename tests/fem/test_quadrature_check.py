@@ -1,0 +1,144 @@
+"""Functions that the rule of the elements does not integrate: said, and right on the mesh that is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from math import isfinite, isnan, pi, sqrt, tan
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from classics import SUPPORTS, column
+from diagram.test_sharp_in_state import bent, deflection, ordinates
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from rodfem import Discretization, Inertia, Plan, Scene, Solver, trace
+from rodfem.fem.quadrature_check import QuadratureCheck
+
+pytestmark = pytest.mark.alone
+STEEP, WIDTH = 0.786, 1e-3
+NOT = "does not integrate the equations about s = "
+
+
+def scene(stiffness: Callable[[Any], Any], **more: Any) -> Scene:
+    """A cantilever under a thrust whose bending stiffness is a function of the arclength."""
+    return column(
+        "uneven", SUPPORTS["clamped-free"], (0.0, 6.0), energy=lambda v, k, c: 0.5 * (
+            stiffness(c.s) * (k[0] ** 2 + 9 * k[1] ** 2) + k[2] ** 2
+        ), **more,
+    )  # fmt: skip
+
+
+def checked(rod: Scene, *mesh: int) -> str:
+    """What the check says of the straight state of a rod."""
+    solver = Solver(rod, Discretization("auto", *mesh))
+    return QuadratureCheck(solver.equilibria.system)(solver.equilibrium(1.0).x)
+
+
+def test_a_jump_asks_for_a_break() -> None:
+    """``tan(p a) tan(q b) = q/p``, ``p^2 = P``, ``q^2 = P/2``: beyond a = 0.43 the column is twice as stiff."""
+    load = brentq(lambda P: tan(sqrt(P) * 0.43) * tan(sqrt(P / 2) * 0.57) - sqrt(1 / 2), 2.0, 4.0, xtol=1e-14)
+    jump = lambda s: ufl.conditional(ufl.lt(s, 0.43), 1.0, 2.0)  # noqa: E731
+    blind, seeing = (trace(scene(jump, breaks=breaks), plan=Plan(depth=0)) for breaks in ((), (0.43,)))
+    (first,), (second,) = (d.special("branch point")[:1] for d in (blind, seeing))
+    (said,) = blind.warnings
+    assert f"{NOT}0.43" in said and "breaks=" in said
+    assert isnan(first.error_estimate) and "not estimated" in first.note and abs(first.point.load - load) > 1e-4
+    assert seeing.warnings == [] and abs(second.point.load - load) <= second.error_estimate < 1e-7
+
+
+@pytest.mark.long
+def test_a_layer_of_a_thousandth_asks_for_shorter_elements() -> None:
+    """``theta' = M/B, M' = -P theta`` with ``B = 1 + tanh((s - 0.786)/0.001) / 2``, by Runge and Kutta."""
+    place = lambda s: (s - STEEP) / WIDTH  # noqa: E731
+
+    def moment(P: float) -> float:
+        y, ends = np.array([0.0, 1.0]), (0.0, STEEP - 40 * WIDTH, STEEP + 40 * WIDTH, 1.0)
+        for a, b in pairwise(ends):
+            slope = lambda s, y: [y[1] / (1 + 0.5 * np.tanh(place(s))), -P * y[0]]  # noqa: E731
+            y = solve_ivp(slope, (a, b), y, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+        return float(y[1])
+
+    load = brentq(moment, 1.0, 2.5, xtol=1e-11)
+    steep = scene(lambda s: 1 + 0.5 * ufl.tanh(place(s)))
+    blind = trace(steep, plan=Plan(depth=0))
+    assert abs(blind.special("branch point")[0].point.load - load) > 1e-6
+    assert any(f"{NOT}0.78" in said and "shorter elements" in said for said in blind.warnings)
+    close = STEEP + WIDTH * np.array([-16, -8, -4, -2, 0, 2, 4, 8, 16])
+    vertices = tuple(float(s) for s in (0.0, 0.35, 0.65, *close, 0.86, 1.0))
+    seeing = trace(steep, Discretization("reduced", len(vertices) - 1, 8, vertices), Plan(depth=0))
+    found = seeing.special("branch point")[0]
+    assert abs(found.point.load - load) < found.error_estimate < 1e-7
+    assert seeing.warnings == []
+
+
+@pytest.mark.long
+def test_a_kink_of_an_energy_asks_for_shorter_elements() -> None:
+    """``M = k`` below the curvature 1 and ``M = k + 4 (k - 1)`` beyond: where that is moves with the load."""
+    kink = lambda k: 0.5 * k**2 + 2 * ufl.max_value(k - 1, 0.0) ** 2  # noqa: E731
+    coarse, fine = (bent(kink, mesh) for mesh in ((8, 6), (128, 3)))
+    assert any(NOT in said and "shorter elements" in said for said in coarse.warnings)
+    assert all(isnan(bar) for _, _, bar in ordinates(coarse))
+    for (load, first, _), (_, second, _) in zip(ordinates(coarse), ordinates(fine), strict=True):
+        exact = deflection(load, 1e-9)
+        assert abs(second - exact) < min(1e-6, abs(first - exact))
+    below = bent(kink, (8, 6), (0.5,))[0].special[0]
+    assert below.point.load == 0.5 and isfinite(below.ordinate_error)  # the curvature is below 1 everywhere
+
+
+@pytest.mark.few(3)
+@pytest.mark.parametrize(
+    ("f", "mesh", "said"),
+    [
+        (lambda s: 1 - 0.4 * s**3, (2, 6), False),
+        (lambda s: 1 + 0.5 * ufl.cos(2 * pi * s), (5, 6), False),
+        *((lambda s: 1 + 0.5 * ufl.cos(2 * pi * s), (8, k), False) for k in (1, 2, 3, 4, 8)),
+        (lambda s: 1 + 0.5 * ufl.tanh((s - STEEP) / 0.1), (8, 6), False),
+        (lambda s: 1 + 0.5 * ufl.tanh((s - STEEP) / 1e-3), (8, 6), True),
+        (lambda s: 1 + 0.5 * ufl.tanh((s - STEEP) / 1e-3), (400, 6), False),
+        *((lambda s: ufl.conditional(ufl.lt(s, STEEP), 1.0, 2.0), (8, k), True) for k in (2, 3, 4, 6, 8)),
+        (lambda s: ufl.conditional(ufl.lt(s, 0.73), 1.0, 2.0), (8, 2), True),  # halves agree with it by accident
+        (lambda s: 1 + abs(s - STEEP), (8, 6), True),
+        (lambda s: 1 + 0 * abs(s - STEEP) + s**2, (8, 6), False),
+        (lambda s: 1 + ufl.exp(-(((s - STEEP) / 5e-4) ** 2)), (8, 6), True),
+        (lambda s: 1 + ufl.exp(-(((s - STEEP) / 5e-4) ** 2)), (2000, 2), False),
+    ],
+)  # fmt: skip
+def test_a_straight_rod_shows_its_stiffness(f: Callable[[Any], Any], mesh: tuple[int, int], said: bool) -> None:
+    sentence = checked(scene(f), *mesh)
+    assert bool(sentence) == said
+    assert not said or f"{NOT}0.7" in sentence
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize(
+    "jumping",
+    [
+        lambda of: {"distributed": lambda c: (0.0, 0.0, -c.P * of(c.s))},
+        lambda of: {"potential": lambda x, c: of(x.s) * x.r[0] ** 2},
+        lambda of: {"inertia": Inertia(rho_A=lambda c: of(c.s))},
+        lambda of: {"inertia": Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (of(c.s), 1.0, 1.0))},
+        lambda of: {"potential": lambda x, c: of(x.r[2]) * x.r[0] ** 2},
+    ],
+)
+def test_loads_and_masses_that_jump(jumping: Callable[[Any], dict[str, Any]]) -> None:
+    """Where they jump at the end of an element there is nothing to say."""
+    for at, elements in ((0.43, 8), (0.5, 8)):
+        rod = scene(lambda s: 1.0, **jumping(lambda s, at=at: ufl.conditional(ufl.lt(s, at), 1.0, 3.0)))
+        assert (f"{NOT}0.43" in checked(rod, elements, 6)) == (at == 0.43)
+
+
+def test_a_kilometre_of_pipe() -> None:
+    """A force along it that is sharp about 710 m, between two beds that end at a break."""
+    bed = lambda x, c: 1e-9 * ufl.conditional(ufl.lt(x.s, 500.0), 1.0, 3.0) * x.r[0] ** 2  # noqa: E731
+    push = lambda c: (0.0, 0.0, -c.P * (1 + ufl.tanh((c.s - 710.0) / 0.3)))  # noqa: E731
+    pipe = column(
+        "long", SUPPORTS["clamped-free"], (0.0, 1e-6), interval=(0.0, 1e3), breaks=(500.0,), potential=bed,
+        distributed=push,
+    )  # fmt: skip
+    solver = Solver(pipe, Discretization("auto", 8, 6))
+    sentence = QuadratureCheck(solver.equilibria.system)(solver.equilibrium(5e-7).x)
+    assert "the element from 625 to 750" in sentence and any(f"{NOT}{place}" in sentence for place in (70, 71))
