@@ -112,11 +112,6 @@ def solve_beside(solver: BranchSolver, curve: Curve, s: float, aside: float) -> 
         return solve_at(solver, curve, s + aside), s + aside
 
 
-def midpoint(solver: BranchSolver, a: Point, b: Point) -> Point | None:
-    """Point half-way between two points of a branch; None where it is not between them."""
-    return point_between(solver, a, b, (a.arclength + b.arclength) / 2)
-
-
 def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point | None:
     """Point at arclength ``s`` between the points ``a`` and ``b`` of a branch of ``solver``; None where it is not."""
     try:

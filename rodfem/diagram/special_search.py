@@ -148,8 +148,8 @@ class SpecialSearch:
     def _nodes(self, a: Point, b: Point) -> tuple[Piece, Node, Node]:
         """The piece from ``a`` to ``b`` with its ends, and a border with all modes that pass zero between them.
 
-        Where the last one has become that of others, or lacks one, it is made anew: of the modes nearest zero at the one
-        end or the other, else of those where the index changes.
+        Where the last one has become that of others, or lacks one, it is made anew: of the modes nearest zero at the
+        one end or the other, else of those where the index changes.
         """
         phi = self._prepare(a)
         piece, p, q = self._ends(a, b, phi)

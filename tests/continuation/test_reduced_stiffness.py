@@ -1,0 +1,108 @@
+"""The reduced stiffness matrix, against dense linear algebra; its crossings, against matrices whose zeros are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+from classics import ON_AXIS, column, push
+from golden_cases import cases, trace
+
+from rodfem import Discretization, Solver, pinned
+from rodfem.continuation.crossings import Node, crossings, roots
+from rodfem.continuation.piece import Piece
+from rodfem.linalg.matrices import gathered
+from rodfem.stability.reduced_stiffness import Condensation
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.mark.parametrize("load", [20.0, np.pi**2, np.pi**2 + 1e-9])
+def test_condensation_of_the_saddle_matrix(load: float) -> None:
+    """H is the Schur complement of S on the amplitudes, its index is that of S; also where S is singular."""
+    rod = column("euler", (pinned(), pinned(ON_AXIS, push)), (0.0, 30.0), constants={"B2": 1.3})
+    states = Solver(rod, Discretization("reduced", 4, 3))
+    solver, x = states.equilibria, states.equilibrium(5.0).x
+    solver.system.set_load(x, load)
+    condensation = Condensation(solver)
+    phi = condensation.border(x)
+    found = condensation.at(x, solver.axis, phi)
+    S, M = (gathered(A).toarray() for A in (solver.inertia.at(x).matrix, solver.inertia.metric))
+    B = M @ phi
+    k = phi.shape[1]
+    solved = np.linalg.solve(np.block([[S, B], [B.T, np.zeros((k, k))]]), np.eye(len(S) + k)[:, len(S) :])
+    assert np.allclose(found.H, -solved[len(S) :], atol=1e-9)
+    assert np.allclose(found.W, solved[: len(S)], atol=1e-7 * abs(found.W).max())
+    negative = (np.linalg.eigvalsh(S) < 0).sum() - solver.inertia.constraints
+    assert found.index == negative or abs(load - np.pi**2) < 1e-8
+
+
+@pytest.mark.few(3)
+@pytest.mark.parametrize("name", ["demo hemitropic", "classic pressed arch", "demo ring", "classic tip on a plane"])
+def test_the_rate_is_the_derivative_along_the_branch(name: str) -> None:
+    """Between rows of a branch, phase conditions included: the cubic through two rows is that of the row between."""
+    diagram = trace(cases()[name](), error_bars=False)
+    branch = diagram[-1]
+    rows = [p for p in branch.points if p.tangent is not None and not any(p is s.point for s in branch.special)]
+    solver, (a, b) = diagram.solvers[rows[4].mesh], rows[4:6]
+    condensation = Condensation(solver)
+    piece = Piece(condensation, a, b, condensation.border(a.x))
+    assert a.tangent is not None
+    assert b.tangent is not None
+    p, q = piece.node(a.x, a.tangent), piece.node(b.x, b.tangent)
+    middle = piece.solve(p, q, (p.s + q.s) / 2)
+    assert middle is not None
+    near = piece.solve(p, middle, middle.s - 1e-3 * q.s), piece.solve(middle, q, middle.s + 1e-3 * q.s)
+    assert near[0] is not None
+    assert near[1] is not None
+    difference = (near[1].H - near[0].H) / (near[1].s - near[0].s)
+    assert np.allclose(middle.slope, difference, atol=2e-5 * abs(difference).max())
+
+
+def polynomial(*coefficients: np.ndarray) -> tuple[Node, Node]:
+    """Nodes at 0 and 1 of a matrix polynomial of degree three or less, with an index across the border of two."""
+    A = [np.array(a, dtype=float) for a in coefficients]
+    slope = sum(i * a for i, a in enumerate(A) if i)
+    return Node(0.0, A[0], A[1], 2), Node(1.0, sum(A[1:], A[0]), slope, 2)
+
+
+def test_all_zeros_are_eigenvalues_of_the_pencil() -> None:
+    """Of ``Q^t diag(polynomials) Q``."""
+    rotation = scipy.linalg.expm(np.array([[0, 0.4, -0.7], [-0.4, 0, 0.3], [0.7, -0.3, 0]]))
+    diagonals = np.array([[0.25, 0.1, -0.08], [-1.0, -0.2, 1.0], [0.0, 0.0, -3.0], [0.0, 0.0, 2.0]])
+    a, b = polynomial(*(rotation.T @ np.diag(d) @ rotation for d in diagonals))
+    cubic = np.roots([2.0, -3.0, 1.0, -0.08])
+    expected = [0.25, 0.5, *cubic]
+    found = roots(a, b)
+    for t in expected:
+        assert abs(found - t).min() < 1e-9
+
+
+def test_crossings_and_their_indices() -> None:
+    """One up at 0.3 and one down there: the index stays; a double one at 0.6; none where all is definite."""
+    opposite = polynomial(np.diag([-0.3, 0.3]), np.diag([1.0, -1.0]))
+    (found,) = crossings(*opposite, lambda *_: None, 1e-9, [])
+    assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.3, 3, 3, (2, 2))
+    double = polynomial(np.diag([0.6, 0.6, 1.0]), np.diag([-1.0, -1.0, 0.5]))
+    (found,) = crossings(*double, lambda *_: None, 1e-9, [])
+    assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.6, 2, 4, (3, 2))
+    clear = polynomial(np.diag([1.0, -2.0]), np.diag([3.0, -1.0]))
+    assert crossings(*clear, lambda *_: None, 1e-9, []) == []
+
+
+def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
+    """``(t - 0.5)^2 - d^2`` has its zeros in two halves then, which one state tells from ``(t - 0.5)^2 + d^2``."""
+    for sign in (-1.0, 1.0):
+        exact = lambda t, sign=sign: np.array([[(t - 0.5) ** 2 + sign * 1e-6]])  # noqa: E731
+        asked, misses = [], list[Node]()
+
+        def solve(a: Node, b: Node, s: float, exact=exact, asked=asked) -> Node:
+            asked.append(s)
+            return Node(s, exact(s), np.array([[2 * (s - 0.5)]]), 0)
+
+        a, b = (Node(t, exact(t), np.array([[2 * (t - 0.5)]]), 0) for t in (0.0, 1.0))
+        found = crossings(a, b, solve, 1e-12, misses)
+        assert [round(c.s, 9) for c in found] == ([0.499, 0.501] if sign < 0 else [])
+        assert [(c.before, c.after) for c in found] == ([(0, 1), (1, 0)] if sign < 0 else [])
+        assert len(asked) == 1
+        assert len(misses) == (sign > 0)
