@@ -34,8 +34,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import Found, nearest_event, noise_of
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
-from rodfem.continuation.singular import SingularSystem
-from rodfem.continuation.singular_points import load_uncertainty
+from rodfem.continuation.singular import SingularSystem, load_uncertainty
 from rodfem.continuation.states_between import STEADY, Curve, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct

@@ -26,6 +26,7 @@ import numpy as np
 import scipy.linalg
 
 from rodfem.stability.reduced_stiffness import negative
+from rodfem.tolerances import TINY
 
 AXIS = 0.15
 """Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
@@ -35,13 +36,18 @@ SHORTEST = 1e-8
 """Length of a piece, in the metric, that is not divided."""
 SAME, ALIKE = 1e-12, 0.9
 """Distance of crossings, in the metric, that are one; cosine of the modes of different ones, at most."""
+FINITE = 1e-13
+"""Inverse of a root above which it is none, but round-off of an eigenvalue at infinity."""
 REAL = 1e-6
 """Imaginary part of a root that is real."""
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A state at a place ``s``, with its reduced stiffness, and the derivative of that in s."""
+    """A state at a place ``s``: its reduced stiffness ``H``, the ``slope`` of that in s, both (k, k).
+
+    The index across the border is ``far``, and ``kept`` is what is to be known of the state besides.
+    """
 
     s: float
     H: np.ndarray
@@ -57,7 +63,10 @@ class Node:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Eigenvalues that pass zero at ``s``: vectors (k, m) of H, the index before and after, and the piece."""
+    """Eigenvalues that pass zero at ``s``: ``vectors`` (k, m) of H, the index ``before`` and ``after``.
+
+    The ``piece`` is that between two nodes in which they do.
+    """
 
     s: float
     vectors: np.ndarray
@@ -90,7 +99,7 @@ def roots(a: Node, b: Node) -> np.ndarray:
     """All places t at which the cubic is singular, (3k,) complex."""
     A = coefficients(a, b)
     # congruence: units in which the largest of the matrices is of size one in each direction
-    size = np.sqrt(sum(abs(np.diagonal(X)) for X in A)) + 1e-300
+    size = np.sqrt(sum(abs(np.diagonal(X)) for X in A)) + TINY
     A = [X / np.outer(size, size) for X in A]
     k = len(A[0])
     one, zero = np.eye(k), np.zeros((k, k))
@@ -98,7 +107,7 @@ def roots(a: Node, b: Node) -> np.ndarray:
     right = np.eye(3 * k)
     right[2 * k :, 2 * k :] = A[3]
     p, q = scipy.linalg.eig(left, right, right=False, homogeneous_eigvals=True)
-    keep = abs(q) > 1e-13 * abs(p)
+    keep = abs(q) > FINITE * abs(p)
     return p[keep] / q[keep]
 
 
@@ -122,10 +131,11 @@ def crossings(
     misses: list[Node],
     depth: int = 0,
 ) -> list[Crossing]:
-    """All crossings between two nodes; ``solve`` makes a node between two others.
+    """All crossings between two nodes ``a``, ``b``; ``solve`` makes a node between two others.
 
-    Eigenvalues of several modes that are within the ``tolerance`` of zero at one place pass it there.  ``misses`` gets
-    nodes at which an eigenvalue is nearly zero, and does not pass it.
+    The piece is one of a larger one that was divided ``depth`` times.  Eigenvalues of several modes that are within the
+    ``tolerance`` of zero at one place pass it there.  ``misses`` gets nodes at which an eigenvalue is nearly zero, and
+    does not pass it.
     """
     h = b.s - a.s
     if a.far == b.far and clear(a, b):
@@ -164,7 +174,10 @@ def crossings(
 
 
 def together(a: Node, b: Node, places: np.ndarray, tolerance: float) -> list[list[float]]:
-    """Places of crossings in order, those of different modes grouped that are one point within the ``tolerance``."""
+    """``places`` of crossings between nodes ``a``, ``b`` in order, in groups.
+
+    A group has those of different modes that are one point within the ``tolerance``.
+    """
     out: list[list[float]] = []
     before, fast = np.zeros(len(a.H)), 0.0
     for t in places.tolist():

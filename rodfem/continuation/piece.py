@@ -29,7 +29,7 @@ LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Knot:
-    """A state of the branch: ``x``, the derivative of the curve in the place there, and its reduced stiffness.
+    """A state of the branch: ``x``, the derivative ``slope`` of the curve in the place, and its reduced stiffness.
 
     The ``speed`` is the derivative of the place along the unit tangent.
     """
@@ -43,10 +43,9 @@ class Knot:
 class Piece:
     """The piece from the row ``a`` to the row ``b`` of a branch on one mesh."""
 
-    def __init__(self, condensation: Condensation, a: Point, b: Point, phi: np.ndarray) -> None:
-        """Measure the chord; ``phi`` is the border of all reduced stiffness matrices of the piece."""
-        self.condensation, self.phi, self.begin = condensation, phi, a.arclength
-        self.solver: BranchSolver = condensation.solver
+    def __init__(self, solver: BranchSolver, condensation: Condensation, a: Point, b: Point, phi: np.ndarray) -> None:
+        """Measure the chord; ``phi`` is the border of the matrices that ``condensation`` makes for the ``solver``."""
+        self.solver, self.condensation, self.phi, self.begin = solver, condensation, phi, a.arclength
         self.chord = b.x - a.x
         self.length = self.solver.system.norm(self.chord)
         self.chord.scale(1.0 / self.length)

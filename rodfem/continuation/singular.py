@@ -41,6 +41,7 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.bordered import Bordered
+from rodfem.tolerances import TINY
 
 DIFFERENCE = 1e-4
 """Step of the differences, in the metric."""
@@ -108,7 +109,10 @@ class SingularSystem:
     """The singular system of one mesh, with a border of so many modes."""
 
     def __init__(self, solver: BranchSolver, modes: list[PETSc.Vec], critical: np.ndarray, *, fold: bool) -> None:
-        """Border with M-orthonormal ``modes``, of which the combinations ``critical`` (m, k) are to vanish."""
+        """Border with M-orthonormal ``modes``, of which the combinations ``critical`` (m, k) are to vanish.
+
+        At a ``fold``, or at a branch point; the ``solver`` has the mesh.
+        """
         self.solver, self.system, self.inertia = solver, solver.system, solver.inertia
         self.fold, self.Z = fold, critical
         self.psi = [self.inertia.metric * v for v in modes]
@@ -235,6 +239,14 @@ class SingularSystem:
             bend.axpy(sign / (2 * h), beside.border)
         system.set_load(bend, 0.0)
         return out, bend
+
+
+def load_uncertainty(solver: BranchSolver, found: SingularState) -> float:
+    """Uncertainty of the load of a branch point, by round-off and by what several eigenvalues differ."""
+    matrix = solver.inertia.at(found.x)
+    doubt = max(matrix.noise(v) for v in found.vectors) + found.spread
+    moved = abs(solver.system.scalar(found.last))
+    return moved + doubt / max(abs(found.rate), TINY)
 
 
 def _relaxed(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -17,13 +17,13 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Crossing, Node
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.piece import Piece
-from rodfem.continuation.singular import SingularState, SingularSystem
+from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize
 from rodfem.stability.inertia import Index
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
-from rodfem.tolerances import TINY, round_off
+from rodfem.tolerances import round_off
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
@@ -77,7 +77,7 @@ class Candidate:
     """Where a singular state is expected: ``x``, ``slope`` of the branch, modes near zero, and those that vanish.
 
     These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece.  At a ``crossing``
-    eigenvalues pass zero; otherwise they touch it.
+    eigenvalues pass zero; otherwise they touch it.  ``change`` is that of the index.
     """
 
     x: PETSc.Vec
@@ -113,9 +113,10 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
-    """Candidate where the load turns back between two nodes, and an eigenvalue may touch zero.
+    """Candidate at the place ``s`` where the load turns back between nodes ``p``, ``q`` of a ``piece``.
 
-    The state may be one of more symmetry than its neighbours: its modes are its own.
+    An eigenvalue may touch zero there.  The state may be one of more symmetry than its neighbours: its modes are its
+    own.
     """
     condensation, (x, slope) = piece.condensation, piece.curve(p, q, s)
     reduced = condensation.at(x, _unit(piece.solver, slope), condensation.border(x))
@@ -161,7 +162,7 @@ def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState 
 
 
 def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bool) -> SpecialPoint:
-    """Special point at the singular state ``found`` of a candidate."""
+    """Special point, a ``fold`` or a branch point, at the state ``found`` for a candidate ``at`` some of a ``piece``."""
     place = piece.begin + piece.place(found.x)
     special = singular_point(piece.solver, found, place, at.slope, at.change, fold=fold)
     more = at.critical.shape[1] - len(found.vectors)
@@ -176,7 +177,11 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
 def singular_point(
     solver: BranchSolver, found: SingularState, arclength: float, slope: PETSc.Vec, change: Change, *, fold: bool
 ) -> SpecialPoint:
-    """Special point at a singular state of a branch that has about that ``slope``: null vectors, index and tangent."""
+    """Special point at the singular state ``found`` on a branch of a ``solver`` that has about that ``slope``.
+
+    A ``fold`` or a branch point, at an ``arclength``, with null vectors, tangent, and the index that its ``change``
+    tells.
+    """
     system, x, null = solver.system, found.x, found.vectors
     tangent = _tangent(solver, slope, found, fold=fold)
     system.set_phase(x)
@@ -190,14 +195,6 @@ def singular_point(
     special.unfolding = float("nan") if fold else found.size
     special.test_function = "slope" if fold else "mu"
     return special
-
-
-def load_uncertainty(solver: BranchSolver, found: SingularState) -> float:
-    """Uncertainty of the load of a branch point, by round-off and by what several eigenvalues differ."""
-    matrix = solver.inertia.at(found.x)
-    doubt = max(matrix.noise(v) for v in found.vectors) + found.spread
-    moved = abs(solver.system.scalar(found.last))
-    return moved + doubt / max(abs(found.rate), TINY)
 
 
 def _tangent(solver: BranchSolver, slope: PETSc.Vec, found: SingularState, *, fold: bool) -> PETSc.Vec:

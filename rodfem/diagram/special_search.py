@@ -119,7 +119,7 @@ class SpecialSearch:
 
     def _on(self, point: Point) -> Condensation:
         if point.mesh not in self._condensations:
-            self._condensations[point.mesh] = Condensation(self.meshes.solvers[point.mesh])
+            self._condensations[point.mesh] = Condensation(self.meshes.solvers[point.mesh].inertia)
         return self._condensations[point.mesh]
 
     def _regular(self, point: Point) -> bool:
@@ -176,7 +176,7 @@ class SpecialSearch:
         return self._phi
 
     def _ends(self, a: Point, b: Point, phi: np.ndarray) -> tuple[Piece, Node, Node]:
-        piece = Piece(self._on(b), a, b, phi)
+        piece = Piece(self.meshes.solvers[b.mesh], self._on(b), a, b, phi)
         assert a.tangent is not None
         assert b.tangent is not None
         return piece, piece.node(a.x, a.tangent, self._reduced(a)), piece.node(b.x, b.tangent, self._reduced(b))

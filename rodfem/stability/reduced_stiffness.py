@@ -26,13 +26,13 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import dense_columns
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import shared
 from rodfem.stability.bordered import Bordered
+from rodfem.stability.inertia import Inertia
 from rodfem.stability.round_off import quotient_error
 
 NEAR = 1e-3
@@ -51,7 +51,7 @@ MODES = 6
 
 @dataclass(frozen=True, eq=False)
 class ReducedStiffness:
-    """H of a state with a border, ``rate`` its derivative along the unit tangent, both (k, k), and W (n, k).
+    """Matrix ``H`` of a state with a border, ``rate`` its derivative along the unit tangent, both (k, k), and W (n, k).
 
     ``far`` is the index across the border, ``rotated`` how far the amplitudes are from those of the border's modes, and
     eigenvalues within the ``doubt`` are zero to what round-off and Newton's method leave of them.
@@ -81,17 +81,16 @@ def negative(H: np.ndarray) -> int:
 
 
 class Condensation:
-    """Reduced stiffness matrices of states on the mesh of a solver."""
+    """Reduced stiffness matrices of states on one mesh."""
 
-    def __init__(self, solver: BranchSolver) -> None:
-        """Begin without a border."""
-        self.solver, self.system, self.inertia = solver, solver.system, solver.inertia
-        self.made = 0
+    def __init__(self, inertia: Inertia) -> None:
+        """Begin without a border; the ``inertia`` has the saddle matrix."""
+        self.system, self.inertia = inertia.system, inertia
         self._bordered: dict[int, Bordered] = {}
         self._columns: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
 
     def border(self, x: PETSc.Vec, count: int = MODES) -> np.ndarray:
-        """Modes nearest zero at a state, (own rows, count), fewer if there are no more."""
+        """Modes nearest zero at a state ``x``, (own rows, ``count``), fewer if there are no more."""
         found = self.inertia.at(x)
         found.count()
         with self.inertia.afresh():
@@ -102,8 +101,7 @@ class Condensation:
         return np.asarray(phi @ (turn[:, kept] / np.sqrt(squares[kept])))
 
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
-        """Reduced stiffness matrix at an equilibrium with its unit tangent, for a border."""
-        self.made += 1
+        """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
         inertia, B = self.inertia, self.inertia.weighed(phi)
         found = inertia.at(x)
         try:

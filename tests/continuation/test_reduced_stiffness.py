@@ -24,7 +24,7 @@ def test_condensation_of_the_saddle_matrix(load: float) -> None:
     states = Solver(rod, Discretization("reduced", 4, 3))
     solver, x = states.equilibria, states.equilibrium(5.0).x
     solver.system.set_load(x, load)
-    condensation = Condensation(solver)
+    condensation = Condensation(solver.inertia)
     phi = condensation.border(x)
     found = condensation.at(x, solver.axis, phi)
     S, M = (gathered(A).toarray() for A in (solver.inertia.at(x).matrix, solver.inertia.metric))
@@ -47,8 +47,8 @@ def test_the_rate_is_the_derivative_along_the_branch(name: str) -> None:
     branch = diagram[-1]
     rows = [p for p in branch.points if p.tangent is not None and not any(p is s.point for s in branch.special)]
     solver, (a, b) = diagram.solvers[rows[4].mesh], rows[4:6]
-    condensation = Condensation(solver)
-    piece = Piece(condensation, a, b, condensation.border(a.x))
+    condensation = Condensation(solver.inertia)
+    piece = Piece(solver, condensation, a, b, condensation.border(a.x))
     assert a.tangent is not None
     assert b.tangent is not None
     p, q = piece.node(a.x, a.tangent), piece.node(b.x, b.tangent)

@@ -12,6 +12,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
 from rodfem import (
+    Attachment,
     Discretization,
     Ordinate,
     Parameter,
@@ -240,3 +241,25 @@ def test_the_bend_of_a_broken_pitchfork_with_default_steps() -> None:
     found = [(s.kind, s.negative_before, s.negative_after) for s in branch.special[:-1]]
     assert found == [(FOLD, 0, 1), (BRANCH_POINT, 1, 2), (FOLD, 2, 1)]
     assert [s.point.load for s in branch.special[:-1]] == pytest.approx([53.4992006, 9.7171269, 9.0176032], abs=1e-6)
+
+
+@pytest.mark.parametrize("largest", [0.05, 0.15])
+def test_the_other_sides_are_found_with_long_steps(largest: float) -> None:
+    """A column with a lateral force at a spring: its rows resolve the bends, and an eigenvalue turns back near zero."""
+    rod = Scene(
+        name="imperfect",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.3, 1.0)),
+        parameters={"P": Parameter(0.0), "h": 0.05},
+        load="P",
+        ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))),
+        attachments=(Attachment(0.35, force=lambda c: (c.h, 0.7 * c.h, 0.0), energy=lambda x, c: 10.0 * x.r[0] ** 2),),
+        ordinate=Ordinate("mid", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1]))),
+        span=(0.0, 90.0),
+    )
+    steps = StepControl(first=0.03, largest=largest)
+    found = trace(rod, Discretization("auto", 8, 6), Plan(depth=1, steps=steps, error_bars=False))
+    folds = [s.point.load for branch in found for s in branch.special if s.kind == FOLD]
+    for expected in (5.37, 63.67, 66.86, 39.70):
+        assert min(abs(np.array(folds) - expected)) < 5e-3
