@@ -43,7 +43,7 @@ def criterion_of(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint
     """
     if kind == FLUTTER:
         return Collision(solver, plane)
-    return Singular(solver, plane, near.modes, kind == FOLD, near.left)
+    return Singular(solver, plane, near, fold=kind == FOLD)
 
 
 def errors_of(

@@ -93,25 +93,19 @@ class _Linear:
 class Singular:
     """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
 
-    def __init__(
-        self,
-        solver: StaticSolver,
-        plane: Plane,
-        vectors: list[PETSc.Vec],
-        fold: bool,
-        left: list[PETSc.Vec] | None = None,
-    ) -> None:
-        """Border with the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric.
+    def __init__(self, solver: StaticSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
+        """Border with the null vectors of a point ``near`` the curve, and the left ones where there are such.
 
-        ``solver`` has the mesh, ``plane`` the two parameters; there are as many ``vectors`` as eigenvalues vanish.  At
-        a ``fold`` the single null vector is coupled to the load; otherwise the points are branch points.
+        ``solver`` has the mesh, ``plane`` the two parameters; as many eigenvalues vanish as there are vectors.  At a
+        ``fold`` the single null vector is coupled to the load; otherwise the points are branch points.
         """
+        vectors, left = near.modes, near.left
         self.solver: StaticSolver = solver
         self.system, self.plane, self.fold = solver.system, plane, fold
         self.saddle = solver.inertia if isinstance(solver, BranchSolver) else Inertia(solver.system)
         self.metric = self.saddle.metric
-        self._adopt(vectors, left or [])
-        matrix = self.saddle.at(vectors[0]).matrix  # for its pattern
+        self._adopt(vectors, left)
+        matrix = self.saddle.at(near.x).matrix  # for its pattern
         constraints = None if left else self.saddle.constraints
         self.bordered = Bordered(self.system, matrix, len(vectors), constraints)
         self.turned: Bordered | None = None

@@ -209,6 +209,9 @@ class SingularSystem:
         simple = len(null) == 1 and not self.fold
         directions = self._directions(made.response, null[0], made.table) if simple else []
         orthonormalize(null, self.inertia.metric)
+        seed = self.inertia.seed(0)
+        for v in null:  # of its two directions always the same
+            v.scale(1.0 if seed.dot(v) >= 0 else -1.0)
         load = self.system.scalar(x)
         rest = made.rate, made.spread, modes, made.others, step
         return SingularState(x, load, null, made.response, made.beta, noise, directions, *rest)

@@ -17,6 +17,7 @@ from rodfem.diagram.frequency_mesh import frequency_mesh
 from rodfem.diagram.frequency_rows import FREQUENCIES
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
+from rodfem.diagram.start_index import check_start
 from rodfem.diagram.sweep import Sweep
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
@@ -96,6 +97,8 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         with clock("setup"):
             mesh = _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
+            if plan.accuracy is None:
+                check_start(found, plan.over(scene), recorder.warn)
         asked = as_asked(found.system, plan)
         recorder.system(found.system, plan.accuracy)
         if unused := _not_used(discretization, plan):
