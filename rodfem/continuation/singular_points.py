@@ -162,7 +162,7 @@ def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState 
 
 
 def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bool) -> SpecialPoint:
-    """Special point, a ``fold`` or a branch point, at the state ``found`` for a candidate ``at`` a place of a ``piece``."""
+    """Special point, a ``fold`` or a branch point, at the state ``found`` for the candidate ``at`` in a ``piece``."""
     place = piece.begin + piece.place(found.x)
     special = singular_point(piece.solver, found, place, at.slope, at.change, fold=fold)
     more = at.critical.shape[1] - len(found.vectors)
