@@ -151,7 +151,7 @@ class Condensation:
             rates = (there[0] - there[1]) / (2 * DIFFERENCE)
             for i, weights in phase.broken.items():
                 rate = system.generators.vector(weights @ rates).array_r
-                term = np.outer(inertia.sum(W.T @ inertia.weighed(rate[:, None])[:, 0]), W[system.drifts[i]])
+                term = np.outer(inertia.sum(W.T @ inertia.weighed(rate[:, None])[:, 0]), self._row(W, system.drifts[i]))
                 out += term + term.T
         return _symmetric(out)
 
@@ -171,6 +171,11 @@ class Condensation:
         right.getDenseArray()[:] = B
         factors.solve_all(right, out)
         return np.array(out.getDenseArray())
+
+    def _row(self, columns: np.ndarray, number: int) -> np.ndarray:
+        """Row of a global number of columns, on all ranks."""
+        begin, end = self.inertia.metric.getOwnershipRange()
+        return self.inertia.sum(columns[number - begin] if begin <= number < end else np.zeros(columns.shape[1]))
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
         """Vector of own rows."""
