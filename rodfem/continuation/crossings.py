@@ -28,7 +28,7 @@ import scipy.linalg
 from rodfem.stability.reduced_stiffness import negative
 from rodfem.tolerances import TINY
 
-AXIS = 0.15
+AXIS = 0.4
 """Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
 DEEPEST = 8
 """Divisions of a piece."""
