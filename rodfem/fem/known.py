@@ -105,9 +105,9 @@ class Known:
         return ""
 
     def cut(self, pieces: int) -> Known:
-        """The same on equal pieces of each element, those of the first piece of all elements before others."""
-        out, nodes = copy(self), compat.nodes(self._degree)
-        values = self.along.reshape(len(self.along), self._degree + 1, -1)
+        """The same on equal pieces of this rank's elements, those of the first piece of all elements before others."""
+        out, nodes, own = copy(self), compat.nodes(self._degree), self.along[: self._fields.owned_cells]
+        values = own.reshape(len(own), self._degree + 1, -1)
         bases = [compat.lagrange_basis(self._degree, (piece + nodes) / pieces) for piece in range(pieces)]
         out.along = np.concatenate([(basis @ values).reshape(len(values), -1) for basis in bases])
         return out
