@@ -343,7 +343,7 @@ FAULTS = {
         "tests/continuation/test_index_chain.py",
     ),
     "the-first-mesh-that-does-not-help-is-the-last": Fault(
-        "rodfem/diagram/frequency_mesh.py",
+        "rodfem/diagram/first_mesh.py",
         "(WORSE if least > FINE else 1)",
         "1",
         "tests/adaptivity/test_accuracy_control.py",
@@ -886,25 +886,25 @@ FAULTS = {
         "tests/literature/test_postbuckling.py",
     ),
     "law-of-an-ordinate-that-says-nothing": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "return (QUADRATIC, quadratic, hidden / abs(quadratic.best)) if turns else None",
         "return QUADRATIC, quadratic, hidden / abs(quadratic.best)",
         "tests/literature/test_postbuckling.py",
     ),
     "law-by-one-side-of-a-mixed-ordinate": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "even, odd = parts(ordinates)",
         "even, odd = ordinates[0], ordinates[0]",
         MIXED,
     ),
     "quadratic-term-that-hides-no-linear-one": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "hidden = (abs(linear.best) + linear.missed) / amplitudes[0]",
         "hidden = 0.0",
         MIXED,
     ),
     "a-linear-term-below-round-off-leads": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "and not (turns and linear.best**2 <= SEEN * left * abs(quadratic.best))",
         "and True",
         MIXED,
