@@ -22,9 +22,6 @@ from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 from rodfem.tolerances import same_place
 
-TRIED = 3
-"""Places on an element for each degree: three for each zero of the polynomial."""
-
 
 class Integral(NamedTuple):
     """Integral of a state by a composite rule, and how far it is uncertain."""
@@ -66,7 +63,8 @@ class Inside:
         tried = np.empty(0)
         for p in places:
             i = int(np.searchsorted(vertices, p))
-            tried = np.linspace(vertices[i - 1], vertices[i], TRIED * fields.discretization.degree + 2)[1:-1]
+            # three places for each zero of the polynomial
+            tried = np.linspace(vertices[i - 1], vertices[i], 3 * fields.discretization.degree + 2)[1:-1]
         self._tried = [(float(s), coarse.weights(float(s)), richer.weights(float(s))) for s in tried]
 
     def change(self, x: PETSc.Vec, again: PETSc.Vec) -> float:

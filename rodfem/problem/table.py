@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 CONSTANTS = Variable, Indexed, Sum
 """Expressions that stand for an arclength, or for a constant: in the equations ``base + direction * load``."""
-NEAR = 0.5
-"""Cosine of half the angle between the rotations of two rows, at least: 120 degrees."""
 
 
 class Table:
@@ -203,7 +201,7 @@ class Rotations(Table):
         with np.errstate(invalid="ignore"):
             unit = rows / np.linalg.norm(rows, axis=1)[:, None]
         cosines = (unit[1:] * unit[:-1]).sum(axis=1)
-        if not (far := abs(cosines) >= NEAR).all():
+        if not (far := abs(cosines) >= 0.5).all():  # of half the angle
             raise SceneError(
                 f"The {self.what} turns by more than 120 degrees from row {int(np.argmin(far))} (from 0) to the next, "
                 "or has a zero quaternion there: give rows in between."

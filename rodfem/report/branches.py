@@ -34,8 +34,6 @@ DERIVED = {
     WRITHE: "writhe: Gauss integral of the centreline, to about 1e-4",
 }
 """Ordinates that follow from the shapes, in words."""
-MOST = 3
-"""Left-most frequencies that the page has in view, as the picture."""
 
 
 def branch_data(
@@ -93,7 +91,7 @@ def frequencies_of(branch: Mapping[str, Any]) -> dict[str, Any] | None:
             for special in branch["special"]
             if special["kind"] in SPECIAL
         ],
-        "top": top(branch, MOST),
+        "top": top(branch, 3),
     }
 
 
