@@ -40,9 +40,9 @@ from rodfem.problem.ends import pinned as pinned
 from rodfem.problem.ends import sliding as sliding
 from rodfem.problem.ends import sliding_hinge as sliding_hinge
 from rodfem.problem.events import Event as Event
-from rodfem.problem.path import path as path
 from rodfem.problem.scene import Inertia as Inertia
 from rodfem.problem.scene import Ordinate as Ordinate
 from rodfem.problem.scene import Parameter as Parameter
 from rodfem.problem.scene import Scene as Scene
-from rodfem.problem.tabulated import tabulated as tabulated
+from rodfem.problem.table import path as path
+from rodfem.problem.table import tabulated as tabulated

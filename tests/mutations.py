@@ -157,7 +157,7 @@ FAULTS = {
         "tests/diagram/test_load_at_an_end.py",
     ),
     "asked-row": Fault(
-        "rodfem/diagram/requested_loads.py",
+        "rodfem/diagram/finders.py",
         "found.append(q if q is step.b else replace(q))",
         "found.append(replace(q))",
         "tests/diagram/test_load_at_an_end.py",
@@ -313,13 +313,13 @@ FAULTS = {
         "rodfem/diagram/two_sides.py", "LOCATED = 10.0", "LOCATED = 1e9", "tests/hard/test_fuzz.py"
     ),
     "steps-are-short-from-where-a-branch-goes-back-to": Fault(
-        "rodfem/diagram/shorter_steps.py",
+        "rodfem/diagram/step_check.py",
         "max(piece.largest, piece.since - point.arclength)",
         "piece.largest",
         "tests/diagram/test_shorter_steps.py",
     ),
     "pieces-of-short-steps-are-forgotten": Fault(
-        "rodfem/diagram/shorter_steps.py",
+        "rodfem/diagram/step_check.py",
         "[piece for piece in self._pieces if piece not in inside] + [new]",
         "[new]",
         "tests/diagram/test_shorter_steps.py",
@@ -343,7 +343,7 @@ FAULTS = {
         "tests/continuation/test_index_chain.py",
     ),
     "the-first-mesh-that-does-not-help-is-the-last": Fault(
-        "rodfem/diagram/frequency_mesh.py",
+        "rodfem/diagram/first_mesh.py",
         "(WORSE if least > FINE else 1)",
         "1",
         "tests/adaptivity/test_accuracy_control.py",
@@ -809,7 +809,7 @@ FAULTS = {
         "rodfem/problem/arguments.py", "with ONE_THREAD:", "with RLock():", "tests/app/test_threads.py"
     ),
     "free-rod-drifts-without-a-moment": Fault(
-        "rodfem/fem/drift_forces.py", "SHARE = 0.3", "SHARE = 0.0", "tests/literature/test_free_rods.py"
+        "rodfem/fem/phase.py", "SHARE = 0.3", "SHARE = 0.0", "tests/literature/test_free_rods.py"
     ),
     "modes-without-their-parts-along-free-motions": Fault(
         f"{STABILITY}nonsymmetric.py",
@@ -886,25 +886,25 @@ FAULTS = {
         "tests/literature/test_postbuckling.py",
     ),
     "law-of-an-ordinate-that-says-nothing": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "return (QUADRATIC, quadratic, hidden / abs(quadratic.best)) if turns else None",
         "return QUADRATIC, quadratic, hidden / abs(quadratic.best)",
         "tests/literature/test_postbuckling.py",
     ),
     "law-by-one-side-of-a-mixed-ordinate": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "even, odd = parts(ordinates)",
         "even, odd = ordinates[0], ordinates[0]",
         MIXED,
     ),
     "quadratic-term-that-hides-no-linear-one": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "hidden = (abs(linear.best) + linear.missed) / amplitudes[0]",
         "hidden = 0.0",
         MIXED,
     ),
     "a-linear-term-below-round-off-leads": Fault(
-        f"{CONTINUATION}amplitude_series.py",
+        f"{CONTINUATION}normal_form.py",
         "and not (turns and linear.best**2 <= SEEN * left * abs(quadratic.best))",
         "and True",
         MIXED,
@@ -1063,7 +1063,7 @@ FAULTS = {
     "lowest-rows-are-on-all-meshes": Fault(
         "rodfem/diagram/hidden_events.py", "self._open(replace(self._at(here, a)", "(replace(self._at(here, a)", MISSED
     ),
-    "a-mesh-misses-no-critical-loads": Fault("rodfem/diagram/missed_loads.py", "again > KNOWN * mine", "True", MISSED),
+    "a-mesh-misses-no-critical-loads": Fault("rodfem/diagram/hidden_events.py", "again > 0.5 * mine", "True", MISSED),
     "steps-with-an-event-hide-no-others": Fault(
         "rodfem/diagram/critical_loads.py", "self._beside(told, a, b) if told.events", "told if told.events", MISSED
     ),
@@ -1361,7 +1361,7 @@ FAULTS = {
         "tests/continuation/test_index_chain.py",
     ),
     "options-of-petsc-keep-their-dash": Fault(
-        "rodfem/app/petsc_options.py",
+        "rodfem/app/main.py",
         "word[1:].encode()",
         "word.encode()",
         "tests/app/test_command_lines.py",

@@ -12,8 +12,8 @@ small, and a single value may agree on two meshes by accident, where what it has
 cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
 :data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
 may well exceed.  Of an ordinate that is taken inside of an element ``rho`` is of the largest change over that element,
-in which its error oscillates (:mod:`rodfem.adaptivity.inside`).  Of an event ``d`` is to where its function has the
-same state at more places (:mod:`rodfem.adaptivity.event_sampling`).
+in which its error oscillates (:mod:`rodfem.adaptivity.ordinate_bound`).  Of an event ``d`` is to where its function has
+the same state at more places (:mod:`rodfem.adaptivity.event_sampling`).
 
 The state, its tangent and the null vector are interpolated, so that this costs a few solves.
 """

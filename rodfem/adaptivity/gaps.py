@@ -28,8 +28,6 @@ LEAST = 1e-6
 """Least bound of a step."""
 ARM = 0.05
 """Distance, in the metric, at which the four arms that would meet are looked for."""
-DIFFERS = 0.5
-"""Unfolding parameters that a richer mesh lowers below this share are the mesh's own."""
 
 
 class Gap(Exception):
@@ -60,7 +58,7 @@ class Gaps:
         modes = [richer.transfer(v, state=False) for v in special.null_vectors]
         orthonormalize(modes, richer.system.metric)
         again = SingularSystem(richer.solver, modes, np.eye(len(modes)), fold=False).solve(x)
-        if again is not None and again.size < DIFFERS * found.size + again.noise:
+        if again is not None and again.size < 0.5 * found.size + again.noise:  # lowered by half: the mesh's own
             return None
         return Gap(special, found)
 

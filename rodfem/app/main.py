@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rodfem.app import petsc_options
 from rodfem.app.cli import Parser, complain, sentences, start_petsc
 from rodfem.app.constants import Statement
 from rodfem.app.options import add_options, mesh_of, plan_of
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
 Mesh = Callable[..., "Discretization"]
 KEPT = "the branches that were finished are in"
 """What there is in the folder of a run that was interrupted."""
+NOTED = ("-rodfem_", "-mat_", "-vec_", "-eps_", "-st_", "-ksp_", "-pc_")
+"""Beginnings of options of solvers, all of which have the prefix ``rodfem_`` here, of matrices and of vectors."""
 
 
 def main(
@@ -69,6 +70,25 @@ def main(
         complain(f"Memory is exhausted: use fewer elements or a lower degree; {KEPT} {options.output}.")
 
 
+def unread(words: Sequence[str]) -> list[str]:
+    """Options of solvers, matrices and vectors among ``words``, of those after a lone ``--``, that nothing has read.
+
+    PETSc ignores what it does not know.
+    """
+    from cffi import FFI
+    from petsc4py import PETSc
+
+    ffi = FFI()
+    ffi.cdef("int PetscOptionsUsed(void *options, const char *name, int *used);")
+    library, used = ffi.dlopen(PETSc.__file__), ffi.new("int *")
+    found = []
+    for word in words:
+        if word.startswith(NOTED):
+            library.PetscOptionsUsed(ffi.NULL, word[1:].encode(), used)
+            found += [] if used[0] else [word]
+    return found
+
+
 def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
     """Parser of all options of a rod; raises :class:`InputError` where a constant has the name of another option.
 
@@ -113,8 +133,8 @@ def _run(
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
     run(scene, discretization, plan, options.output, figures=options.figures, words=words)
-    if unread := petsc_options.unread(petsc):
-        Report().warn(f"PETSc did not read the option {', '.join(unread)}: see whether it is spelled right.")
+    if ignored := unread(petsc):
+        Report().warn(f"PETSc did not read the option {', '.join(ignored)}: see whether it is spelled right.")
 
 
 def _mesh(mesh: Mesh | None, options: argparse.Namespace, constants: Mapping[str, Any]) -> Discretization:

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.criterion import Destroyed
+from rodfem.codim2.criterion import SPLIT, Destroyed
 from rodfem.codim2.others import UNSTABLE, beside_cluster
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
 from rodfem.continuation.static_solver import StaticSolver
@@ -39,8 +39,6 @@ INSIDE = 0.01
 """Greatest such step over the distance from what is not admissible, as a mass of zero: ``D`` has a pole there."""
 FEWER = 1e-5
 """Pairs whose ``D`` differ by more than this, over the square of their mean, are not equal by a symmetry."""
-SPLIT = 1.1
-"""Times what the ``D`` of pairs differ by that each may be off: to first order."""
 
 
 class Collision:

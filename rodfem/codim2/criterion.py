@@ -11,6 +11,10 @@ from rodfem.codim2.parameter_plane import LocusPoint, Tangent
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 
+SPLIT = 1.1
+"""Times what eigenvalues, or the ``D`` of pairs, that are equal by a symmetry differ by that each may be off: to first
+order."""
+
 
 class Destroyed(ConvergenceError):
     """The special point changes its kind, or ends, along the locus; the message says why."""

@@ -42,7 +42,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.criterion import Destroyed
+from rodfem.codim2.criterion import SPLIT, Destroyed
 from rodfem.codim2.others import UNSTABLE, VANISHED, beside_zero
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
 from rodfem.continuation.branch_solver import BranchSolver
@@ -61,8 +61,6 @@ IMPERFECT = 1e-7
 """An imperfection above this, of the rod's lowest bending eigenvalue, is not round-off."""
 FEWER = 1e-5
 """Null vectors whose eigenvalues differ by more than this, of the same, are not related by a symmetry."""
-SPLIT = 1.1
-"""Times what such eigenvalues differ by that each may be off: to first order."""
 CANCELLED, ACROSS = 1e-6, 1e-9
 """A coupling with the null vectors that is not zero by symmetry: over the sum of its terms, and over their sizes."""
 OFF, NONE = 1e-5, 1e-12

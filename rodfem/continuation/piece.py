@@ -22,7 +22,8 @@ from rodfem.linalg.orthogonal import combine
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
 
 STRAYED = 0.3
-"""Distance of a state from where it is expected, over that from the nearer end, at which it is another branch's."""
+"""Distance of a state from where it is expected, over that from the nearer end, at which it is another branch's; of a
+singular state over the piece."""
 LEAST = 1e-9
 """That distance, in the metric, which is round-off."""
 

@@ -16,7 +16,7 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Crossing, Node
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.piece import Piece
+from rodfem.continuation.piece import STRAYED, Piece
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
@@ -37,8 +37,6 @@ NEARBY = 1e-2
 """Eigenvalue, over the lowest bending one, of modes that the border of a singular system has as well."""
 ZERO = 1e-6
 """Eigenvalue, over the lowest bending one, that is zero where the load turns back and an eigenvalue touches zero."""
-STRAYED = 0.3
-"""Distance of a singular state from where it is expected, over the piece, at which it is another one."""
 
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:

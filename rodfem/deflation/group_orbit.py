@@ -8,6 +8,10 @@ turning of a rod in its plane, moves positions or angles by a constant.  The orb
 
 with the parts ``u_0``, ``u_w`` of ``D(y)`` of each frequency, polynomials in ``L``.  The square of its distance from a
 state is a function of ``a`` alone, given the products of these six vectors, and least at the nearest point.
+
+Other unknowns may stand for the same rod: ``q`` and ``-q`` are one rotation, and so are an angle and that angle and
+``2 pi``.  An end at which one of them is given tells them apart all along the rod.  Where nothing holds a rotation both
+solve the equations, and are one state.
 """
 
 from __future__ import annotations
@@ -15,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.deflation.same_rotations import same_rotations
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.tolerances import NEGLIGIBLE
@@ -26,6 +30,8 @@ FREQUENCIES = (0.5, 1.0)
 AMOUNTS = np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)
 STILL = 1e-20
 """Squared norm of a part of the velocity, relative to that of the state, below which it is round-off."""
+TURNS = 2 * np.pi * np.array([1.0, -1.0, 2.0, -2.0])
+"""By how much the angles of equal states of a planar rod may differ: a search winds it up no farther."""
 
 
 class Orbit:
@@ -84,6 +90,24 @@ class Orbit:
                 break
             a -= float(toward @ slope / curvature)
         return a
+
+
+def same_rotations(system: System, x: PETSc.Vec) -> list[PETSc.Vec]:
+    """States of other unknowns, but of the rotations of ``x``, that the ``system`` has; none of a closed rod.
+
+    Angles of a planar rod are one or two turns to either side.
+    """
+    f, state = system.fields, system.at(x)
+    field = "angle" if "angle" in f.dofs else "q"
+    held = bool((f.number[f.dofs[field]] < 0).any())
+    if system.scene.closed or system.comm.allreduce(held, op=MPI.LOR):
+        return []
+    values = state.named[field]
+    others = [-values] if field == "q" else [values + turn for turn in TURNS]
+    out = [system.vector(f.filled(state.named | state.scalars | {field: other}), state.drifts) for other in others]
+    for image in out:
+        system.set_load(image, system.scalar(x))
+    return out
 
 
 class Orbits:

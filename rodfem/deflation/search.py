@@ -1,11 +1,11 @@
 r"""Deflation: further equilibria at one load, whether or not a branch connects them to those that are known.
 
-Each try starts from a smooth seeded guess (:mod:`rodfem.deflation.guesses`) and iterates by Newton's method on
-equations from which the known equilibria are divided out (:mod:`rodfem.deflation.deflated_newton`).  What a symmetry
-makes of a known equilibrium is known too: a continuous symmetry makes it a circle
-(:mod:`rodfem.deflation.group_orbit`), discrete ones a few isolated images
-(:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
-new and admissible.  States of known branches are found by :mod:`rodfem.deflation.known`.
+Each try starts from a smooth seeded guess, a known state that is turned, and iterates by Newton's method on equations
+from which the known equilibria are divided out (:mod:`rodfem.deflation.deflated_newton`).  What a symmetry makes of a
+known equilibrium is known too: a continuous symmetry makes it a circle (:mod:`rodfem.deflation.group_orbit`), discrete
+ones a few isolated images (:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain
+Newton method, and kept if it is new and admissible.  States of known branches are found by
+:mod:`rodfem.deflation.known`.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
@@ -22,9 +23,10 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
-from rodfem.deflation.guesses import turned_over, turned_state
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
+from rodfem.fem.system import System
+from rodfem.problem.end import TURNS
 from rodfem.tolerances import DRIFT, SAME_LOAD
 
 IMAGE = 1e-12
@@ -183,6 +185,54 @@ class Deflation(DeflatedNewton):
         if point.drift > DRIFT * solver.inertia.scale or not point.stretch > 0:
             return None, INADMISSIBLE
         return point, NEW
+
+
+def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
+    """Known state turned by a smooth rotation that respects clamps, its vector of that root mean square size.
+
+    The vector is a random combination of the lowest four waves along the rod that vanish where directors are clamped.
+    It depends on the nodes and the seed only, not on how the rod is shared among ranks.  ``base`` is the known state of
+    the ``system``, ``amplitude`` the size in radian, ``seed`` that of the random numbers.
+    """
+    f = system.fields
+    rng = np.random.default_rng(seed)
+    weights = rng.normal(size=(4, 3)) / np.arange(1, 5)[:, None]
+    a, b = system.scene.interval
+    x = (f.coordinates(f.discretization.degree) - a) / (b - a)
+    left, right = (end.fixed_rotation is not None for end in system.scene.sides)
+    waves = _waves(x, left, right)
+    dense = _waves(np.linspace(0.0, 1.0, 401), left, right)
+    size = float(np.sqrt(np.mean(np.sum((dense @ weights) ** 2, axis=-1))))
+    state = system.at(base)
+    turned = f.turning.turned(state.turned, waves @ weights * (amplitude / size))
+    return system.vector(f.filled(state.named | {f.turning.name: turned}))
+
+
+def turned_over(system: System, base: PETSc.Vec) -> list[PETSc.Vec]:
+    """Known state turned as a whole by half a turn about d1, and about d2, where both ends turn freely; else none.
+
+    Waves along the rod never get there: a rod between two pins may hang below the one that it stands on.  Newton's
+    method moves the ends to where they are held.  ``base`` is the known state of the ``system``.
+    """
+    if system.scene.closed or any(end.turning != TURNS for end in system.scene.sides):
+        return []
+    f, state = system.fields, system.at(base)
+    out = []
+    for axis in np.eye(3)[:2]:
+        vector = np.broadcast_to(np.pi * axis, (*state.turned.shape[:-1], 3))
+        out.append(system.vector(f.filled(state.named | {f.turning.name: f.turning.turned(state.turned, vector)})))
+    return out
+
+
+def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
+    """Four waves at ``x`` in [0, 1], (..., 4), that vanish at clamped ends; periodic where none is clamped."""
+    k = np.arange(1, 5)
+    x = x[..., None]
+    if left and right:
+        return np.sin(np.pi * k * x)
+    if left or right:
+        return np.sin(np.pi * (k - 0.5) * (x if left else 1 - x))
+    return np.where(k % 2, np.sin(2 * np.pi * ((k + 1) // 2) * x), np.cos(2 * np.pi * ((k + 1) // 2) * x))
 
 
 def find_equilibria(

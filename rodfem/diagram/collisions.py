@@ -30,8 +30,6 @@ SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
 JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
-COMMON = 0.5
-"""Share of a subspace in another above which both are one collision's."""
 
 
 @dataclass
@@ -138,7 +136,7 @@ class Collisions:
             told.events.append(event)
             return
         known = same[0]
-        if known.change * event.change > 0 and self._common(known, event, here) > COMMON:
+        if known.change * event.change > 0 and self._common(known, event, here) > 0.5:
             told.doubts.append(
                 f"Two pairs at {self._load} = {here.load:.6g} end in one collision at {event.load:.8g}: use a smaller "
                 "range."

@@ -1,23 +1,29 @@
-"""The events that a plan asks for, step by step along a branch."""
+"""The events that a plan asks for, step by step along a branch: all zeros of a number of the state, pairs of them, too.
+
+The number is a function of the place on a curve that is interpolated between the rows, which costs no solves; its zeros
+are located there (:mod:`rodfem.continuation.event_zeros`).  Where it is zero, or comes near it, equilibria are solved
+for, and the curve is led through them, until its zeros are those of equilibria.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_location import Found, event_at
-from rodfem.continuation.event_samples import NODES, WIDEST
-from rodfem.continuation.event_search import Happens, search
+from rodfem.continuation.event_location import Found, OnCurve, event_at
+from rodfem.continuation.event_samples import NODES, WIDEST, Piece
 from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.prediction import between
+from rodfem.continuation.states_between import EventCurve
 from rodfem.diagram.step import Step
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.problem.events import Event
-from rodfem.tolerances import round_off
+from rodfem.tolerances import INSIDE, round_off
 
 if TYPE_CHECKING:
     from rodfem.continuation.observer import Observer
@@ -153,3 +159,52 @@ def _named(solver: BranchSolver, event: Event, point: Point, along: float) -> Sp
     """A special point that has the name of its event, at a point whose arclength is known up to ``along``."""
     left = (abs(point.slope) * along if along else 0.0) + round_off(point.load, solver.units.load)
     return SpecialPoint(EVENT, point, point.negative, point.negative, left, note=event.name, event=event)
+
+
+class Happens(NamedTuple):
+    """What an event does in a step: where it is ``found``, and pieces on which it is ``unresolved``.
+
+    At the ``first`` and at the ``last`` row it may be zero, to these distances; on pieces it may be ``still`` zero.
+    The zeros have ``places``, arclengths, those at rows and known ones, too.
+    """
+
+    found: list[Found]
+    unresolved: list[Piece]
+    first: float | None = None
+    last: float | None = None
+    still: Sequence[Piece] = ()
+    places: Sequence[float] = ()
+
+
+def search(
+    solver: BranchSolver,
+    event: Event,
+    rows: tuple[Point, Point],
+    f: Callable[[float], float],
+    ends: tuple[float, float],
+    last: float,
+) -> Happens:
+    """Find what an ``event`` does between two ``rows``, at which it has the values ``ends``.
+
+    ``f(s)`` is its value at the state interpolated at arclength ``s``; the ``last`` zero before was at this one.
+    ``solver`` has the mesh.  Raises :class:`ConvergenceError` where an equilibrium is not found.
+    """
+    value = OnCurve(event, EventCurve(solver, *rows))
+    (a, b), margin = value.places, INSIDE * value.curve.length
+    zeros = value.zeros(f, ends, known=a - last <= margin)
+    if zeros is None:
+        return Happens([], [], still=[(a, b)])
+    found, still, along = list[Found](), list[Piece](), dict[float, float]()
+    unresolved = list(zeros.samples.unresolved)
+    for zero in zeros.found:
+        if value.still(zero):
+            piece = max(zero.low, a), min(zero.high, b)
+            (still if value.zero_on(piece) else unresolved).append(piece)
+        elif value.inside(zero):
+            found.append(value.found(zero))
+        else:
+            along[a if zero.s - a < b - zero.s else b] = max(margin, zero.high - zero.low)
+    if a - last <= max(margin, along.get(a, 0.0)):
+        along.pop(a, None)
+    places = [zero.s for zero in zeros.found]
+    return Happens(found, unresolved, along.get(a), along.get(b), still, places)

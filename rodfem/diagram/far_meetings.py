@@ -32,8 +32,6 @@ from rodfem.stability.census import Census
 from rodfem.stability.frequencies import ALIKE, REAL, Frequencies, groups
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
-RESOLVED = 0.5
-"""Part of a mesh's eigenvalues, nearest to zero, that are compared."""
 FOUND = 1e-4
 """Relative distance within which an eigenvalue is found again."""
 EDGE = 0.1
@@ -100,7 +98,7 @@ class FarMeetings:
 def _meetings(looks: list[Look]) -> list[tuple[int, Meeting]]:
     """What may meet on the way from the second of three looks to each of the others, with the place of that."""
     of, T = looks[1].census.motions, [look.census.motions.operator for look in looks]
-    places = np.setdiff1d(np.arange(int(RESOLVED * len(of.nu))), looks[1].census.nearer)
+    places = np.setdiff1d(np.arange(len(of.nu) // 2), looks[1].census.nearer)  # the half nearest to zero
     if not len(places) or not T[0].shape == T[1].shape == T[2].shape:  # sections have mass at some loads only
         return []
     Y, Z = of.vectors(places)

@@ -5,11 +5,15 @@ comes back.  What is smooth there and vanishes at the critical loads, the square
 the eigenvalue itself, has a lowest value between the rows.  Where a parabola through it at three rows comes near zero
 the lowest value is sought, by equilibria.  Eigenvalues that cross have a lowest value of zero, and are left alone: they
 have vectors of their own there, where those of two that meet become one.
+
+A mesh may miss a pair: two frequencies that come near one another and part again, or one that comes near zero, may
+meet, or pass through it, on a mesh whose error is less.  No row of the sweep shows it, nor a special point; where they
+are nearest a richer mesh tells whether they meet.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,8 +21,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.branch import Branch
 from rodfem.continuation.complex_pairs import upper
 from rodfem.diagram.side import Side
+from rodfem.errors import ConvergenceError
 from rodfem.roots import lowest_between
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
 from rodfem.stability.cluster_noise import noise_of
@@ -228,3 +234,29 @@ def _several(pencil: NonsymmetricPencil, load: float, sign: int, cluster: Cluste
     crossing = noise.square < ONE * max(abs(value), equal)
     hidden = value <= noise.of_discriminant and not crossing
     return Lowest(load, sign, value, here.cluster, below or hidden, crossing)
+
+
+def missed_loads(
+    branch: Branch, near: list[Lowest], richer: Callable[[PETSc.Vec, float, Cluster], Measured], name: str
+) -> Iterator[str]:
+    """Yield a sentence on each load of a sweep's ``branch`` at which critical loads may be missing.
+
+    ``near`` are those at which something comes near zero.  On a ``richer`` mesh a cluster is measured near a state, at
+    a load, which has a ``name``.
+    """
+    for lowest in near:
+        row = min(branch.points, key=lambda p: abs(p.load - lowest.load))
+        single, mine = lowest.cluster.size == 1, lowest.value - lowest.below
+        try:
+            again = lowest.measured(richer(row.x, lowest.load, lowest.cluster)) - lowest.below
+            found = f"{mine:.2g} on this mesh, and {again:.2g} on a richer one"
+            if again > 0.5 * mine:  # where less remains its sign is in doubt
+                continue
+        except ConvergenceError:
+            found = f"{mine:.2g} on this mesh, and not found on a richer one"
+        what = "an eigenvalue is nearest to zero" if single else "two frequencies are nearest to one another"
+        measure = "its distance" if single else "the square of half the difference of their omega^2"
+        yield (
+            f"Near {name} = {lowest.load:.8g} {what}: {measure} is {found}. A pair of critical loads may be missing "
+            "there, use more elements."
+        )

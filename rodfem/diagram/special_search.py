@@ -26,8 +26,7 @@ from rodfem.continuation.singular_points import (
     solved,
     special_point,
 )
-from rodfem.diagram.shorter_steps import ShorterSteps, Unresolved
-from rodfem.diagram.step_check import StepCheck
+from rodfem.diagram.step_check import ShorterSteps, StepCheck, Unresolved
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
 DIP = 0.1

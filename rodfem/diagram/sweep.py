@@ -27,8 +27,8 @@ from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load
+from rodfem.diagram.hidden_events import missed_loads
 from rodfem.diagram.load_steps import LoadSteps
-from rodfem.diagram.missed_loads import missed_loads
 from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.quadrature import Quadrature

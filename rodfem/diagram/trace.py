@@ -13,11 +13,10 @@ from rodfem.continuation.observer import Observer, Recorder
 from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.frequency_mesh import frequency_mesh
+from rodfem.diagram.first_mesh import check_start, frequency_mesh
 from rodfem.diagram.frequency_rows import FREQUENCIES
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
-from rodfem.diagram.start_index import check_start
 from rodfem.diagram.sweep import Sweep
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization

@@ -33,9 +33,9 @@ from rodfem.diagram.images import image_of
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.quadrature import Quadrature
-from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
 from rodfem.diagram.step import Step
+from rodfem.diagram.step_check import Unresolved
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
 from rodfem.tolerances import DRIFT

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -11,10 +11,14 @@ from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.fem.compiled_shape import CompiledShape
 from rodfem.fem.fields import LOAD
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
+from rodfem.forms.kinematics import UNDEFORMED
+from rodfem.linalg.compiled import Memory, buffer, module
+
+if TYPE_CHECKING:
+    from rodfem.fem.fields import Fields
 
 INWARDS = 1e-9
 """Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
@@ -58,6 +62,53 @@ class Gauss:
         """Integrals of the Lagrange basis on the points from 0 to ``x`` of shape (m,): (m, points)."""
         antiderivative = legendre.legint(self._coefficients, lbnd=-1, axis=0) / 2
         return legendre.legval(2 * np.asarray(x, dtype=float) - 1, antiderivative).T
+
+
+class CompiledShape:
+    """Slopes and least stretch by compiled code (``shape.c``) for the owned cells of one mesh.
+
+    Each row of a branch asks for both; by arrays they cost as much as a factorisation.
+    """
+
+    def __init__(self, fields: Fields, points: np.ndarray) -> None:
+        """Hand over the degrees of freedom of the ``fields`` and the Gauss ``points`` in [0, 1]."""
+        code = module("fem/shape")
+        self._lib, self._ffi, self._memory = code.lib, code.ffi, Memory(code.ffi)
+        scene, k, owned = fields.scene, fields.discretization.degree, slice(0, fields.owned_cells)
+        self._shape = (fields.owned_cells, len(points), 3)
+        self.spacing = 0.5 / k
+        """Distance of the samples in a cell, [-1, 1]."""
+        shape = self._pointer = self._ffi.new("Shape *")
+        shape.cells, shape.points, shape.nodes, shape.strain_nodes = fields.owned_cells, len(points), k + 1, k
+        shape.normal = -1 if scene.normal is None else scene.normal
+        shape.strains, shape.samples = len(scene.free_strains), 4 * k + 1
+        strains = fields.dofs["v"][owned] if "v" in fields.dofs else np.zeros(0)
+        integers = {
+            "component": np.array(scene.free_strains),
+            "rotation": fields.dofs[fields.turning.name][owned],
+            "strain": strains,
+        }
+        doubles = {
+            "held": [0.0 if i in scene.free_strains else x for i, x in enumerate(UNDEFORMED)],
+            "basis": compat.lagrange_basis(k, points),
+            "strain_basis": compat.lagrange_basis(k - 1, points),
+            "sample_basis": compat.lagrange_basis(k - 1, np.linspace(0, 1, shape.samples)),
+        }
+        for kind, arrays in ((np.int32, integers), (float, doubles)):
+            given = {name: np.ascontiguousarray(values, dtype=kind) for name, values in arrays.items()}
+            self._memory.point(shape, **given)
+
+    def slopes(self, local: np.ndarray) -> np.ndarray:
+        """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3), of ``local`` values."""
+        out = np.empty(self._shape)
+        self._lib.slopes(self._pointer, buffer(self._ffi, local), buffer(self._ffi, out))
+        return out
+
+    def least_stretch(self, local: np.ndarray) -> tuple[float, int, int]:
+        """Least stretch ``v3``, an unknown, at equally spaced samples of all cells; its cell, and the sample there."""
+        place = self._ffi.new("int[2]")
+        value = self._lib.least(self._pointer, buffer(self._ffi, local), place)
+        return value, place[0], place[1]
 
 
 class Shape:

@@ -23,16 +23,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.fem.assembly import Places, matrix_places, vector_places
+from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_pattern, new_matrix, vector_places
 from rodfem.fem.compiled_newton import CompiledNewton
-from rodfem.fem.drift_forces import DriftForces
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
 from rodfem.fem.generators import Generators
 from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.parameters import Line
-from rodfem.fem.phase import no_phase, phase_at
-from rodfem.fem.sparsity import bordered_pattern, metric_pattern, new_matrix
+from rodfem.fem.phase import DriftForces, no_phase, phase_at
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Symmetry, capable, may_slide
 from rodfem.fem.values import NodalValues

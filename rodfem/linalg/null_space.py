@@ -1,8 +1,9 @@
 r"""Orthonormal bases of the null space of the constraints, in factored form.
 
 A full Q-R factorisation ``C = (Q1 Q2) (R; 0)`` of the constraints' gradients ``C`` (m, p) gives in ``Q2`` (m, m - p) an
-orthonormal basis of the kernel of ``C^t``.  It is kept as Householder reflections, see
-:mod:`rodfem.linalg.householder`, and no matrix of size m x m is ever made.
+orthonormal basis of the kernel of ``C^t``.  It is kept as Householder reflections, and no matrix of size m x m is ever
+made.  Stacks of small ones are applied at once, in compact WY form, ``I - V T V^t`` with T upper triangular: R.
+Schreiber & C. Van Loan, SIAM J. Sci. Stat. Comput. 10 (1989) 53-57.
 
 * Dense columns (integral constraints): one block of reflections over all rows, products in O(m p).
 * Sparse columns (pointwise constraints), in groups along the rod such that a row couples two neighbouring groups at
@@ -23,12 +24,40 @@ import numpy as np
 import scipy.sparse as sp
 
 from rodfem.errors import InputError
-from rodfem.linalg.householder import Reflections, factor
 
 DEPENDENT = 1e-12
 """A column whose part orthogonal to the others is smaller than this, relative to the largest entry, depends on them."""
 NEGLIGIBLE = 1e-14
 """Entries of ``C`` below this, relative to the largest, are zero."""
+
+
+@dataclass(frozen=True)
+class Reflections:
+    """A stack of b orthogonal matrices ``I - V T V^t``, each on its own rows: rows (b, r), V (b, r, c), T (b, c, c)."""
+
+    rows: np.ndarray
+    V: np.ndarray
+    T: np.ndarray
+
+    def apply(self, x: np.ndarray, *, transposed: bool) -> None:
+        """Multiply ``x`` (m,) or (m, w) by all of them, in place."""
+        part = x[self.rows].reshape(*self.rows.shape, -1)
+        T = np.swapaxes(self.T, 1, 2) if transposed else self.T
+        part -= self.V @ (T @ (np.swapaxes(self.V, 1, 2) @ part))
+        x[self.rows] = part.reshape(*self.rows.shape, *x.shape[1:])
+
+
+def factor(rows: np.ndarray, blocks: np.ndarray) -> tuple[Reflections, np.ndarray]:
+    """Q-R factorisations of a stack of matrices (b, r, c): the reflections and the factors R (b, min(r, c), c)."""
+    h, tau = np.linalg.qr(blocks, mode="raw")
+    h = np.swapaxes(h, 1, 2)
+    size = tau.shape[1]
+    V = np.tril(h[:, :, :size], -1)
+    V[:, np.arange(size), np.arange(size)] = 1.0
+    V *= (tau != 0)[:, None, :]
+    inverse = np.triu(np.swapaxes(V, 1, 2) @ V, 1)
+    inverse[:, np.arange(size), np.arange(size)] = 1.0 / np.where(tau != 0, tau, 1.0)
+    return Reflections(rows, V, np.linalg.inv(inverse)), np.triu(h[:, :size, :])
 
 
 @dataclass

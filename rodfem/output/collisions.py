@@ -18,8 +18,6 @@ from rodfem.continuation.kinds import FLUTTER
 
 SIDE, DRAWN = 5, 3
 """Rows on each side of a flutter load that the splines pass through, and between which of them curves have points."""
-LEAST = 2
-"""Rows on each side without which nothing is drawn in between."""
 SHARES = (np.arange(1, 9) / 8) ** 2
 """Where the step next to a flutter load has points, in parts of it from there."""
 JUST = 1e-5
@@ -74,7 +72,7 @@ def _beside(
     for step, other in ((-1, 1), (1, -1)):
         met = {n for n, real in sides[step].items() if real} & {n for n, real in sides[other].items() if not real}
         rows = {at: _rows(members, met, row, at, real) for at, real in ((step, True), (other, False))}
-        if len(met) < 2 or len(met) % 2 or min(map(len, rows.values())) < LEAST:
+        if len(met) < 2 or len(met) % 2 or min(map(len, rows.values())) < 2:
             continue
         used = np.array([*rows[step], row, *rows[other]])
         used = used[np.argsort(loads[used])]

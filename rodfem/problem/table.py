@@ -1,5 +1,8 @@
 """Functions that a scene has as tables: piecewise cubics of one of its constants, or of the arclength.
 
+A stiffness, a natural curvature, a load or a mass per length follows one along the rod (:func:`tabulated`), a position,
+a rotation or a force one as the load grows (:func:`path`).
+
 With a number a table returns numbers.  In the equations it returns an :class:`Entry`, an expression of UFL that stands
 for the value; :mod:`rodfem.fem.known` says what the compiled forms read there.  So a table of ten thousand rows is no
 longer an expression than one of two.
@@ -11,6 +14,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import ufl
 from ufl.classes import Indexed, Label, Sum, Variable
 from ufl.core.expr import Expr
 
@@ -21,7 +25,6 @@ from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
-
 
 CONSTANTS = Variable, Indexed, Sum
 """Expressions that stand for an arclength, or for a constant: in the equations ``base + direction * load``."""
@@ -159,6 +162,84 @@ def tables_of(scene: Scene) -> list[tuple[Table, str]]:
                 f"from {low:g} to {high:g}: give rows for all of that."
             )
     return list(dict.fromkeys(calls))
+
+
+def tabulated(s: Any, values: Any, order: int = 1) -> Table:
+    """Function of the arclength through the rows of a table: call it with ``c.s``.
+
+    It stands for a stiffness, a curvature, a load or a mass per length in the functions of a scene::
+
+        s, EI = np.loadtxt("stiffness.txt", unpack=True)
+        stiffness = rodfem.tabulated(s, EI)
+        energy = lambda v, k, c: bending_and_twist(k, (stiffness(c.s), 1.0, 1.0))
+
+    Parameters
+    ----------
+    s
+        Arclengths (n,), increasing, from one end of the rod to the other.
+    values
+        A number for each, (n,), or a vector, (n, m): then the function returns a tuple.
+    order
+        1: linear in between; 3: a cubic spline with two continuous derivatives, whose first two pieces, and last two,
+        are one cubic each ("not a knot": de Boor, A Practical Guide to Splines, 1978, chapter IV).
+
+    Raises :class:`SceneError` for what is no such table.
+    """
+    if order not in (1, 3):
+        raise SceneError(f"A table along the rod has the order {order!r}: choose 1 (linear) or 3 (a cubic spline).")
+    return Table("table along the rod", s, values, smooth=order == 3)
+
+
+class Rotations(Table):
+    """Quaternions of unit norm: of the components, which are interpolated, those of the unit vector count."""
+
+    def adjusted(self, rows: np.ndarray) -> np.ndarray:
+        """Give each row unit norm, and the sign by which it is near the one before.
+
+        Raises :class:`SceneError` where it is not near.
+        """
+        with np.errstate(invalid="ignore"):
+            unit = rows / np.linalg.norm(rows, axis=1)[:, None]
+        cosines = (unit[1:] * unit[:-1]).sum(axis=1)
+        if not (far := abs(cosines) >= 0.5).all():  # of half the angle
+            raise SceneError(
+                f"The {self.what} turns by more than 120 degrees from row {int(np.argmin(far))} (from 0) to the next, "
+                "or has a zero quaternion there: give rows in between."
+            )
+        return unit * np.append(1.0, np.cumprod(np.sign(cosines)))[:, None]
+
+    def __call__(self, x: Any) -> Any:
+        """Quaternion at a constant of the scene, or at a number."""
+        q = super().__call__(x)
+        norm = ufl.sqrt(sum(a**2 for a in q))
+        return tuple(a / norm if isinstance(a, ufl.core.expr.Expr) else float(a / norm) for a in q)
+
+
+def path(t: Any, values: Any, smooth: bool = True) -> Table:
+    """Function of the load through the rows of a table: call it with that constant.
+
+    It moves an end, turns it, or is a force::
+
+        t, *columns = np.loadtxt("gripper.txt", unpack=True)
+        place = rodfem.path(t, np.transpose(columns))
+        ends = (clamped(), clamped(lambda c: place(c.t)))
+
+    Parameters
+    ----------
+    t
+        Values of the constant, (n,), increasing, over its whole range.
+    values
+        A number for each, (n,); a position or a force, (n, 3); or a rotation, (n, 4), a quaternion with the scalar
+        first.  Quaternions get the signs by which each is near the one before, are interpolated by their components,
+        and normalised then: give rows that are less than 120 degrees apart.
+    smooth
+        True: a cubic spline with two continuous derivatives.  False: linear in between; a branch has a point exactly at
+        each corner, and no step across one.
+
+    Raises :class:`SceneError` for what is no such table.
+    """
+    kind = Rotations if np.ndim(values) == 2 and np.shape(values)[1] == 4 else Table
+    return kind("path of the load", t, values, smooth=smooth)
 
 
 def _floats(what: str, values: Any) -> np.ndarray:

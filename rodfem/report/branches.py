@@ -1,4 +1,4 @@
-"""Branches of ``diagram.json`` as the page draws them: columns, pieces of one index, special points, words."""
+"""Branches of ``diagram.json`` as the page draws them: columns, pieces, special points, frequencies, words."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from scipy.interpolate import CubicSpline
 from rodfem.continuation.kinds import KINDS
 from rodfem.modes.modes import RIGID
 from rodfem.output.endings import endings
+from rodfem.output.frequency_curves import curves, ranges_of, top
+from rodfem.output.plot_frequencies import SPECIAL
 from rodfem.output.plot_pieces import pieces_of
 from rodfem.output.smooth import between
-from rodfem.report.frequencies import frequencies_of
 from rodfem.report.packing import plain
 from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
@@ -65,6 +66,32 @@ def branch_data(
         "omega2": _without_noise(columns),
         "frequencies": frequencies_of(branch),
         "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
+    }
+
+
+def frequencies_of(branch: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Curves, unstable ranges and special points of a branch; None where no frequencies are recorded."""
+    columns = branch["columns"]
+    if not columns.get("omega2"):
+        return None
+    return {
+        "curves": [
+            {
+                "motion": curve.motion,
+                "colour": curve.colour,
+                "load": plain(curve.loads),
+                "rows": curve.rows.tolist(),
+                "parts": {"frequency": plain(curve.real)} | {name: plain(part) for name, part in curve.parts.items()},
+            }
+            for curve in curves(columns, branch["special"])
+        ],
+        "ranges": [found._asdict() for found in ranges_of(branch)],
+        "marks": [
+            {"kind": special["kind"], "row": special["row"], "frequency": abs(complex(special["omega2"])) ** 0.5}
+            for special in branch["special"]
+            if special["kind"] in SPECIAL
+        ],
+        "top": top(branch, 3),
     }
 
 

@@ -16,11 +16,22 @@ from rodfem.output.digits import with_unit
 from rodfem.output.sheet import mesh_in_words, ordinate_in_words
 from rodfem.report.branches import DERIVED, ordinates_of
 from rodfem.report.labels import html_of, plain_of
-from rodfem.report.loaded import Loaded
 from rodfem.report.loci import loci_of
 from rodfem.report.rods import rods_of
 
 NEEDED = ("parameter", "parameter_label", "constants", "branches", "meshes", "discretization", "ordinate", "range")
+
+
+class Loaded(dict[str, Any]):
+    """Entries of a group by name, arrays and groups alike; ``attrs``, ``name`` and ``file`` are those of the group.
+
+    One reading for all rows, where each row would read a dozen small arrays.
+    """
+
+    def __init__(self, group: Any) -> None:
+        """Read a group and all below it."""
+        super().__init__({name: Loaded(x) if isinstance(x, h5py.Group) else x[()] for name, x in group.items()})
+        self.attrs, self.name, self.file = dict(group.attrs), group.name, group.file
 
 
 def payload_of(folder: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Shapes, supports and modes of all states, as the page draws them."""
+"""Shapes, supports, modes and profiles along the rod of all states, as the page draws them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from rodfem.modes.modes import rows_with_modes
 from rodfem.modes.recorded import read as recorded
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_images import is_traced
+from rodfem.output.profiles import POINTS, PROFILES, profiles_of
 from rodfem.output.sheet import PALETTE
 from rodfem.output.solids import profile_of
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.bodies import FLAT, Shelf
 from rodfem.report.branches import branch_data
 from rodfem.report.motions import modes_of, motions_of
-from rodfem.report.packing import packed
-from rodfem.report.profiles import profiles_data
+from rodfem.report.packing import packed, plain
 from rodfem.report.shapes import Shapes, shapes_of, stations
 from rodfem.report.stage import Stage, stage_of
 
@@ -34,6 +34,8 @@ OVER = 1.02
 """Distance of the stripe from the axis, relative to that of the surface."""
 UNIFORM = 1e-6
 """Difference of outlines, in radii of the rod, up to which they are one."""
+BUDGET = 400_000
+"""Points of all states together above which some are left out: about 28 MB of the page."""
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
@@ -69,6 +71,40 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
             | {"modes": modes, "missed": missed, "image": image}
         )
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
+
+
+def profiles_data(group: Any, states: int) -> dict[str, Any]:
+    """Profiles of a branch, whose group of ``states.h5`` is given; ``states`` is the number of those of all branches.
+
+    Where the file has them: ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors
+    at M points, nan beyond the last one of a coarser mesh; ``element`` (P,), how many of them an element has, which
+    determine its polynomials, and 0 where some are left out; ``jumps`` (P,) of each of the four between elements.
+    """
+    found = [profiles_of(group, row) for row in range(len(group["load"]))]
+    if None in found:
+        return {"profile": None, "element": None, "jumps": None}
+    most = group[POINTS][0].size
+    kept = np.unique(np.linspace(0, most - 1, min(most, max(2, BUDGET // states))).round().astype(int))
+    out = np.full((len(found), most, 1 + 3 * len(PROFILES)), np.nan)
+    loaded = _loaded(group)
+    jumps: dict[str, list[float]] = {symbol: [] for symbol in PROFILES}
+    for place, one in zip(out, found, strict=True):
+        assert one is not None
+        count = one.points.size
+        place[:count, 0] = one.points.ravel()
+        for i, symbol in enumerate(PROFILES):
+            place[:count, 3 * i + 1 : 3 * i + 4] = one.fields[symbol].reshape(count, 3)
+            jumps[symbol].append(one.jump(symbol, loaded))
+    element = [one.points.shape[1] if one is not None and len(kept) == most else 0 for one in found]
+    jumped = {symbol: plain(column) for symbol, column in jumps.items()}
+    return {"profile": packed(out[:, kept]), "element": element, "jumps": jumped}
+
+
+def _loaded(group: Any) -> list[float]:
+    """Arclengths at which something holds or loads the rod."""
+    places: list[Mapping[str, Any]] = [*group.get("supports", {}).values(), *group.get("constraints", {}).values()]
+    found = [float(place.attrs["s"]) for place in places]  # type: ignore[attr-defined]
+    return [s for s in found if np.isfinite(s)]
 
 
 def _shapes(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Shapes]:

@@ -13,6 +13,17 @@ of the form ``(x, -i x)`` belong to the first kind.
 ``M`` is singular.  The infinite eigenvalues come in Jordan blocks, which round-off smears to large finite ones: those
 are told by their distance from the shift and by the round-off of the stiffness over the kinetic energy of their
 vectors, and in doubt by a second shift.
+
+Those of a small pencil are found by orthogonal reductions of dense matrices.  The infinite ones are removed before any
+eigenvalue is computed: with bases of the range and the null space of ``M`` ::
+
+    S = ( S11  S10 )      M = ( M11  0 )
+        ( S01  S00 ),         (  0   0 ),
+
+the regular part of ``S00`` is eliminated (static condensation), and each null vector of it is a multiplier with its
+constraint ``H x1 = 0``, on whose null space the pencil is projected.  What remains is such a pencil again, of smaller
+size, until ``M`` is regular: the staircase of Van Dooren, Linear Algebra Appl. 27 (1979) 103-140, with rank decisions
+by singular values.
 """
 
 from __future__ import annotations
@@ -21,6 +32,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
@@ -30,7 +42,6 @@ from rodfem.errors import ConvergenceError
 from rodfem.linalg.matrices import local_rows
 from rodfem.stability import mode_type
 from rodfem.stability.frequencies import EPS
-from rodfem.stability.staircase import finite_eigenpairs
 from rodfem.tolerances import TINY
 
 FAR = 1e5
@@ -74,6 +85,8 @@ It is 1 of those, which beside a body of 1e6 times the rod's mass lie among the 
 """
 SPARE = 2
 """Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
+RANK = 1e-11
+"""Singular values below this, relative to the norm of the pencil's matrices, are zero."""
 
 
 @dataclass(frozen=True)
@@ -238,6 +251,47 @@ class FinitePairs:
         for made in (shifted, upper, lower, pencil, masses):
             made.destroy()
         return out[:number]
+
+
+def split(matrix: np.ndarray, norm: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return ``U1, s, V1, U0, V0`` with ``matrix = U1 diag(s) V1^t`` and null spaces ``U0^t``, ``V0``.
+
+    Singular values are measured against ``norm``.
+    """
+    u, s, vt = np.linalg.svd(matrix)
+    rank = int((s > RANK * norm).sum())
+    return u[:, :rank], s[:rank], vt[:rank].T, u[:, rank:], vt[rank:].T
+
+
+def kernel(matrix: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (n, k) of the null space of a matrix (m, n), of which m may be zero: LAPACK refuses that."""
+    return np.asarray(scipy.linalg.null_space(matrix, rcond=RANK)) if matrix.size else np.eye(matrix.shape[1])
+
+
+def finite_eigenpairs(S: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all finite eigenvalues (complex, sorted by magnitude) and their vectors (n, number).
+
+    Multipliers that drop out of the reduction are zero in the vectors.  Empty for a pencil without inertia.  Raises
+    :class:`numpy.linalg.LinAlgError` for a pencil that is singular at every shift.
+    """
+    stiffness, inertia = (max(float(np.linalg.norm(A, ord=2)), TINY) for A in (S, M))
+    back = np.eye(len(S))
+    while len(M):
+        u1, _, v1, u0, v0 = split(M, inertia)
+        if u0.shape[1] == 0:
+            break
+        p, regular, q, p0, q0 = split(u0.T @ S @ v0, stiffness)
+        s01, s10 = u0.T @ S @ v1, u1.T @ S @ v0
+        condensed = q @ ((p.T @ s01) / regular[:, None])
+        s11 = u1.T @ S @ v1 - s10 @ condensed
+        z, w = kernel(p0.T @ s01), kernel((s10 @ q0).T)
+        if w.shape != z.shape:  # dependent constraints on one side only: the pencil has no definite eigenvalues
+            raise np.linalg.LinAlgError("the pencil is singular for every mu")
+        back = back @ ((v1 - v0 @ condensed) @ z)
+        S, M = w.T @ s11 @ z, w.T @ u1.T @ M @ v1 @ z
+    values, vectors = scipy.linalg.eig(np.linalg.solve(M, S)) if len(M) else (np.zeros(0), np.zeros((0, 0)))
+    order = np.argsort(abs(values))
+    return np.asarray(values[order], dtype=complex), back @ vectors[:, order]
 
 
 def _taken(others: list[EigenPair], pair: EigenPair) -> bool:

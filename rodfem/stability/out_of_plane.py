@@ -17,8 +17,6 @@ from rodfem.tolerances import same_place
 
 PUSHED = 1e-8
 """Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
-MOSTLY = 0.5
-"""Part of an eigenvector's squared norm out of the plane above which it is a motion out of the plane."""
 NEAR = 1e-2
 """Distance, in the metric, within which the state in space that belongs to a planar one is sought."""
 
@@ -62,7 +60,7 @@ class InSpace:
             return index.negative
         values, vectors = inside_band(found, near, NULL)
         falling = [
-            value < -quotient_error(found.matrix, v) and self._share(v) > MOSTLY
+            value < -quotient_error(found.matrix, v) and self._share(v) > 0.5  # mostly out of the plane
             for value, v in zip(values, vectors, strict=True)
         ]
         return index.negative + int(sum(falling))

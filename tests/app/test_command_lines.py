@@ -13,7 +13,7 @@ from hemitropic_cases import run_demo
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.app import petsc_options
+from rodfem.app.main import unread
 from rodfem.diagram import solver
 from rodfem.output import plot_diagram, plot_modes, render
 
@@ -106,12 +106,12 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
 @pytest.mark.versions
 @pytest.mark.alone
 def test_options_of_petsc_that_are_read() -> None:
-    assert petsc_options.unread(["-rodfem_nothing", "3", "-log_view"]) == ["-rodfem_nothing"]
-    assert petsc_options.unread(["-st_type", "sinvert"]) == ["-st_type"]
+    assert unread(["-rodfem_nothing", "3", "-log_view"]) == ["-rodfem_nothing"]
+    assert unread(["-st_type", "sinvert"]) == ["-st_type"]
     PETSc.Options()["rodfem_number"] = 3
-    assert petsc_options.unread(["-rodfem_number", "3"]) == ["-rodfem_number"]
+    assert unread(["-rodfem_number", "3"]) == ["-rodfem_number"]
     assert PETSc.Options().getInt("rodfem_number") == 3
-    assert petsc_options.unread(["-rodfem_number", "3"]) == []
+    assert unread(["-rodfem_number", "3"]) == []
     PETSc.Options().delValue("rodfem_number")
 
 

@@ -23,9 +23,8 @@ from rodfem.continuation.observer import Observer
 from rodfem.deflation.deflated_newton import DeflatedNewton
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
-from rodfem.deflation.guesses import turned_state
 from rodfem.deflation.known import equilibria_at
-from rodfem.deflation.search import NEW, SAME, Deflation, find_equilibria
+from rodfem.deflation.search import NEW, SAME, Deflation, find_equilibria, turned_state
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver

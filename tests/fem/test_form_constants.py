@@ -13,8 +13,8 @@ from rodfem import compat
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.fem import form_compiler
+from rodfem.fem.equations import with_constants
 from rodfem.fem.fields import Discretization
-from rodfem.fem.literals import with_constants
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Ordinate, Scene
 

@@ -26,7 +26,6 @@ MATRICES = {
     "rodfem.linalg.factorization",
     "rodfem.linalg.selection",
     "rodfem.linalg.matrices",
-    "rodfem.linalg.householder",
     "rodfem.linalg.null_space",
     "rodfem.linalg.orthogonal",
 }

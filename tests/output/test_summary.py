@@ -13,8 +13,7 @@ import golden_cases
 import pytest
 
 from rodfem import Discretization, Plan, trace
-from rodfem.output.change_words import known_digits, told_apart
-from rodfem.output.summary import in_sentences
+from rodfem.output.summary import in_sentences, known_digits, told_apart
 
 pytestmark = pytest.mark.alone
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from rodfem.app.commands.list import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
 from rodfem.output.digits import number
 from rodfem.output.endings import endings
-from rodfem.output.first_loss import first_loss
 from rodfem.output.frequency_curves import curves
 from rodfem.output.solids import ball, box, coil
 from rodfem.report.bodies import CLOSE, Shelf

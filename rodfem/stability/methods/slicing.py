@@ -7,6 +7,7 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.linalg.factorization import PETSC_ERR_LIB
 from rodfem.stability.method import Found, Interval, SymmetricMethod
 from rodfem.stability.pencil import in_interval
 from rodfem.stability.symmetric import SymmetricPencil
@@ -15,8 +16,6 @@ WIDER = (0.0, 1e-9, 1e-7, 1e-5)
 """By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
 PETSC_ERR_PLIB = 77
 """PETSc's error code for that."""
-PETSC_ERR_LIB = 76
-"""PETSc's error code for a fault of MUMPS."""
 ROOMS = (100, 400, 1600)
 """Percentages of room beyond MUMPS's estimate: where rotations have no mass many pivots of the pencil are delayed."""
 STEP, CUT = 1.0371, 0.4931

@@ -1,13 +1,16 @@
-"""A mesh on which the frequencies of a rod that is swept are as accurate as asked for.
+"""The mesh that a run begins with: chosen for a sweep, and whether it can hold the index of a scene's start.
 
 Equilibria are traced on meshes that are raised on the way (:mod:`rodfem.adaptivity.mesh_sequence`).  What a sweep
 computes, a few frequencies at every load, asks for the richest mesh where its load is greatest, and costs little: one
 mesh is chosen before, on which the frequencies wanted do not change by more than the accuracy when it is refined.
+
+Each unstable mode has half-waves.  Where a mesh has few nodes for each of them, the index of the start is counted at
+both ends of the range on twice as many elements as well: another one is that of the mesh, not of the rod.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import ceil
 
@@ -15,9 +18,11 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.held import at_load
+from rodfem.diagram.solver import Solver, check_index
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
@@ -36,6 +41,10 @@ WORSE, FINE = 3, 1e-6
 """Refinements after each other that do not help before the best mesh is taken: coarse ones do not see all yet.  Below
 this change one is enough: that is round-off.
 """
+NODES = 8
+"""Nodes for each unstable mode below which the index is compared."""
+BENT = 1e-6
+"""Rotation of a state away from the scene's start, in radian, above which it is not that start."""
 
 
 def frequency_mesh(
@@ -88,3 +97,41 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
 def _change(values: np.ndarray, richer: np.ndarray, one: float) -> float:
     """Largest distance of values from the nearest of the richer ones, relative to values greater than ``one``."""
     return max(float(abs(richer - v).min() / unit(v, one=one)) for v in values)
+
+
+def check_start(solver: StaticSolver, span: tuple[float, float], warn: Callable[[str], None]) -> None:
+    """Compare the index at the ends of a range of loads with that on twice as many elements, where a mesh has few.
+
+    ``span`` is the range, and ``warn`` hears of an index that is the mesh's.  Of a rod that bends from the start on,
+    only the first load is looked at.  Raises :class:`InputError` where the mesh of the ``solver`` cannot hold the
+    half-waves at all.  Collective.
+    """
+    if not isinstance(solver, BranchSolver):
+        return
+    scene, mesh = solver.system.scene, solver.system.fields.discretization
+    nodes = mesh.elements * mesh.degree
+    for load in span:
+        index = _index(solver, load)
+        if index is None:
+            return
+        if NODES * index > nodes:
+            check_index(scene, load, index, nodes)
+            finer = Solver(scene, mesh.finer(2), solver.system.comm).equilibria
+            assert isinstance(finer, BranchSolver)
+            there = _index(finer, load)
+            if there not in (None, index):
+                warn(
+                    f"At {scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} elements "
+                    f"and {there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a higher "
+                    "degree."
+                )
+
+
+def _index(solver: BranchSolver, load: float) -> int | None:
+    """Index of the scene's start at a load; None where it is no equilibrium there."""
+    start, system = solver.start(load), solver.system
+    x, outcome = solver.at_load(start, load)
+    turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
+    if not outcome.converged or (load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT):
+        return None
+    return solver.inertia.at(x).count().negative
