@@ -1604,7 +1604,7 @@ def caught_by(fault: Fault) -> str:
         files = subprocess.run(["git", "ls-files", "-z"], cwd=HOME, capture_output=True, text=True, check=True).stdout
         for file in filter(None, files.split("\0")):
             (tree / file).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(HOME / file, tree / file)
+            shutil.copy(HOME / file, tree / file, follow_symlinks=False)
         place, whole = tree / fault.file, (tree / fault.file).read_text()
         for marks in ("not long", "long"):
             place.write_text(planted(whole, fault))
