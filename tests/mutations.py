@@ -80,7 +80,7 @@ FAULTS = {
     ),
     "what-turns-back-near-zero-is-passed": Fault(
         "rodfem/diagram/special_search.py",
-        "            self._missed(piece, p, ended=True)  # the rows resolve it",
+        "            self._missed(piece, p, resolved=True)",
         "            pass",
         "tests/continuation/test_unfolding.py",
     ),

@@ -65,8 +65,6 @@ class Point:
         Number of the discretisation that ``x`` belongs to.
     estimate
         Error of the discretisation in load and ordinate, where an accuracy was asked for.
-    determinant
-        Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index.
     soft
         Eigenvalues near zero, by name: :class:`~rodfem.stability.soft_mode.SoftMode`.
     nearest
@@ -93,7 +91,6 @@ class Point:
     negative_in_space: int | None = None
     mesh: int = 0
     estimate: float = float("nan")
-    determinant: float = float("nan")
     undecided: int = 0
     soft: list[SoftMode] = field(default_factory=list)
     nearest: float = 0.0

@@ -154,7 +154,6 @@ class BranchSolver(StaticSolver):
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.negative(x),
             mesh=self.mesh,
-            determinant=index.determinant,
             nearest=index.nearest,
         )
 

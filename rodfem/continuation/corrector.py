@@ -159,7 +159,7 @@ class Corrector:
         """Index by one count of factors, unless an eigenvalue is too near zero."""
         inertia = self.inertia
         certain = nearest >= NEAR * inertia.scale + 10 * inertia.tolerance
-        return Index(below, found.drifts, found.factors.determinant(), nearest) if certain else None
+        return Index(below, found.drifts, nearest) if certain else None
 
     def _solve(self, found: Factored, right: PETSc.Vec | None) -> tuple[PETSc.Vec, float]:
         """Solve for all right-hand sides at once: the cost is that of the call, hardly of a column.

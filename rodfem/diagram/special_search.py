@@ -25,6 +25,7 @@ from rodfem.continuation.singular_points import (
     of_turn,
     solved,
     special_point,
+    taut_where_it_turns,
 )
 from rodfem.diagram.step_check import ShorterSteps, StepCheck, Unresolved
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
@@ -219,10 +220,10 @@ class SpecialSearch:
                 else:
                     out.append(special)
         for node in misses:
-            self._missed(piece, node, ended=ended)
+            self._missed(piece, node, resolved=ended)
         nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
         if not out and self._nearest > nearest < ahead and nearest < DIP * piece.solver.inertia.scale:
-            self._missed(piece, p, ended=True)  # the rows resolve it
+            self._missed(piece, p, resolved=True)
         self._nearest = -inf if out else nearest
         return sorted(out, key=lambda special: special.point.arclength)
 
@@ -233,6 +234,9 @@ class SpecialSearch:
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
         at = of_turn(piece, left, right, turn)
+        if words := taut_where_it_turns(solver, at.x):
+            self.observer.warn(words)
+            return None
         if is_fold(solver, at.x, at.null):
             return None
         found = solved(solver, at, fold=False)
@@ -259,7 +263,7 @@ class SpecialSearch:
             return special_point(piece, at, found, fold=False)
         gap = self._open_gap(piece, at, found, ended=ended) if found is not None else None
         fold = solved(solver, at, fold=True)
-        if fold is not None and (gap is None or turns):
+        if fold is not None and (turns or found is None):
             return special_point(piece, at, fold, fold=True)
         if found is None:
             return None
@@ -275,15 +279,15 @@ class SpecialSearch:
             raise gap
         return gap
 
-    def _missed(self, piece: Piece, node: Node, *, ended: bool) -> None:
+    def _missed(self, piece: Piece, node: Node, *, resolved: bool) -> None:
         """Look for the branch on the other side where an eigenvalue comes near zero and turns back.
 
         An imperfection is the cause if a branch point with unfolding parameters is near by: then raises :class:`Gap`,
-        unless the branch has ``ended``, or rows resolve the bend.
+        unless the bend is ``resolved`` by the rows, or the branch has ended.
         """
         at = of_miss(piece, node)
         found = SingularSystem(piece.solver, at.modes, at.critical, fold=False).solve(at.x)
         if found is not None and found.size > found.noise:
-            gap = self._open_gap(piece, at, found, ended=ended)
-            if gap is not None and ended:
+            gap = self._open_gap(piece, at, found, ended=resolved)
+            if gap is not None and resolved:
                 self.gaps.open(gap, piece.solver)

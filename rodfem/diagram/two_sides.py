@@ -19,7 +19,7 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.switching import between
 from rodfem.diagram.equivalence import equivalent
-from rodfem.stability.inertia import NULL, Factored, Index
+from rodfem.stability.inertia import NULL, Factored
 from rodfem.tolerances import SAME_STATE
 
 SAME_DETERMINANT = 1e-3
@@ -69,7 +69,8 @@ def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
     widest = int(np.argmax(np.diff(first.values)))
     shift = float(first.values[widest : widest + 2].mean())
     shifted = [_shifted(at(point.x), shift) for point in (a, b)]
-    return shifted[0] == shifted[1] and abs(shifted[0].determinant - shifted[1].determinant) <= SAME_DETERMINANT
+    (below, size), (other, another) = shifted
+    return below == other and abs(size - another) <= SAME_DETERMINANT
 
 
 class _Nearest(NamedTuple):
@@ -90,7 +91,6 @@ def _nearest(found: Factored, zero: int) -> _Nearest:
     return _Nearest(values[order], near[order], noise[order])
 
 
-def _shifted(found: Factored, shift: float) -> Index:
-    """Number of eigenvalues below a ``shift``, and the determinant there."""
-    below = found.below(shift)
-    return Index(below, 0, found.factors.determinant())
+def _shifted(found: Factored, shift: float) -> tuple[int, float]:
+    """Number of eigenvalues below a ``shift``, and the logarithm of the size of the determinant there."""
+    return found.below(shift), found.factors.determinant()

@@ -54,13 +54,12 @@ PIVOT = 1e-3
 class Index:
     """Numbers ``negative`` and ``zero`` of eigenvalues of the constrained second variation, symmetry modes among these.
 
-    ``determinant`` is the logarithm of the size of that of the matrix that was counted, ``nearest`` an estimate of the
-    distance of the nearest eigenvalue from zero, symmetry modes left out; 0 where there is none.
+    ``nearest`` is an estimate of the distance of the nearest eigenvalue from zero, symmetry modes left out; 0 where
+    there is none.
     """
 
     negative: int
     zero: int
-    determinant: float = field(default=float("nan"), compare=False)
     nearest: float = field(default=0.0, compare=False)
 
 
@@ -305,7 +304,7 @@ class Factored:
         negative = self.below(-own.tolerance)
         # a phase condition takes its symmetry mode out of both counts, and it is a zero eigenvalue of the state
         zero = self.below(own.tolerance) - negative + self.drifts
-        return Index(negative, zero, own.factors.determinant())
+        return Index(negative, zero)
 
     def nearest(
         self, number: int, accuracy: float = 1e-3, most: int = 60, spare: int = 1
@@ -372,21 +371,6 @@ class Factored:
         projection = np.array([[dual.dot(w).real for w in images] for dual in basis.duals])
         nu, z = np.linalg.eigh((projection + projection.T) / 2)
         return [combine(basis.vectors, z[:, j]) for j in np.argsort(-abs(nu))[: len(block)]]
-
-    def response(self, mode: PETSc.Vec) -> float:
-        """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
-        system = self._own().system
-        with system.clock("stability"):
-            image = self.inertia.metric * mode
-            self.factors.solve(image, system.workspace)
-            return 1.0 / image.dot(system.workspace) + self.shift
-
-    def sharpened(self, mode: PETSc.Vec) -> PETSc.Vec:
-        """Vector of metric norm 1 by one step of inverse iteration from ``mode``."""
-        out, metric = mode.duplicate(), self._own().metric
-        self.factors.solve(metric * mode, out)
-        out.scale(1.0 / np.sqrt(out.dot(metric * out).real))
-        return out
 
     def noise(self, mode: PETSc.Vec) -> float:
         r"""Round-off in the eigenvalue of a ``mode`` of metric norm 1.

@@ -19,7 +19,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.matrices import rounding
 from rodfem.stability.inertia import NULL, ZERO_BAND, Factored, Index
 
@@ -122,20 +121,6 @@ def resolve(found: Factored) -> tuple[int, int]:
     theta, vectors = inside_band(found, near, NULL)
     doubt = np.array([quotient_error(found.matrix, v) for v in vectors])
     return index.negative + int((theta < -doubt).sum()), index.negative + int((theta <= doubt).sum())
-
-
-def clear_of_zero(found: Factored) -> int:
-    """Number of eigenvalues within the tolerance of a count that are not zero, symmetries left out.
-
-    Their Rayleigh quotients exceed what round-off, and what Newton's method leaves of the state, make of them.
-    """
-    inertia = found.inertia
-    near = found.count().zero - found.drifts
-    if near <= 0:
-        return 0
-    theta, vectors = inside_band(found, near, NULL)
-    doubt = [max(quotient_error(found.matrix, v), TOLERANCE * inertia.scale) for v in vectors]
-    return int((abs(theta) > doubt).sum())
 
 
 def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:

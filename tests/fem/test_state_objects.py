@@ -125,13 +125,12 @@ def test_stale_factors_refuse() -> None:
     index, values = first.count(), first.nearest(1)[0]
     second = inertia.at(y)
     with pytest.raises(RuntimeError, match="not factored"):
-        second.response(inertia.seed(0))
+        second.nearest(1)
     assert second.count() != index
     asked = {
         "below": lambda: first.below(0.0),
         "count": first.count,
         "nearest": lambda: first.nearest(1),
-        "response": lambda: first.response(inertia.seed(0)),
         "noise": lambda: first.noise(inertia.seed(0)),
         "matrix": lambda: first.matrix,
         "border": lambda: first.border,

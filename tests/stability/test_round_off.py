@@ -45,7 +45,7 @@ def test_zeros_of_symmetries_stay_zeros() -> None:
     inertia = SimpleNamespace(tolerance=0.01, resolution=0.01, scale=1.0)
     theta = np.array([1e-3, -2e-3, 5.0, 7.0])
     found: Any = SimpleNamespace(
-        count=lambda: Index(2, 3, 0.0, 0.0), drifts=1, inertia=inertia, shift=0.0, matrix=matrix,
+        count=lambda: Index(2, 3), drifts=1, inertia=inertia, shift=0.0, matrix=matrix,
         nearest=lambda number, accuracy: (theta, vectors),
     )  # fmt: skip
     index = decide(found).index
