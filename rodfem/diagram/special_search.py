@@ -197,11 +197,11 @@ class SpecialSearch:
         off = ASIDE * (q.s - p.s)
         p = p if p.kept.reduced.zero <= piece.still else piece.solve(p, q, p.s + off) or p
         q = q if q.kept.reduced.zero <= piece.still or not ended else piece.solve(p, q, q.s - off) or q
-        out: list[SpecialPoint] = []
+        out, words = list[SpecialPoint](), list[str]()
         pieces = [(p, q)]
         turn = piece.turn(p, q)
         if turn is not None:
-            touch = self._touching(piece, p, q, turn, ended=ended)
+            touch = self._touching(piece, p, q, turn, words, ended=ended)
             if touch is not None:
                 out.append(touch)
                 s = piece.place(touch.point.x)
@@ -216,9 +216,11 @@ class SpecialSearch:
                 special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
                 if special is None:
                     self._steps.ask(a, b)
-                    self.observer.warn(missing(a.load, b.load))
+                    words.append(missing(a.load, b.load))
                 else:
                     out.append(special)
+        for sentence in words:
+            self.observer.warn(sentence)
         for node in misses:
             self._missed(piece, node, resolved=ended)
         nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
@@ -227,15 +229,20 @@ class SpecialSearch:
         self._nearest = -inf if out else nearest
         return sorted(out, key=lambda special: special.point.arclength)
 
-    def _touching(self, piece: Piece, p: Node, q: Node, s: float, *, ended: bool) -> SpecialPoint | None:
-        """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""
+    def _touching(
+        self, piece: Piece, p: Node, q: Node, s: float, words: list[str], *, ended: bool
+    ) -> SpecialPoint | None:
+        """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there.
+
+        ``words`` gets a sentence where the load turns back for another reason.
+        """
         solver, off = piece.solver, ASIDE * (q.s - p.s)
         left, right = piece.solve(p, q, max(s - off, (p.s + s) / 2)), piece.solve(p, q, min(s + off, (s + q.s) / 2))
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
         at = of_turn(piece, left, right, turn)
-        if words := taut_where_it_turns(solver, at.x):
-            self.observer.warn(words)
+        if why := taut_where_it_turns(solver, at.x):
+            words.append(why)
             return None
         if is_fold(solver, at.x, at.null):
             return None

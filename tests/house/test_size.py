@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 42430,
+    "lines of Python": 42437,
     "files of Python": 295,
     "lines of C": 1702,
     "module constants with a number": 656,
