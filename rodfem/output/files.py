@@ -73,6 +73,8 @@ ALIKE = ("row", "negative_before", "negative_after", "located_to", "error_estima
 SPECIAL = {"ordinate_error_estimate": "ordinate_error", "followed": "switched", "note": "note"}
 SPECIAL |= {name: name for name in ALIKE}
 """Entries of a special point, and the attributes that they hold, most of which have the same name."""
+NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")
+"""Numbers whose natural sizes stand in the file."""
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
 """Meaning of ``negative`` where loads have no potential."""
 
@@ -105,7 +107,7 @@ def as_data(
         "ordinate": scene.ordinate.name,
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "ordinate_unit": scene.ordinate.unit,
-        "natural": {name: getattr(scene.units, name) for name in ("load", "ordinate", "length", "force", "moment")},
+        "natural": {name: getattr(scene.units, name) for name in NATURAL},
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
         "planar": scene.planar,
