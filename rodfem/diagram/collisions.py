@@ -1,35 +1,54 @@
-"""Collisions of eigenvalues between two loads of a sweep: what becomes of each complex pair.
+"""Collisions of eigenvalues between two loads of a sweep: complex pairs that are at one of them and not at the other.
 
-A pair at one load goes on from a pair at the other one, or from two real eigenvalues that have met, or from a pair that
-was there already, farther from the origin than what is found.  Each is followed by its invariant subspace, unless its
-value and its vectors leave no doubt.  A pair that ends in one that another was taken to go on from takes its place, and
-the other one is followed.
+A pair at one load goes on from that at the other one whose plane has its vectors, and whose value is near.  Another one
+comes from two real eigenvalues that meet on the way.  They are followed by their invariant subspace.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.complex_pairs import paired, places, together, upper
+from rodfem.continuation.eigenvalue_curves import assignment
 from rodfem.continuation.flutter import Located, locate_flutter
 from rodfem.continuation.kinds import FLUTTER, Kind
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.held import at_load
-from rodfem.diagram.side import Side
 from rodfem.errors import ConvergenceError
-from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
+from rodfem.stability.cluster import Cluster, Measured, measure, real_span
 from rodfem.stability.cluster_noise import ClusterNoise, noise_of
-from rodfem.stability.frequencies import MULTIPLE
+from rodfem.stability.frequencies import ALIKE, MULTIPLE, groups
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.spectrum import Spectrum, inside
 from rodfem.tolerances import TINY, round_off, unit
 
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
 JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
+MOVED, OUTSIDE = 0.3, 0.2
+"""Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, above which it is another.
+"""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One end of a step: its ``load``, the equilibrium ``x`` there, and its ``spectrum``."""
+
+    load: float
+    x: PETSc.Vec
+    spectrum: Spectrum
+
+
+class Near(NamedTuple):
+    """A ``side`` at which a ``cluster`` comes near a collision, or zero: the ``value`` is its discriminant, or mean."""
+
+    side: Side
+    cluster: Cluster
+    value: float
 
 
 @dataclass
@@ -64,7 +83,7 @@ class Critical:
 class Told:
     """What happens in a step: ``events``, what ``entered`` (less what left), and ``doubts``, in words, where not all.
 
-    Complex eigenvalues that ``entered`` are complex at both loads, but were not among those found at the first one.
+    Complex eigenvalues that ``entered`` are complex at both loads, but by no more than round-off at the first one.
     """
 
     events: list[Critical] = field(default_factory=list)
@@ -76,8 +95,40 @@ class Told:
         return Told(self.events + other.events, self.entered + other.entered, self.doubts + other.doubts)
 
 
+def pairs_in_common(mine: Spectrum, others: Spectrum) -> dict[int, int]:
+    """Places of complex eigenvalues of positive imaginary part, and those of the other state that they go on from."""
+    here, there = mine.upper, others.upper
+    if not len(here) or not len(there):
+        return {}
+    a, b = mine.values[here][:, None], others.values[there][None, :]
+    distance, outside = abs(a - b) / abs(a), 1.0 - _shares(mine, others)
+    rows, columns = assignment(distance + outside)
+    near = (distance < MOVED) & (outside < OUTSIDE)
+    return {int(here[i]): int(there[j]) for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if near[i, j]}
+
+
+def _shares(mine: Spectrum, others: Spectrum) -> np.ndarray:
+    """Shares (k, m) of vectors of complex pairs in the planes of another state's; of equal ones in all of them."""
+    there, vectors = others.upper, others.coordinates(mine)[:, mine.upper]
+    shares = np.zeros((len(mine.upper), len(there)))
+    for group in groups(others.values[there], np.inf, ALIKE):
+        w = others.condensed.pairs.right[:, there[group]]
+        shares[:, group] = inside(np.concatenate([w.real, w.imag], axis=1), vectors)[:, None]
+    return shares
+
+
+def others_negative(mine: Spectrum, others: Spectrum) -> bool:
+    """Whether the fewer of the negative eigenvalues of two states go on from some that are not negative, by vectors."""
+    if len(mine.negative) > len(others.negative):
+        mine, others = others, mine
+    if not len(mine.negative):
+        return False
+    basis = others.condensed.pairs.right[:, others.negative].real
+    return bool(inside(basis, others.coordinates(mine)[:, mine.negative].real).min() < 1.0 - OUTSIDE)
+
+
 class Collisions:
-    """Tells what becomes of the complex pairs of a sweep in a step."""
+    """Tells which eigenvalues of a sweep collide in a step."""
 
     def __init__(self, solver: StaticSolver, eigensolver: NonsymmetricSolver) -> None:
         """Know what computes equilibria (``solver``); the ``eigensolver`` is that of the pencils."""
@@ -86,48 +137,29 @@ class Collisions:
 
     def between(self, a: Side, b: Side) -> Told:
         """Collisions between two loads, those at one and the same load together."""
-        told, before = Told(), paired(self.solver.system.comm, b.found, a.found)
-        self._follow(told, b, a, before, 1)
-        self._follow(told, a, b, {there: here for here, there in before.items()}, -1)
+        told, common = Told(), pairs_in_common(b.spectrum, a.spectrum)
+        born = [i for i in b.spectrum.upper.tolist() if i not in common]
+        gone = [i for i in a.spectrum.upper.tolist() if i not in common.values()]
+        for sign, here, there, chosen in ((1, b, a, born), (-1, a, b, gone)):
+            for group in groups(here.spectrum.values[chosen], np.inf, MULTIPLE):
+                self._follow(told, here, there, [chosen[i] for i in group], sign)
         return told
 
-    def _follow(self, told: Told, here: Side, there: Side, match: dict[int, int], sign: int) -> None:
-        """Follow the pairs at one load that no ``match`` says what they go on from, to the other load.
-
-        The ``sign`` is that of their number where they are born on the way back.
-        """
-        waiting = together(here.found, [i for i in upper(here.found) if i not in match])
-        followed: set[int] = set()
-        while waiting:
-            chosen = waiting.pop(0)
-            mine = [i for i in chosen if here.found.values[i].imag > 0]
-            followed |= set(mine)
-            try:
-                end = self._end(here, there, chosen)
-            except ConvergenceError as trouble:
-                told.doubts.append(
-                    f"The eigenvalue {here.found.values[chosen[0]]:.6g} at {self._load} = {here.load:.6g} was not "
-                    f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
-                )
-                continue
-            if isinstance(end, Critical):
-                end.change *= sign
-                self._add(told, end, here)
-                continue
-            known = places(there.found, end.values)
-            taken = [i for i, place in match.items() if place in known]
-            if not known:
-                told.entered += sign * len(chosen)
-            elif len(known) != len(mine) or followed & set(taken) or (sign < 0 and len(taken) != len(known)):
-                told.doubts.append(
-                    f"Which eigenvalues at {self._load} = {there.load:.6g} become {here.found.values[chosen[0]]:.6g} "
-                    f"at {here.load:.6g} is not clear: use a smaller range."
-                )
-            else:
-                for i in taken:
-                    del match[i]
-                match |= dict(zip(mine, known, strict=True))
-                waiting += together(here.found, taken)
+    def _follow(self, told: Told, here: Side, there: Side, upper: list[int], sign: int) -> None:
+        """Follow equal complex pairs at one load, which have no counterpart at the other one, to where they collide."""
+        try:
+            event = self._end(here, there, upper)
+        except ConvergenceError as trouble:
+            told.doubts.append(
+                f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was not "
+                f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
+            )
+            return
+        if event is None:
+            told.entered += 2 * sign * len(upper)
+        else:
+            event.change *= sign
+            self._add(told, event, here)
 
     def _add(self, told: Told, event: Critical, here: Side) -> None:
         """Take a collision, followed from ``here``, together with others at its load; none is to be found twice."""
@@ -154,37 +186,51 @@ class Collisions:
         parts = pencil.product(one.cluster.basis, pencil.weighed(other.cluster.basis))
         return float((abs(parts) ** 2).sum() / min(parts.shape))
 
-    def _end(self, here: Side, there: Side, chosen: list[int]) -> Critical | Measured:
-        """Collision, on the way ``there``, of eigenvalues complex ``here``; where they are complex there too, these.
+    def _end(self, here: Side, there: Side, upper: list[int]) -> Critical | None:
+        """Collision, on the way ``there``, of pairs complex ``here``; None for some that are, by round-off, there too.
 
         Raises :class:`ConvergenceError` where it is none of both.
         """
-        values = here.found.values[chosen]
-        if 2 * (values.imag > 0).sum() != len(chosen):
-            raise ConvergenceError("not all of its equals and conjugates are found")
-        cluster = cluster_of(self.eigensolver.at(here.x), here.found, chosen)
+        cluster = cluster_at(self.eigensolver.at(here.x), here.spectrum, upper)
         other = measure(self.eigensolver.at(there.x), cluster)
         scale = abs(other.values).max()
         if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
-            side = ">" if here.load > there.load else "<"
-            note = (
-                f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
-                f"flutter at every {self._load} {side} {there.load:.6g} next to it"
-            )
-            floor = round_off(there.load, self.units.load)
-            return Critical(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
-        just_met = abs(other.discriminant) < (JUST_MET * scale) ** 2 and not places(there.found, other.values)
+            return self._at_once(here, there, other)
+        just_met = abs(other.discriminant) < (JUST_MET * scale) ** 2
         if other.discriminant < 0 and not just_met:
-            return other
-        located = located_flutter(
-            Measuring(self.solver, self.eigensolver, here.x),
-            cluster,
-            (there.load + here.load) / 2,
-            abs(here.load - there.load),
+            nearest = abs(there.spectrum.values - other.cluster.mean).argmin()
+            if -other.discriminant <= 4.0 * there.spectrum.noise[nearest] ** 2:
+                return None
+            raise ConvergenceError("it is complex there, too")
+        try:
+            return self._located(here, there, cluster, just_met=just_met)
+        except ConvergenceError:
+            if abs(other.discriminant) < (ALIKE * scale) ** 2:
+                return self._at_once(here, there, other)
+            if other.discriminant < 0:
+                return None
+            raise
+
+    def _at_once(self, here: Side, there: Side, measured: Measured) -> Critical:
+        """Frequencies that are double ``there``, and complex next to it, on the way from ``here``."""
+        side = ">" if here.load > there.load else "<"
+        note = (
+            f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
+            f"flutter at every {self._load} {side} {there.load:.6g} next to it"
         )
+        floor, cluster = round_off(there.load, self.units.load), measured.cluster
+        return Critical(FLUTTER, there.load, cluster.size, floor, cluster.mean, cluster, note)
+
+    def _located(self, here: Side, there: Side, cluster: Cluster, *, just_met: bool) -> Critical:
+        """Collision of a cluster on the way from one load to another, where it may have ``just_met``.
+
+        Raises :class:`ConvergenceError` where there is none.
+        """
+        measured, width = Measuring(self.solver, self.eigensolver, here.x), abs(here.load - there.load)
+        located = located_flutter(measured, cluster, (there.load + here.load) / 2, width)
         load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
         outside = (load - there.load) * (here.load - there.load) < 0
-        if apart <= uncertainty or (outside and just_met and apart < JUST_MET * abs(here.load - there.load)):
+        if apart <= uncertainty or (outside and just_met and apart < JUST_MET * width):
             load, uncertainty = there.load, uncertainty + apart  # at that row, at which they still count as real
         low, high = sorted((here.load, there.load))
         if not low - uncertainty <= load <= high + uncertainty:
@@ -192,6 +238,14 @@ class Collisions:
         if located.slope * (here.load - there.load) > 0:
             raise ConvergenceError(f"the two that meet at {load:.6g} are complex on the other side of it")
         return Critical(FLUTTER, load, cluster.size, uncertainty, located.cluster.mean, located.cluster)
+
+
+def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:
+    """Cluster of some eigenvalues of a state's ``spectrum``, and the conjugates of complex ones."""
+    found = pencil.of(spectrum, np.array([i for i in places if spectrum.values[i].imag >= 0.0]))
+    conjugates = [found.vectors.conj()] if found.values.imag.any() else []
+    vectors = np.concatenate([found.vectors, *conjugates], axis=1)
+    return Cluster(real_span(pencil, vectors), float(found.values.real.mean()))
 
 
 class Measuring:

@@ -1,35 +1,32 @@
-"""Loads of flutter and of divergence between two loads of a sweep.
+"""Loads of flutter and of divergence between two loads of a sweep, from all eigenvalues at both.
 
-Where two real ones collide and become a complex pair, the square of half
-their difference ``D = ((mu1 - mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root
-there, ``D`` is a smooth function of the load: the discriminant of the pencil projected on the two of them.  Its zero
-is found by Chebyshev interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a
-single real one passes through zero the rod diverges: the eigenvalue itself is smooth there.
+Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 - mu2)/2)^2``
+passes through zero.  Unlike the eigenvalues, which have a square root there, ``D`` is a smooth function of the load:
+the discriminant of the pencil projected on the two of them.  Its zero is found by Chebyshev interpolation, at spectral
+accuracy and without ever solving at the double eigenvalue.  Where a single real one passes through zero the rod
+diverges: the eigenvalue itself is smooth there.
+
+A step in which what is found does not explain the numbers at both ends is parted.  So is one in which eigenvalues may
+meet and part again (:mod:`rodfem.diagram.meetings`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
-from petsc4py import PETSc
 
-from rodfem.continuation.complex_pairs import strange
 from rodfem.continuation.interpolant import SHARP
 from rodfem.continuation.kinds import DIVERGENCE
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.collisions import Collisions, Critical, Measuring, Told
+from rodfem.diagram.collisions import Collisions, Critical, Measuring, Near, Side, Told, cluster_at, others_negative
 from rodfem.diagram.divergence_loads import Mean, interpolated_zero
-from rodfem.diagram.frequency_rows import Row, leftmost
 from rodfem.diagram.held import at_load
-from rodfem.diagram.hidden_events import HiddenEvents, signature
-from rodfem.diagram.side import Side
+from rodfem.diagram.meetings import Meeting, meetings
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
-from rodfem.stability.cluster import cluster_of
-from rodfem.stability.finite_pairs import SHIFT
-from rodfem.stability.frequencies import REAL, Frequencies
+from rodfem.stability.cluster import measure
+from rodfem.stability.cluster_noise import noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, unit
 
@@ -43,88 +40,103 @@ CLEAR = 1e-4
 """Distance from a collision, relative to a step of the sweep, at which its eigenvalues are counted: they are apart."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
+NEARER, CLOSEST, BESIDE = 10, 1e-6, 1e-2
+"""Loads at which a meeting is looked for, at most, their least distance, over a step, and that of the meeting found."""
+
+SAME = 1e-2
+"""Change of the mean of eigenvalues, relative, within which they are the same ones at a load nearby."""
 
 
 class CriticalLoads:
     """Locates the critical loads between two loads of a sweep."""
 
-    def __init__(
-        self, solver: StaticSolver, eigensolver: NonsymmetricSolver, number: int, warn: Callable[[str], None]
-    ) -> None:
-        """Know what computes equilibria (``solver``) and their ``number`` of eigenvalues, and whom to ``warn``.
-
-        The ``eigensolver`` is that of the pencils.
-        """
-        self.solver, self.eigensolver, self.number, self.warn = solver, eigensolver, number, warn
+    def __init__(self, solver: StaticSolver, eigensolver: NonsymmetricSolver, warn: Callable[[str], None]) -> None:
+        """Know what computes equilibria (``solver``) and their eigenvalues (``eigensolver``), and whom to ``warn``."""
+        self.solver, self.eigensolver, self.warn = solver, eigensolver, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
-        self.collisions, self._still, self._parted = Collisions(solver, eigensolver), 0, 0
-        self.hidden = HiddenEvents(lambda x: Measuring(solver, eigensolver, x))
-        self._last: Side | None = None
-        self._unclear = 0
+        self.collisions, self._still, self._parted, self._unclear = Collisions(solver, eigensolver), 0, 0, 0
+        self.near: list[Near] = []
+        self._ahead = list[Meeting]()  # parts of the next step at which eigenvalues may meet
 
-    def between(self, first: Row, second: Row) -> Told:
+    def between(self, a: Side, b: Side, behind: Side | None, still: int) -> Told:
         """What happens between two rows, in its order: eigenvalues that collide, real ones that pass through zero.
 
-        Where the rows are neighbours, ``first`` comes before ``second`` in the sweep.  A step in which not all is
-        clear is parted.  What is not clear then is said.
+        Steps are given one after the other, each with the row ``behind`` it; ``still`` eigenvalues are zero at all
+        loads.  What is not clear is said.
         """
-        a, b = (Side(row.point.load, row.point.x, row.found) for row in (first, second))
-        self._before, self._still = b.found, min(a.found.still(), b.found.still())
-        self._parted = 0
-        told, self._last = self._hidden(self._last, a, b), a
+        self._still, self._parted = still, 0
+        told, sides = Told(), [a]
+        for side in [*self._met(told, a, b, behind), b]:
+            told = told.and_then(self._told(sides[-1], side))
+            sides.append(side)
         self._unclear += bool(told.doubts)
         for words in dict.fromkeys(told.doubts):
             self.warn(words)
         told.events.sort(key=lambda e: abs(e.load - a.load))
         return told
 
-    def _hidden(self, last: Side | None, a: Side, b: Side) -> Told:
-        """What happens in a step, also what comes and goes in it or at its first load, as the ``last`` side suggests.
+    def _met(self, told: Told, a: Side, b: Side, behind: Side | None) -> list[Side]:
+        """Loads of a step at which eigenvalues come nearest to one another, or to zero, and may meet; in its order."""
+        ahead, self._ahead, width = self._ahead, [], b.load - a.load
+        found, reach = (_meetings(a, b, behind), behind.load - b.load) if behind else ([], 0.0)
+        for m in found:
+            if m.flat:
+                if abs(m.t) <= 0.5:  # at the nearest row
+                    self._keep(b, m.places)
+            elif abs(m.t) < CLOSEST:
+                self._examine(told, b, m.places)
+            elif m.t < 0.0:
+                ahead.append(m._replace(t=1.0 + m.t * reach / width))
+            else:
+                self._ahead.append(m)
+        out = [a]
+        for m in sorted(ahead):
+            load = a.load + m.t * width
+            if min(abs(load - side.load) for side in (*out, b)) > CLOSEST * abs(width):
+                try:
+                    out.append(self._nearest(told, out[-1], b, load, m.mean))
+                except ConvergenceError as trouble:
+                    told.doubts.append(self._unknown(a.load, b.load, trouble))
+        return out[1:]
 
-        Nothing does in the step between that one and this.
+    def _nearest(self, told: Told, a: Side, b: Side, load: float, mean: float) -> Side:
+        """Where eigenvalues about a ``mean`` come nearest in a step, or a load at which they have met.
+
+        That is about a ``load``.
         """
-        told = self._told(a, b)
-        if told.doubts:
-            return told
-        return self._beside(told, a, b) if told.events else self._quiet(told, last, a, b)
+        low, high, mine = a, b, self._side(a, load)
+        for _ in range(NEARER):
+            if mine.spectrum.numbers != a.spectrum.numbers:
+                return mine
+            move = _move(low, mine, high, mean)
+            if abs(move) < CLOSEST * abs(b.load - a.load):
+                break
+            low, high = (mine, high) if move * (b.load - a.load) > 0.0 else (low, mine)
+            mine = self._side(mine, mine.load + move)
+        for m in _meetings(a, mine, b):
+            if abs(m.t) < BESIDE and not m.flat:
+                self._examine(told, mine, m.places)
+        return mine
 
-    def _quiet(self, told: Told, last: Side | None, a: Side, b: Side) -> Told:
-        """The same of a step of which no events are ``told``."""
-        before, here, after = (None if side is None else signature(side.found) for side in (last, a, b))
-        try:
-            if last is not None and here != after == before:
-                told.doubts += [self._near_at(a.load)] if self.hidden.at_row(a, last) else []
-            if here != after:
-                return told
-            if last is None or last.load == a.load or before != here:
-                last = self._side(a, a.load + PART * (b.load - a.load))
-                if signature(last.found) != here:
-                    return self._told(a, last).and_then(self._told(last, b))
-            for load in self.hidden.between(last, a, b):
-                middle = self._side(a, load)
-                told = self._told(a, middle).and_then(self._told(middle, b))
-                if not told.events and not told.doubts:
-                    told.doubts.append(self._near_at(load))
-                return told
-        except ConvergenceError as trouble:
-            told.doubts.append(self._unknown(a.load, b.load, trouble))
-        return told
+    def _keep(self, side: Side, places: list[int]) -> None:
+        """Keep eigenvalues that come near one another about a side, to be compared with another mesh."""
+        cluster = cluster_at(self.eigensolver.at(side.x), side.spectrum, places)
+        if (value := float(side.spectrum.values[places].var().real)) != 0.0:
+            self.near.append(Near(side, cluster, value))
 
-    def _beside(self, told: Told, a: Side, b: Side) -> Told:
-        """What happens in a step, also what comes and goes on either side of the events that were ``told`` of it."""
-        for low, high in self._pieces(a, b, [event.load for event in told.events]):
-            ends = [side if load == side.load else None for side, load in ((a, low), (b, high))]
-            try:
-                first, last = (end or self._side(a, load) for end, load in zip(ends, (low, high), strict=True))
-            except ConvergenceError as trouble:
-                told.doubts.append(self._unknown(low, high, trouble))
-                continue
-            self.hidden.forget()
-            more = self._quiet(Told(), None, first, last)
-            if sum(event.change for event in more.events) == 0:
-                told = told.and_then(replace(more, entered=0))
-        self.hidden.forget()
-        return told
+    def _examine(self, told: Told, side: Side, places: list[int]) -> None:
+        """Say that eigenvalues may meet at a side, for round-off; else keep them, to be compared with another mesh."""
+        pencil = self.eigensolver.at(side.x)
+        cluster = cluster_at(pencil, side.spectrum, places)
+        if len(places) == 1:
+            value, noise = cluster.mean, 2.0 * side.spectrum.zero
+        else:
+            here = measure(pencil, cluster)
+            value, noise = here.discriminant, noise_of(pencil, here).of_discriminant
+        if abs(value) <= noise:
+            told.doubts.append(self._near_at(side.load))
+        else:
+            self.near.append(Near(side, cluster, value))
 
     def _unknown(self, low: float, high: float, trouble: ConvergenceError) -> str:
         """Words for two loads between which something may come and go, for a reason."""
@@ -153,9 +165,9 @@ class CriticalLoads:
         return self._told(a, middle).and_then(self._told(middle, b))
 
     def _side(self, a: Side, load: float) -> Side:
-        """A load of a step that begins at a side: the equilibrium, and what is found there."""
+        """A load of a step that begins at a side: the equilibrium, and its eigenvalues."""
         x = at_load(self.solver, a.x, load)
-        return Side(load, x, leftmost(self.eigensolver.at(x), self.number, self._before))
+        return Side(load, x, self.eigensolver.at(x).spectrum)
 
     def _whole(self, a: Side, b: Side) -> Told:
         """What happens in a step that is not parted."""
@@ -164,37 +176,36 @@ class CriticalLoads:
         left = sum(event.change for event in negative)
         for event in negative:  # both are unstable before and after
             event.change = 0
-        known, passed = {a.load: a.found, b.load: b.found}, 0
+        known, passed = {a.load: a, b.load: b}, 0
         for piece in self._pieces(a, b, [event.load for event in negative]):
-            first, last = ((known[x] if x in known else self._near(a.x, x)).diverged() for x in piece)
-            told = told.and_then(self._diverging(a.x, piece, first, last))
+            first, last = (len((known.get(x) or self._side(a, x)).spectrum.negative) for x in piece)
+            told = told.and_then(self._diverging(a, piece, first, last))
             passed += last - first
-        if a.found.diverged() + passed - left != b.found.diverged() and not told.doubts:
+        numbers = [len(side.spectrum.negative) for side in (a, b)]
+        if numbers[0] + passed - left != numbers[1] and not told.doubts:
             told.doubts.append(
                 f"Between {self._load} = {a.load:.6g} and {b.load:.6g} the number of negative eigenvalues changes from "
-                f"{a.found.diverged()} to {b.found.diverged()}, which what was found does not explain: use a smaller "
-                "range."
+                f"{numbers[0]} to {numbers[1]}, which what was found does not explain: use a smaller range."
             )
-        if not negative and not told.doubts and self._exchanged(a.found, b.found):
+        if not negative and not told.doubts and self._exchanged(a, b):
             told.doubts.append(
                 f"Whether eigenvalues that are negative at {self._load} = {a.load:.6g} and at {b.load:.6g} are the "
                 "same ones, or some pass through zero between them, others back, is not known: use a smaller range."
             )
         return told
 
-    def _exchanged(self, before: Frequencies, after: Frequencies) -> bool:
+    def _exchanged(self, a: Side, b: Side) -> bool:
         """Whether other eigenvalues may be negative after a step than before, by vectors.
 
         Near rigid motions vectors are round-off.  What passes through zero in a small part of a step changes all the
         same by as much as it is.
         """
-        mine, others = before.negative(), after.negative()
-        if not strange(self.solver.system.comm, before, after, mine, others):
+        if not others_negative(a.spectrum, b.spectrum):
             return False
-        if not self._parted or len(mine) != len(others):
+        before, after = (np.sort(s.spectrum.values[s.spectrum.negative].real) for s in (a, b))
+        if not self._parted or len(before) != len(after):
             return True
-        a, b = before.values[mine].real, after.values[others].real
-        return bool((abs(a - b) > SMALL * abs(a)).any())
+        return bool((abs(before - after) > SMALL * abs(before)).any())
 
     @staticmethod
     def _pieces(a: Side, b: Side, between: list[float]) -> list[tuple[float, float]]:
@@ -209,7 +220,7 @@ class CriticalLoads:
         edges.append(b.load)
         return [(x, y) for x, y in zip(edges[::2], edges[1::2], strict=True) if (y - x) * width > 0]
 
-    def _diverging(self, guess: PETSc.Vec, span: tuple[float, float], first: int, last: int) -> Told:
+    def _diverging(self, a: Side, span: tuple[float, float], first: int, last: int) -> Told:
         """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``.
 
         At the loads of the ``span``, in the order of the sweep, so many are negative.
@@ -219,10 +230,10 @@ class CriticalLoads:
         for number in range(min(first, last), max(first, last)):
 
             def mu(load: float, number: int = number) -> float:
-                return self._real(guess, load)[number]
+                return self._real(a, load)[number]
 
             try:
-                found.append(self._zero(mu, loads[0], loads[1], self._near(guess, loads[0]).noise))
+                found.append(self._zero(mu, loads[0], loads[1], self._side(a, loads[0]).spectrum.zero))
                 ends = min(abs(mu(loads[0])), abs(mu(loads[1])))
                 beyond = abs(mu(found[-1])) > max(ends, self.units.omega2)
             except (ConvergenceError, IndexError, ValueError):
@@ -243,7 +254,7 @@ class CriticalLoads:
         out = Told()
         for group in together:
             try:
-                out.events.append(self._divergence(guess, group, loads, 1 if last > first else -1))
+                out.events.append(self._divergence(a, group, loads, 1 if last > first else -1))
             except ConvergenceError as trouble:
                 out.doubts.append(str(trouble))
         return out
@@ -251,32 +262,40 @@ class CriticalLoads:
     def _zero(self, mu: Callable[[float], float], low: float, high: float, noise: float) -> float:
         """Load at which ``mu`` vanishes: a bound where it does there but for ``noise``: its sign says nothing then."""
         for load in (low, high):
-            if abs(mu(load)) <= min(noise, REAL * self.units.omega2):
+            if abs(mu(load)) <= noise:
                 return load
         return zero_between(mu, low, high, ROUND_OFF * max(abs(low), abs(high)))
 
-    def _divergence(self, guess: PETSc.Vec, loads: list[float], bounds: list[float], sign: int) -> Critical:
+    def _divergence(self, a: Side, loads: list[float], bounds: list[float], sign: int) -> Critical:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero.
 
         Those that are zero at all loads are among them: there they are not told apart, and they add nothing.  The load
         is within ``bounds``.
         """
-        pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
-        size = number + self._still
-        found = pencil.near(size + 2, SHIFT * self.units.omega2)
-        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:size].tolist())
-        mean = Mean(Measuring(self.solver, self.eigensolver, guess), cluster, self._still)
+        at, number = self._side(a, loads[0]), len(loads)
+        places = np.argsort(abs(at.spectrum.values), kind="stable")[: number + self._still].tolist()
+        cluster = cluster_at(self.eigensolver.at(at.x), at.spectrum, places)
+        mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, self._still)
         load, uncertainty = interpolated_zero(mean, loads[0], self.units.load)
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
         inside = min(max(load, bounds[0]), bounds[1])
         load, uncertainty = inside, uncertainty + abs(load - inside)
         return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster, still=self._still)
 
-    def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
+    def _real(self, a: Side, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order, but for those that are zero at all loads."""
-        real = [v.real for v in self._near(guess, load).values if v.imag == 0]
+        values = self._side(a, load).spectrum.values
+        real = values[values.imag == 0].real.tolist()
         return sorted(sorted(real, key=abs)[self._still :])
 
-    def _near(self, guess: PETSc.Vec, load: float) -> Frequencies:
-        """Eigenvalues at a load near the origin, and what became of the complex ones after it."""
-        return leftmost(self.eigensolver.at(at_load(self.solver, guess, load)), self.number, self._before)
+
+def _meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
+    """What comes near zero between a row and its neighbours."""
+    ratio = abs(before.load - row.load) / abs(behind.load - row.load)
+    return meetings(row.spectrum, before.spectrum, behind.spectrum, ratio)
+
+
+def _move(low: Side, row: Side, high: Side, mean: float) -> float:
+    """Change of the load from a row to where eigenvalues about a ``mean`` meet within its neighbours; zero for none."""
+    found = [m for m in _meetings(low, row, high) if not m.flat and abs(m.mean - mean) < SAME * abs(mean)]
+    return min((m.t * (high.load - row.load) for m in found), key=abs, default=0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -12,7 +13,7 @@ from rodfem.continuation.flutter import ENOUGH
 from rodfem.continuation.interpolant import in_doubt, real_root, zero_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster
-from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.condensed import SHIFT
 from rodfem.tolerances import round_off, unit
 
 if TYPE_CHECKING:
@@ -82,7 +83,9 @@ def zero_near(mean: Mean, load: float, one: float) -> tuple[float, float]:
     from scipy.optimize import newton  # slow to load
 
     step = BESIDE * unit(load, one=one)
-    found, result = newton(mean, load, x1=load + step, tol=round_off(load, one), full_output=True, disp=False)
+    with catch_warnings():  # two equal values end the secants
+        simplefilter("ignore", RuntimeWarning)
+        found, result = newton(mean, load, x1=load + step, tol=round_off(load, one), full_output=True, disp=False)
     slope = (mean(found + step) - mean(found - step)) / (2 * step)
     left = mean.noise(found)
     if not result.converged:  # round-off of the mean may be more than the tolerance

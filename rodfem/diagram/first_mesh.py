@@ -27,7 +27,7 @@ from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
-from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.condensed import SHIFT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import unit
 

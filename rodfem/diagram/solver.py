@@ -114,8 +114,6 @@ class Solver:
             compat.require_real_petsc()
         if form_compiler.ALONE:
             compile_ahead("linalg/chain", "fem/assembly", "fem/newton", "fem/shape", "continuation/step")
-            if not scene.conservative:
-                compile_ahead("stability/followed")
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

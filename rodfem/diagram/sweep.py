@@ -1,7 +1,7 @@
 """Frequencies against the load for a rod under loads without a potential, and the loads at which they become unstable.
 
-At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are found
-(:mod:`rodfem.diagram.frequency_rows`).  Between them critical loads are located
+At each load the equilibrium is solved for, and all eigenvalues ``mu = omega^2`` that the mesh has are found
+(:mod:`rodfem.stability.spectrum`); the left-most ones are recorded.  Between loads critical ones are located
 (:mod:`rodfem.diagram.critical_loads`).
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import isnan
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -21,32 +22,38 @@ from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.static_solver import StaticSolver
+from rodfem.diagram.collisions import Side
 from rodfem.diagram.critical_loads import CriticalLoads
-from rodfem.diagram.far_meetings import FarMeetings
 from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.first_state import first_state
-from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load
-from rodfem.diagram.hidden_events import missed_loads
 from rodfem.diagram.load_steps import LoadSteps
 from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.quadrature import Quadrature
 from rodfem.diagram.sweep_errors import SweepErrors
-from rodfem.diagram.unfollowed import Unfollowed
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
-from rodfem.stability.census import census
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
-from rodfem.stability.frequencies import REAL, Frequencies
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.frequencies import REAL, Frequencies, named
+from rodfem.stability.leftmost import FREQUENCIES, differ, leftmost
+from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.slow_motions import begins_slowly
 from rodfem.tolerances import unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
 ONE_LOAD = 1e-12
 """Distance of two loads, over the greatest, up to which they are one: a step between them would be round-off."""
+
+
+class Row(NamedTuple):
+    """A ``point`` of a sweep, its ``side`` of the steps there, and its left-most frequencies ``found``."""
+
+    point: Point
+    side: Side
+    found: Frequencies
 
 
 class Sweep:
@@ -67,12 +74,10 @@ class Sweep:
             self._asked.append(next(known, load))
         self.eigensolver = NonsymmetricSolver(solver.system)
         self.number = plan.spectrum or FREQUENCIES
-        self.rows = FrequencyRows(self.eigensolver, self.number)
         self.curves = Curves(solver.system.comm)
-        self.critical = CriticalLoads(solver, self.eigensolver, self.number, observer.warn)
-        self.unfollowed = Unfollowed(self.eigensolver, FarMeetings(self.critical.hidden), observer)
+        self.critical = CriticalLoads(solver, self.eigensolver, observer.warn)
         self.invariants = Invariants(solver)
-        self.last: Row | None = None
+        self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._still = self.number  # frequencies that are zero at all loads
         self.branches: list[Branch] = []
         self._load = solver.system.scene.load
@@ -122,7 +127,10 @@ class Sweep:
         self.observer.branch(branch)
         x = at_load(self.solver, x, float(loads[0]))
         self.solver.require_convexity(x)
-        if words := self.rows.first(x):
+        if not (first := self.eigensolver.at(x).spectrum).complete:
+            self.observer.note("  the mesh has too many unknowns to find all frequencies: those nearest zero are found")
+        self.eigensolver.slow = begins_slowly(first.values, first.one)
+        if words := differ(self.eigensolver.at(x), self.number):
             self.observer.warn(
                 f"The eigenvalues omega^2 of the first state are not well defined ({words}): do not trust any of this "
                 "sweep. Constraints may follow from others, or sizes of the rod's numbers may be too far apart."
@@ -141,9 +149,9 @@ class Sweep:
                 steps = steps or LoadSteps(self.solver, latest, self.span)
                 for notice in self.solver.notices():
                     self.observer.warn(notice)
-                self._take(branch, self.rows.add(latest))
+                self._take(branch, latest)
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
-            self._take(branch, self.rows.finish())
+            self._close(branch, None)
         return ""
 
     def _lost_convexity(self, a: PETSc.Vec, b: PETSc.Vec) -> str:
@@ -176,18 +184,29 @@ class Sweep:
                 return why
         return ""
 
-    def _take(self, branch: Branch, rows: list[Row]) -> None:
-        """Take rows of the grid into a branch, and the special points before each."""
-        for row in rows:
-            point, before, self.last = row.point, self.last, row
-            self._record(point, row.found, on_the_way=True)
-            self.unfollowed.look(point, last=point.load == self.span[1])
-            if before is not None:
-                self._between(branch, before, row)
-            branch.points.append(point)
-            if point.load in self._asked:
-                self._special(branch, self.solver.given(USER, point))
-            self.observer.progress(branch, point)
+    def _take(self, branch: Branch, point: Point) -> None:
+        """Find the eigenvalues of the next row; the step before the last one can be taken then."""
+        pencil = self.eigensolver.at(point.x)
+        row = Row(point, Side(point.load, point.x, pencil.spectrum), self._named(pencil))
+        self._close(branch, row)
+        self._rows = [*self._rows[-1:], row]
+
+    def _close(self, branch: Branch, following: Row | None) -> None:
+        """Take the last row, before the ``following`` one, into a branch, and the special points before it."""
+        if not self._rows:
+            return
+        before, row = self._rows[-2:-1], self._rows[-1]
+        self._record(row, on_the_way=True)
+        if before:
+            self._between(branch, before[0], row, following)
+        branch.points.append(row.point)
+        if row.point.load in self._asked:
+            self._special(branch, self.solver.given(USER, row.point))
+        self.observer.progress(branch, row.point)
+
+    def _named(self, pencil: NonsymmetricPencil) -> Frequencies:
+        """The left-most frequencies of a state with the names of those that are recorded."""
+        return named(pencil.system, [(leftmost(pencil, self.number), pencil.turned)], self.number)[0]
 
     def _family(self, last: Point) -> None:
         """Say where frequencies are zero at all loads, without a symmetry, to which the ``last`` one belongs, too."""
@@ -205,16 +224,9 @@ class Sweep:
         )
 
     def at(self, x: PETSc.Vec) -> Point:
-        """Evaluate the records of an equilibrium by itself; unstable are all eigenvalues of the mesh that are."""
-        point = self._beside(x)
-        if (everything := census(self.eigensolver.at(x))) is not None:
-            point.negative = max(point.negative, len(everything.unstable))
-        return point
-
-    def _beside(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""
-        point, before = self._point(x), NONE if self.last is None else self.last.found
-        self._record(point, leftmost(self.eigensolver.at(x), self.number, before), on_the_way=False)
+        point, pencil = self._point(x), self.eigensolver.at(x)
+        self._record(Row(point, Side(point.load, x, pencil.spectrum), self._named(pencil)), on_the_way=False)
         return point
 
     def _point(self, x: PETSc.Vec) -> Point:
@@ -249,27 +261,28 @@ class Sweep:
             error=0.0,
         )
 
-    def _record(self, point: Point, found: Frequencies, *, on_the_way: bool) -> None:
-        """Record the frequencies ``found`` at a point; a special point is not ``on_the_way`` of the curves."""
-        values = found.values
-        point.negative = found.unstable(found.noise)
-        still = int((abs(values) < min(found.noise, REAL * self.units.omega2)).sum())
+    def _record(self, row: Row, *, on_the_way: bool) -> None:
+        """Record the frequencies of a row at its point; a special point is not ``on_the_way`` of the curves."""
+        point, found = row.point, row.found
+        point.negative = row.side.spectrum.unstable
+        still = int((abs(found.values) < min(found.noise, REAL * self.units.omega2)).sum())
         point.zero += still
         self._still = min(self._still, still)
-        point.omega2 = [[float(v.real), float(v.imag)] for v in values[: self.number]]
+        point.omega2 = [[float(v.real), float(v.imag)] for v in found.values[: self.number]]
         point.motion = list(found.kinds[: self.number])
         point.curve = self.curves.numbers(found, keep=on_the_way)[: self.number]
 
-    def _between(self, branch: Branch, first: Row, second: Row) -> None:
+    def _between(self, branch: Branch, first: Row, second: Row, following: Row | None) -> None:
         """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
-        a, b = first.point, second.point
+        a, b, behind = first.point, second.point, following and following.side
+        still = min(first.found.still(), second.found.still())
         with self.solver.system.clock.scope("location"):
-            told = self.critical.between(first, second)
+            told = self.critical.between(first.side, second.side, behind, still)
         events, negative = told.events, a.negative
         explained = negative + sum(e.change for e in events) + told.entered == b.negative
         for i, event in enumerate(events):
             point = a if event.load == a.load else b if event.load == b.load else None
-            point = point or self._beside(at_load(self.solver, a.x, event.load))
+            point = point or self.at(at_load(self.solver, a.x, event.load))
             after_it = negative + event.change
             if explained and i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded
@@ -288,10 +301,9 @@ class Sweep:
             branch.unexplained.append(change)
             self.observer.warn(str(change))
         elif told.entered > 0:
-            self.observer.warn(
-                f"{told.entered} eigenvalues that are found at {self._load} = {b.load:.6g} and not at {a.load:.6g} are "
-                f"complex at both: the rows before, which count {a.negative}, may count too few. Ask for more "
-                "frequencies."
+            self.observer.note(
+                f"  {told.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} "
+                "by no more than round-off"
             )
 
     def _within_bars(self, branch: Branch) -> None:
@@ -333,6 +345,6 @@ class Sweep:
                     errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
-            with without("Whether a richer mesh has more critical loads was not examined", comm, warn):
-                for words in missed_loads(branch, self.critical.hidden.near, errors.measured, self._load):
+            for near in self.critical.near:
+                if words := errors.missed(near):
                     warn(words)

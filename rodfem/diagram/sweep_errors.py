@@ -9,11 +9,12 @@ from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.collisions import Measuring, located_flutter
+from rodfem.diagram.collisions import Measuring, Near, located_flutter
 from rodfem.diagram.divergence_loads import Mean, zero_near
 from rodfem.diagram.held import at_load
+from rodfem.errors import ConvergenceError
 from rodfem.fem.transfer import Transfer, halved, richer_system
-from rodfem.stability.cluster import Cluster, Measured, as_vectors
+from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off
 
@@ -70,13 +71,24 @@ class SweepErrors:
         beside = at_load(self.richer, x, s.point.load + step)
         return abs(self.richer.shape.ordinate(beside) - self.richer.shape.ordinate(x))
 
-    def measured(self, x: PETSc.Vec, load: float, cluster: Cluster) -> Measured:
-        """A ``cluster`` at a ``load`` on the richer discretisation; ``x`` is a state near that.
-
-        Raises :class:`~rodfem.errors.ConvergenceError` where it is not found there.
-        """
-        at = Measuring(self.richer, self.eigensolver, self.transfer(x, state=True))
-        return at(load, self._transferred(cluster))
+    def missed(self, near: Near) -> str:
+        """Sentence on a load at which critical loads may be missing, as the richer mesh is nearer to them; or none."""
+        side, single = near.side, near.cluster.size == 1
+        try:
+            at = Measuring(self.richer, self.eigensolver, self.transfer(side.x, state=True))
+            here = at(side.load, self._transferred(near.cluster))
+            again = here.cluster.mean if single else here.discriminant
+            found = f"{near.value:.2g} on this mesh, and {again:.2g} on a richer one"
+            if again / near.value > 0.5:  # where less remains its sign is in doubt
+                return ""
+        except ConvergenceError:
+            found = f"{near.value:.2g} on this mesh, and not found on a richer one"
+        what = "an eigenvalue is nearest to zero" if single else "two frequencies are nearest to one another"
+        measure = "its distance" if single else "the square of half the difference of their omega^2"
+        return (
+            f"Near {self.solver.system.scene.load} = {side.load:.8g} {what}: {measure} is {found}. A pair of critical "
+            "loads may be missing there, use more elements."
+        )
 
     def _cluster(self, s: SpecialPoint) -> Cluster:
         """The cluster of a special point on the richer discretisation."""

@@ -14,7 +14,6 @@ from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.first_mesh import check_start, frequency_mesh
-from rodfem.diagram.frequency_rows import FREQUENCIES
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import Sweep
@@ -25,6 +24,7 @@ from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains
 from rodfem.ranks import end_together
+from rodfem.stability.leftmost import FREQUENCIES
 from rodfem.timing import Clock
 
 PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")

@@ -15,14 +15,11 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
-from rodfem.stability.census import census
 from rodfem.stability.dense import check_number
 from rodfem.stability.method import Found, Method
 from rodfem.stability.methods import AUTO, METHODS, find
-from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
-from rodfem.stability.slow_motions import noise_of_slow
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
@@ -30,8 +27,6 @@ COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
 SMALL = 12
 """A system with fewer unknowns than this for each eigenvalue is solved by dense matrices."""
-ZERO = 1e-7
-"""Real and imaginary parts of mu below this, relative to the stiffness over the length, are zero (no potential)."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,7 @@ class Verdict:
         Index, number of zero eigenvalues (symmetry modes included), and of those whose sign is not decided, which are
         not among the negative ones; under non-conservative loads the number of eigenvalues with a negative real part
         or an imaginary part, of all that the mesh has (of those found, where it is too large for
-        :func:`~rodfem.stability.census.census`), and that of free motions.
+        :class:`~rodfem.stability.spectrum.Spectrum`), and that of free motions.
     values, vectors, errors
         Left-most eigenvalues ``mu = omega^2`` without symmetry modes (under non-conservative loads those nearest zero),
         their vectors (without multipliers where constraints were reduced), and backward errors.  No vectors where mu is
@@ -153,13 +148,7 @@ class Assessor(Workspace):
         if self.inertia is None:
             with as_failure(self.system.comm):
                 found = self._method(name).nearest(x, max(number, 1))
-            pencil = self.nonsymmetric.at(x)
-            scale = min(ZERO * least_eigenvalue(self.system), noise_of_slow(pencil, found.values))
-            bad = int(((found.values.real < -scale) | (abs(found.values.imag) > scale)).sum())
-            everything = census(pencil)
-            if everything is not None:
-                bad = max(bad, len(everything.unstable))
-            index, zero, nothing = bad, self.system.active_drifts(x), np.zeros(0)
+            index, zero, nothing = self.nonsymmetric.at(x).spectrum.unstable, self.system.active_drifts(x), np.zeros(0)
             inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing
             made = 0
         else:

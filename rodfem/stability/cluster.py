@@ -75,7 +75,7 @@ def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
 
 
 def members(
-    pencil: NonsymmetricPencil, basis: np.ndarray, cluster: Cluster, near: Callable[[int, complex], Frequencies]
+    pencil: NonsymmetricPencil, basis: np.ndarray, cluster: Cluster, near: Callable[[int, float], Frequencies]
 ) -> tuple[Frequencies, list[int], np.ndarray]:
     """Eigenvalues of a ``pencil`` ``near`` the mean of a ``cluster`` that are its own, by shares in its ``basis``.
 

@@ -11,9 +11,8 @@ from mpi4py import MPI
 from rodfem.fem.system import System
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
+from rodfem.stability.condensed import REAL
 
-REAL = 1e-7
-"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 MULTIPLE = 1e-8
 """Eigenvalues that differ by less than this, relative, are one that is multiple."""
 ALIKE = 1e-6
@@ -31,12 +30,12 @@ EPS = float(np.finfo(float).eps)
 class Frequencies:
     """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
 
-    Errors are backward errors; of eigenvalues that were followed (:mod:`rodfem.stability.followed_pairs`) relative ones
-    of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
-    (n, k) are complex, or real where all eigenvalues are, with the n unknowns of this rank, ``weighed`` (n, k) are
-    their products with the mass, and ``one`` is the natural size of the eigenvalues.  The rod is ``floating`` where
-    nothing holds it: it has zero eigenvalues.  Of a rod that is held and has slow motions, as a stiff one on soft
-    springs, the ``floor`` is what round-off makes of zero; it is infinite elsewhere.
+    Errors are those of ``1 / (mu - shift)`` over the greatest.  ``kinds`` names the motion of each: see
+    :mod:`rodfem.stability.mode_type`.  ``vectors`` (n, k) are complex, or real where all eigenvalues are, with the n
+    unknowns of this rank, ``weighed`` (n, k) are their products with the mass, and ``one`` is the natural size of the
+    eigenvalues.  The rod is ``floating`` where nothing holds it: it has zero eigenvalues.  Of a rod that is held and
+    has slow motions, as a stiff one on soft springs, the ``floor`` is what round-off makes of zero; it is infinite
+    elsewhere.
     """
 
     values: np.ndarray
@@ -73,21 +72,20 @@ class Frequencies:
         least = REAL * float(abs(self.values).min(initial=np.inf))
         return min(max(REAL * self.one, least), max(self.floor, least))
 
-    def negative(self) -> list[int]:
-        """Places of the negative real eigenvalues."""
-        return [int(i) for i in np.flatnonzero((self.values.imag == 0) & (self.values.real < -self.noise))]
-
-    def diverged(self) -> int:
-        """Number of negative real eigenvalues."""
-        return len(self.negative())
-
     def still(self) -> int:
         """Number of eigenvalues that are zero: of rigid motions, and their partners in Jordan blocks."""
         return int((abs(self.values) < STILL * self.far).sum())
 
-    def unstable(self, tolerance: float) -> int:
-        """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
-        return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
+
+def in_order(found: Frequencies) -> Frequencies:
+    """Frequencies by their real parts."""
+    values = found.values
+    order = np.lexsort((values.imag, np.round(values.real / min(found.one, found.natural), 6)))
+    kinds = tuple(found.kinds[i] for i in order) if found.kinds else ()
+    vectors, weighed = found.vectors[:, order], found.weighed[:, order]
+    return replace(
+        found, values=values[order], errors=found.errors[order], kinds=kinds, vectors=vectors, weighed=weighed
+    )
 
 
 def named(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from petsc4py import PETSc
 
 from rodfem.fem.system import System
 from rodfem.tolerances import TINY
@@ -80,9 +79,3 @@ def names(shares: np.ndarray) -> list[str]:
     mixed = np.where(shares[:, 0] + shares[:, 1] > PURE, len(KINDS), len(KINDS) + 1)
     found = [kinds[i] for i in np.where(shares.max(axis=1) > PURE, shares.argmax(axis=1), mixed).tolist()]
     return [STRAIGHT if not share.any() else kind for share, kind in zip(shares, found, strict=True)]
-
-
-def halves(vector: PETSc.Vec) -> list[np.ndarray]:
-    """Real and imaginary part of this rank's values of a vector of a complex PETSc; the one part of a real one."""
-    values = vector.array_r
-    return [values.real.copy(), values.imag.copy()] if np.iscomplexobj(values) else [values.copy()]

@@ -4,7 +4,7 @@ A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low
 couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
 axis: flutter.
 
-Which eigenvalues are finite, near which shift: :mod:`~rodfem.stability.finite_pairs`.
+The finite eigenvalues are those of the pencil on its unknowns with mass: :mod:`~rodfem.stability.condensed`.
 
 A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
 ``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
@@ -12,39 +12,42 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cached_property, partial
+
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 from petsc4py import PETSc
-from slepc4py import SLEPc
+from scipy.sparse.linalg import splu
 
 from rodfem import compat
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain, Elimination, GaveUpError
-from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors
-from rodfem.linalg.matrices import Shared, gathered, local_rows, petsc_matrix, places_in, shared
+from rodfem.linalg.factorization import Factors
+from rodfem.linalg.matrices import Shared, gathered, local_rows, places_in, shared
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
-from rodfem.stability.finite_pairs import SHIFT, FinitePairs
-from rodfem.stability.frequencies import REAL, Frequencies, named, orthonormal, product, squares
+from rodfem.stability.condensed import SHIFT, Condensed
+from rodfem.stability.frequencies import REAL, Frequencies, in_order, named, orthonormal, product, squares
 from rodfem.stability.pencil import (
     FACTORS,
-    Inverse,
     PencilMatrices,
     StatePencil,
     assemble_pencil,
     exclude_modes,
-    shift_invert,
     symmetry_modes,
     weighed_modes,
-    with_factors,
 )
+from rodfem.stability.slow_motions import floor_of_slow
+from rodfem.stability.spectrum import Spectrum, inside
 from rodfem.tolerances import NEGLIGIBLE
 
 BEYOND = 6
 """Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
+SPARE = 2
+"""Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
 PILE = 64
 """States after which what PETSc keeps of matrices that are not used any more is destroyed."""
 
@@ -101,6 +104,10 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """Be the state that the matrices were just filled for."""
         super().__init__(shared)
         self.turned, self._free, self._own, self.slow = shared.turned, shared.free, slice(None), shared.slow
+        if self.system.comm.size > 1:
+            self._own = slice(*shared.matrix.getOwnershipRange())
+        self.floating = shared.floating
+        self._condensed = dict[float, Condensed]()
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -118,13 +125,12 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         small[np.searchsorted(used, rows), np.searchsorted(used, columns)] = values
         return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(used) else (0, 0.0)
 
-    def near(self, number: int, target: complex) -> Frequencies:
+    def near(self, number: int, target: float) -> Frequencies:
         """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
 
-        Fewer are returned only where the discretisation has no more finite ones.  A pencil hardly larger than the
-        Krylov space for ``number`` of them is solved by dense reductions.
+        Fewer are returned only where the discretisation has no more finite ones.
         """
-        return self._near(number, target, *self._whole())
+        return self._near(number, target)
 
     def near_zero(self, number: int) -> Frequencies:
         """Return more than the ``number`` eigenvalues nearest zero, in ascending order of their real parts."""
@@ -134,65 +140,99 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """Return the same of the transposed pencil."""
         return self.left(number + BEYOND, SHIFT * self.system.scene.units.omega2)
 
-    def left(self, number: int, target: complex) -> Frequencies:
+    def left(self, number: int, target: float) -> Frequencies:
         """Return those of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation.
 
         They have no parts along free motions ``g``: of ``S g = 0`` follows ``z.Mg = 0``.
         """
-        matrix, mass = self._whole()
-        transposed = matrix.copy()
-        transposed.transpose()
-        try:
-            return self._near(number, target, transposed, mass, left=True)
-        finally:
-            transposed.destroy()
+        return self._near(number, target, left=True)
 
-    def _whole(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """The pencil; on several ranks all of it on each, which solves alone."""
-        pencil = self.in_units()
-        if self.system.comm.size == 1:
-            return pencil
-        self._own = slice(*self.matrix.getOwnershipRange())
-        whole, mass = (petsc_matrix(MPI.COMM_SELF, gathered(matrix)) for matrix in pencil)
-        return whole, mass
-
-    def _near(
-        self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat, *, left: bool = False
-    ) -> Frequencies:
-        target /= self.system.scene.units.omega2
+    def _near(self, number: int, target: float, *, left: bool = False) -> Frequencies:
         with self.system.clock("stability"):
-            apart = (self.system.load_index, *self.system.drifts)
-            found = FinitePairs(matrix, mass, self._solve, apart, self._own).near(number, target)
-            vectors = np.stack([p.vector for p in found], axis=1)
-            values, errors = np.array([p.value for p in found]), np.array([p.error for p in found])
-            return named(self.system, [(self.unnamed(values, errors, vectors, left=left), self.turned)])[0]
+            condensed = self.condensed(target)
+            nu, noise, w = condensed.greatest(number + SPARE, left=left)
+            kept = slice(0, len(nu) - _half(nu))
+            nu, noise = nu[kept], noise[kept]
+            found = self._found(
+                condensed, condensed.values(nu, noise), noise / abs(nu).max(initial=0.0), nu, w[:, kept], left=left
+            )
+            return named(self.system, [(in_order(found), self.turned)])[0]
 
-    def unnamed(
+    @cached_property
+    def spectrum(self) -> Spectrum:
+        """All eigenvalues that the mesh has; of a mesh with many unknowns those nearest zero."""
+        with self.system.clock("stability"):
+            one = self.system.scene.units.omega2
+            found = Spectrum(self.condensed(SHIFT * one), one)
+            return replace(found, floor=floor_of_slow(self, found))
+
+    def nearest(self, number: int) -> Frequencies:
+        """Those of the spectrum nearest to its shift, ``number`` or one less, not to cut a pair, not named yet."""
+        pairs, spectrum = self.spectrum.condensed.pairs, self.spectrum
+        kept = min(number, len(pairs.nu))
+        kept -= _half(pairs.nu[:kept])
+        return self.of(spectrum, np.arange(kept))
+
+    def of(self, spectrum: Spectrum, places: np.ndarray) -> Frequencies:
+        """Frequencies of some eigenvalues of a ``spectrum`` of this state, in its order and not named yet."""
+        pairs, values = spectrum.condensed.pairs, spectrum.values[places] / spectrum.one
+        errors, nu = pairs.noise[places] / abs(pairs.nu).max(initial=0.0), pairs.nu[places]
+        known = None if pairs.vectors is None else pairs.vectors[:, places]
+        found = self._found(spectrum.condensed, values, errors, nu, pairs.right[:, places], known)
+        return replace(found, floor=spectrum.floor)
+
+    def shares(self, basis: np.ndarray) -> np.ndarray:
+        """Share (k,) of the vector of each eigenvalue of the spectrum in the span of a real ``basis`` (n, m)."""
+        whole = np.concatenate(self.system.comm.allgather(basis / self.sizes.array_r.real[:, None]))
+        condensed = self.spectrum.condensed
+        return inside(condensed.dual.T @ whole[condensed.heavy], condensed.pairs.right)
+
+    def condensed(self, target: float) -> Condensed:
+        """The pencil on its unknowns with mass, about a shift; raises :class:`ConvergenceError` where it is singular.
+
+        On several ranks each of them has all of it.
+        """
+        self._held()
+        if target not in self._condensed:
+            shift = target / self.system.scene.units.omega2
+            factors = self.eliminated(target)
+            if factors is not None:
+                mass, solve, transposed = self.mass_in_units(), factors.solve, factors.solve_transposed
+            else:
+                stiffness, mass = (gathered(A) for A in self.in_units())
+                try:
+                    lu = splu((stiffness - shift * mass).real.tocsc())
+                except RuntimeError as trouble:
+                    raise ConvergenceError(_singular(target)) from trouble
+                mass, solve, transposed = mass.real, lu.solve, partial(lu.solve, trans="T")
+            self._condensed = {target: Condensed(mass, solve, transposed, shift)}  # factors are those of one shift
+        return self._condensed[target]
+
+    def _found(
         self,
+        condensed: Condensed,
         values: np.ndarray,
         errors: np.ndarray,
-        vectors: np.ndarray,
-        weighed: np.ndarray | None = None,
+        nu: np.ndarray,
+        w: np.ndarray,
+        known: np.ndarray | None = None,
         *,
         left: bool = False,
     ) -> Frequencies:
-        """Frequencies of ``values`` with their ``errors`` and ``vectors`` before their motions are named.
+        """Frequencies of ``values`` (k,) in natural units, with their ``errors``, of pairs ``nu``, ``w`` of ``T``.
 
-        Vectors (n, k) are complex, in units of natural sizes, and those of the transposed pencil where they are
-        ``left`` ones.  The ``weighed`` vectors are the products with the mass, in the same units, where they are known.
+        Their vectors may be ``known`` (n, k).
         """
         units = self.system.scene.units
+        vectors = (condensed.vectors(nu, w, left=left) if known is None else known)[self._own]
+        weighed = condensed.spread(w)[self._own] if units.ordinary and not (self._free or left) else None
         if not units.ordinary:
-            values, vectors, weighed = values * units.omega2, vectors * self.sizes.array_r.real[:, None], None
+            values, vectors = values * units.omega2, vectors * self.sizes.array_r.real[:, None]
         if self._free and not left:
-            vectors, weighed = vectors.astype(complex), None
+            vectors = vectors.astype(complex)
             self._complete(values, vectors)
-        order = np.lexsort((values.imag, np.round(values.real / units.omega2, 9)))
-        if (np.diff(order) != 1).any():
-            values, errors, vectors = values[order], errors[order], vectors[:, order]
-            weighed = None if weighed is None else weighed[:, order]
         weighed = self.weighed(vectors) if weighed is None else weighed
-        return Frequencies(values, errors, (), vectors, weighed, units.omega2, self._shared.floating)
+        return Frequencies(values, errors, (), vectors, weighed, units.omega2, self.floating)
 
     def motion(self, basis: np.ndarray) -> str:
         """Type of the motion spanned by a ``basis`` (n, k)."""
@@ -249,34 +289,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             shares[moving] = work[moving] / values[moving]
             vectors += np.outer(mode.array_r.real, shares)
 
-    def _solve(self, matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
-        """Run SLEPc; raises :class:`ConvergenceError` where it finds nothing at all, or has no factors to do so.
-
-        A small pencil has few finite eigenvalues, and a Krylov space that holds all of them breaks down on the Jordan
-        blocks of the infinite ones: it is then made smaller.
-        """
-        inverse = self._inverse(matrix, mass, target)
-        while number:
-            try:
-                if inverse is None:
-                    solver = shift_invert(matrix, mass, number, target)
-                else:
-                    solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
-                solver.setUp()
-            except PETSc.Error as trouble:
-                raise ConvergenceError(_singular(target)) from trouble
-            try:
-                solver.solve()
-            except PETSc.Error as trouble:
-                if trouble.ierr != PETSC_ERR_LIB:
-                    raise
-            else:
-                if solver.getConverged():
-                    return solver
-            solver.destroy()
-            number //= 2
-        raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
-
     def eliminated(self, target: float) -> Elimination | None:
         """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
         if self.system.comm.size > 1 or compat.COMPLEX:
@@ -284,9 +296,21 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         own, mass, kept = shared(self.matrix), shared(self.mass), self._shared.inverted
         if own and mass and kept and isinstance(kept[1], Chain) and self.system.scene.units.ordinary:
             return self._refactored(kept[1], own, mass, target)
-        inverse = self._inverse(*self.in_units(), target / self.system.scene.units.omega2)
-        factors = None if inverse is None else inverse.factors
-        return factors.elimination if isinstance(factors, Chain) and not factors.resorted else None
+        matrix, mass = self.in_units()
+        if kept is None:
+            rows = matrix.size[0] if self.system.fields.along else 0
+            factors = factors_of("lu", self.system.comm, rows, self.system.fields.dense_rows, {8: 0}, prefix=FACTORS)
+            self._shared.inverted = kept = matrix.copy(), factors
+        else:
+            matrix.copy(kept[0], PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        shifted, factors = kept
+        if not isinstance(factors, Chain):
+            return None
+        shifted.axpy(-target / self.system.scene.units.omega2, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        factors(shifted)
+        if not factors.regular:
+            raise ConvergenceError(_singular(target))
+        return None if factors.resorted else factors.elimination
 
     def _refactored(self, factors: Chain, own: Shared, mass: Shared, target: float) -> Elimination | None:
         """The same by factors that know the pattern, of values that need no matrix of PETSc's."""
@@ -303,28 +327,12 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             raise ConvergenceError(_singular(target))
         return factors.elimination
 
-    def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
-        """Inverse of ``matrix - target mass`` along the rod; None: SLEPc's own.
 
-        The pencil of twice the size that a complex shift makes is SLEPc's and MUMPS's.
-        """
-        rows, comm = matrix.size[0], matrix.comm.tompi4py()
-        if rows > self.matrix.size[0]:
-            return None
-        kept = self._shared.inverted
-        if kept is None or kept[0].size != matrix.size:
-            along = rows if self.system.fields.along else 0
-            factors = factors_of("lu", comm, along, self.system.fields.dense_rows, {8: 0}, prefix=FACTORS)
-            shifted = matrix.copy()
-            self._shared.inverted = shifted, factors
-        else:
-            shifted, factors = kept
-            matrix.copy(shifted, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        factors(shifted)
-        if not factors.regular:
-            raise ConvergenceError(_singular(target))
-        return Inverse(factors)
+def _half(nu: np.ndarray) -> int:
+    """1 where the last of some eigenvalues (k,) is one of a pair that is cut in two, else 0."""
+    if len(nu) < 2 or not nu[-1].imag:
+        return 0
+    return int(abs(nu[:-1] - nu[-1].conjugate()).min() > abs(nu[-1].imag))
 
 
 def _singular(target: complex) -> str:

@@ -25,14 +25,12 @@ from rodfem.problem.validation import trouble_with_inertia
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
-UNSYMMETRIC, SLICED = 1e-13, 1e-10
-"""Relative tolerances of SLEPc for a pencil without symmetry, and for all eigenvalues of an interval."""
+SLICED = 1e-10
+"""Relative tolerance of SLEPc for all eigenvalues of an interval."""
 OF_VECTORS = 1e-9
 """The same for vectors of a symmetric pencil: the error of its eigenvalues is the square."""
 FACTORS = "rodfem_st_"
 """Prefix of the options for the factors of a pencil without symmetry."""
-ROOM = {"mat_mumps_icntl_14": 100}
-"""Percentage of room beyond MUMPS's estimate: delayed pivots of a saddle point take more than its own 20."""
 LEAST = 6
 """How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
@@ -266,25 +264,6 @@ def seek(solver: SLEPc.EPS, target: complex, number: int, size: int, tolerance: 
     solver.setTolerances(tol=tolerance, max_it=300)
 
 
-def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
-    """Set up shift-invert (LU) for the ``number`` eigenvalues nearest to ``target`` of a pencil without symmetry.
-
-    Raises :class:`PETSc.Error` where the shifted matrix is singular.  The pencil is ``matrix - mu mass``.
-    """
-    solver = eigensolver(matrix, mass, "rodfem_", symmetric=False)
-    seek(solver, target, number, 2 * number + 20, UNSYMMETRIC)
-    transform = solver.getST()
-    transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    ksp = transform.getKSP()
-    ksp.setType("preonly")
-    ksp.getPC().setType("lu")
-    ksp.getPC().setFactorSolverType("mumps")
-    solver.setFromOptions()
-    with preferred(FACTORS, ordering(matrix) | ROOM):
-        solver.setUp()
-    return solver
-
-
 class Inverse:
     """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
 
@@ -315,21 +294,16 @@ def with_factors(
     inverse: Inverse,
     start: PETSc.Vec | None = None,
     deflated: Sequence[PETSc.Vec] = (),
-    *,
-    symmetric: bool = True,
 ) -> SLEPc.EPS:
-    """Set up the same with the ``inverse`` of ``matrix - target mass`` from factors made elsewhere, and a first vector.
+    """Set up shift-invert for the ``number`` eigenvalues nearest to ``target`` of a symmetric pencil.
 
-    Vectors of a symmetric pencil are right up to massless unknowns: purification corrects all of them at once.
-    Eigenvectors that are ``deflated`` are not found.  ``number`` is that of :func:`shift_invert`, ``symmetric`` that of
-    :func:`eigensolver`; ``start`` is the first vector.
+    It is ``matrix - mu mass``.  The ``inverse`` of ``matrix - target mass`` is from factors made elsewhere.  Vectors
+    are right up to massless unknowns: purification corrects all of them at once.  Eigenvectors that are ``deflated``
+    are not found; ``start`` is the first vector.
     """
-    solver = eigensolver(matrix, mass, "rodfem_", symmetric=symmetric)
-    if symmetric:
-        seek(solver, target, number, number + max(number, LEAST), OF_VECTORS)
-        solver.setPurify(False)
-    else:
-        seek(solver, target, number, 2 * number + 20, UNSYMMETRIC)
+    solver = eigensolver(matrix, mass, "rodfem_", symmetric=True)
+    seek(solver, target, number, number + max(number, LEAST), OF_VECTORS)
+    solver.setPurify(False)
     if start is not None:
         solver.setInitialSpace([start])
     if deflated:

@@ -18,19 +18,15 @@ import numpy as np
 import pytest
 from closed_forms import column, double
 from hemitropic_cases import specials
-from mpi4py import MPI
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 from rodfem import Diagram, Plan, clamped, free
-from rodfem.continuation.complex_pairs import paired, upper
-from rodfem.continuation.eigenvalue_curves import assignment
 from rodfem.continuation.observer import Observer
 from rodfem.diagram.sweep import Sweep
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.problem.scene import Scene
-from rodfem.stability.frequencies import Frequencies
 
 BECK = float(double(20.0, 120.0)[0])
 MESH = Discretization("pointwise", 4, 6)
@@ -129,43 +125,6 @@ def test_flutters_that_are_one_to_round_off(strong: float) -> None:
         found = critical(columns(strong, span)[0])
         for exact in (BECK, BECK * strong):
             assert any(abs(load - exact) <= bar < 1e-6 for load, bar, *_ in found)
-
-
-def by_values(comm: MPI.Comm, found: Frequencies, others: Frequencies) -> dict[int, int]:
-    """Pairs that go on from the nearest one."""
-    mine, there = upper(found), upper(others)
-    if not mine or not there:
-        return {}
-    rows, columns = assignment(abs(found.values[mine][:, None] - others.values[there]))
-    return {mine[i]: there[j] for i, j in zip(rows.tolist(), columns.tolist(), strict=True)}
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0)])
-def test_a_pair_that_is_mistaken_is_put_right(span: tuple[float, float], monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is born within the step lies nearest to where the other one was; followed, the other one ends there, too."""
-    monkeypatch.setattr("rodfem.diagram.collisions.paired", by_values)
-    diagram = swept(1.01, span)
-    agree(critical(diagram[0]), [BECK, BECK * 1.01])
-    adds_up(diagram)
-
-
-def test_pairs_by_their_vectors() -> None:
-    """Two planes, and the nearest value in the other one."""
-
-    def found(values: Sequence[complex], planes: Sequence[int]) -> Frequencies:
-        vectors = np.zeros((4, 2 * len(values)), dtype=complex)
-        for i, plane in enumerate(planes):
-            vectors[2 * plane : 2 * plane + 2, 2 * i] = 1.0, 0.5j
-        vectors[:, 1::2] = vectors[:, ::2].conj()
-        both = np.array([v for value in values for v in (value, value.conjugate())])
-        return Frequencies(both, np.zeros(len(both)), (), vectors, vectors)
-
-    before, after = found([100 + 5j], [0]), found([100 + 6j, 100 + 30j], [1, 0])
-    assert paired(MPI.COMM_SELF, after, before) == {2: 0}
-    assert paired(MPI.COMM_SELF, before, after) == {0: 2}
-    assert paired(MPI.COMM_SELF, found([100 + 5j], [1]), before) == {}
 
 
 def humped(strong: float, top: float, curvature: float, span: tuple[float, float]) -> Scene:

@@ -240,17 +240,13 @@ def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
         inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)),
     )
     mesh = Discretization("pointwise", 4, 6)
-    few = trace(scene, mesh, Plan(error_bars=False))
-    assert not specials(few[0], "flutter")
-    (said,) = [w for w in few.warnings if "not among those that are followed" in w]
-    number = int(said.split("spectrum=")[1].rstrip("."))
-    many = trace(scene, mesh, Plan(spectrum=number))
-    (flutter,) = specials(many[0], "flutter")
+    found = trace(scene, mesh, Plan())
+    (flutter,) = specials(found[0], "flutter")
     assert abs(flutter.point.load - double(20.0, 120.0)[0]) <= flutter.error_estimate < 1e-9
-    assert not any("well defined" in words for words in (*few.warnings, *many.warnings))
+    assert not found.warnings
     for method in ("auto", "dense", "shift-invert"):
-        assert [many.assess(many[0].points[row], method).negative for row in (0, -1)] == [0, 2]
-    (state,) = few.at(22.0)
+        assert [found.assess(found[0].points[row], method).negative for row in (0, -1)] == [0, 2]
+    (state,) = found.at(22.0)
     assert (state.negative, state.stable) == (2, False)
 
 
@@ -360,7 +356,7 @@ def test_long_pencil_on_any_number_of_ranks() -> None:
     x, outcome = solver.at_load(solver.start(10.0), 10.0)
     assert outcome.converged
     vibration = NonsymmetricSolver(solver.system).at(x)
-    for target in (1.0, 26 + 3j):
+    for target in (1.0, 26.0):
         values = vibration.near(2, target).values
         assert abs(values - column(26.7885149853, 10.0)).min() < 3e-7 * 26.8
         assert abs(values.imag).max() < 1e-5

@@ -14,13 +14,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 42437,
-    "files of Python": 295,
-    "lines of C": 1702,
-    "module constants with a number": 656,
-    "functions of a complexity above 10": 149,
-    "functions of six parameters or more": 90,
-    "places that warn": 45,
+    "lines of Python": 41038,
+    "files of Python": 288,
+    "lines of C": 1452,
+    "module constants with a number": 610,
+    "functions of a complexity above 10": 140,
+    "functions of six parameters or more": 89,
+    "places that warn": 40,
     "files that import internals of UFL and FFCx": 12,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)

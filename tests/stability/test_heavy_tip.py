@@ -7,7 +7,7 @@ import pytest
 
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.condensed import SHIFT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 

@@ -9,7 +9,7 @@ from hard.fuzz.comparison import meshes
 from hard.fuzz.oracle import Oracle
 
 from rodfem import Discretization, Plan, Solver, trace
-from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.condensed import SHIFT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 pytestmark = pytest.mark.alone

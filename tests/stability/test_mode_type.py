@@ -11,7 +11,7 @@ import pytest
 from hard.fuzz import scenes as fuzz
 
 from rodfem import Discretization, Solver
-from rodfem.stability.finite_pairs import SHIFT
+from rodfem.stability.condensed import SHIFT
 from rodfem.stability.mode_type import STRAIGHT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 

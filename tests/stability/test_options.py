@@ -14,7 +14,7 @@ from rodfem.fem.system import System
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.stability.pencil import in_interval, shift_invert, with_factors
+from rodfem.stability.pencil import in_interval, with_factors
 from rodfem.stability.projection import PREFIX
 from rodfem.stability.reduction import Reduction
 
@@ -44,7 +44,6 @@ def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
     vibration = NonsymmetricSolver(system).at(x)
     vibration.near(2, 0.0)
-    shift_invert(vibration.matrix, vibration.mass, 2, 1.0).solve()
     assert options.getAll() == before
 
 
@@ -79,20 +78,6 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
     assert solver.getTolerances()[0] == 1e-8
     assert solver.getKrylovSchurKSP().getPC().getFactorMatrix().getMumpsIcntl(7) == ORDERING
     np.testing.assert_allclose(sorted(solver.getEigenvalue(i).real for i in range(3)), expected, rtol=1e-8)
-
-
-def test_pencil_without_symmetry(options: PETSc.Options) -> None:
-    system, x = plain("follower", "pointwise", 6, 3, 10.0)
-    vibration = NonsymmetricSolver(system).at(x)
-    expected = vibration.near(2, 0.0).values[:2]
-    options["rodfem_st_pc_factor_mat_solver_type"] = "mumps"
-    options["rodfem_st_mat_mumps_icntl_7"], options["rodfem_st_type"] = ORDERING, "cayley"
-    solver = shift_invert(vibration.matrix, vibration.mass, 2, 1.0)
-    solver.solve()
-    assert solver.getST().getType() == "cayley"
-    assert solver.getST().getKSP().getPC().getFactorMatrix().getMumpsIcntl(7) == ORDERING
-    values = sorted(solver.getEigenvalue(i).real for i in range(2))
-    np.testing.assert_allclose(values, expected.real, rtol=1e-9)
 
 
 def test_reduced_pencil(options: PETSc.Options) -> None:

@@ -1,0 +1,100 @@
+"""All frequencies of the mesh, at every load: against QZ on the full pencil, and where the first ones do not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi
+
+import classics
+import numpy as np
+import pytest
+from golden_cases import NOT_CONSERVATIVE, cases
+from literature.test_free_rods import floating
+from scipy.linalg import eigvals
+
+from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, trace
+from rodfem.diagram.held import at_load
+from rodfem.forms.energy import bending_and_twist
+from rodfem.linalg.matrices import gathered
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
+
+pytestmark = pytest.mark.alone
+
+BECK = 20.0509536189738
+SCENES: dict[str, Callable[[], Scene]] = {name: cases()[name] for name in NOT_CONSERVATIVE} | {
+    "torque": lambda: replace(classics.torque("follower_moment"), span=(0.0, 9.0)),
+    "floating": lambda: floating(
+        (free(), free(follower=lambda c: (0.0, 0.0, -c.P))), (0.0, 130.0), distributed=lambda c: (0.0, 0.0, c.P)
+    ),
+}
+
+
+def dense(pencil: object, number: int) -> np.ndarray:
+    """The ``number`` eigenvalues of the full pencil nearest to -10 by QZ, whose infinite ones are far."""
+    S, M = (gathered(a).toarray() for a in (pencil.matrix, pencil.mass))  # type: ignore[attr-defined]
+    nu = eigvals(M, S + 10.0 * M)
+    return -10.0 + 1.0 / nu[np.argsort(-abs(nu))[:number]]
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("part", [0.3, 0.9])
+def test_against_qz(name: str, part: float) -> None:
+    """Twenty frequencies, by what they are from the shift: 1e-9 of the greatest inverse."""
+    scene = SCENES[name]()
+    solver = Solver(scene, Discretization("pointwise", 3, 5)).equilibria
+    low, high = scene.span
+    x = at_load(solver, solver.first(low)[0], low + part * (high - low))
+    pencil = NonsymmetricSolver(solver.system).at(x)
+    found, exact = pencil.spectrum.values[:20], dense(pencil, 20)
+    for one, other in ((found, exact), (exact, found)):
+        nu, all_others = 1.0 / (one[:18] + 10.0), 1.0 / (other + 10.0)
+        assert abs(nu[:, None] - all_others).min(axis=1).max() < 1e-9 * abs(nu).max()
+
+
+@pytest.mark.long
+def test_a_cantilever_rolled_up_out_of_its_plane() -> None:
+    """Ten frequencies are complex at t = 0.045, and none of the six that are nearest to zero."""
+    helix = Scene(
+        "roll-up", (0.0, 10.0), "flexible",
+        lambda v, k, c: 5e3 * (v[0] ** 2 + v[1] ** 2 + (v[2] - 1) ** 2) + 50 * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
+        {"t": 0.0}, "t",
+        (clamped(), free(lambda c: (50 * c.t, 0.0, 0.0), moment=lambda c: (200 * pi * c.t, 0.0, 0.0))),
+        Ordinate("tip", s=10.0, of=lambda r, q: r[2]), (0.0, 0.046),
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1e-2, 1e-2, 2e-2)),
+    )  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rodfem.diagram.sweep.LOADS", 47)
+        diagram = trace(helix, Discretization("auto", 6, 5), Plan(error_bars=False))
+    (row,) = [p for p in diagram[0].points if abs(p.load - 0.045) < 1e-9]
+    assert row.negative == 10 == diagram.assess(row).negative
+    assert not diagram.warnings and not diagram[0].unexplained
+    for point in diagram[0].points[1::9]:
+        assert point.negative > 0
+
+
+def test_two_beyond_the_fortieth_meet_first() -> None:
+    """Soft in torsion, with dozens of motions below the first that bends: no pair nearer to zero ever meets."""
+    inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0))
+    column = replace(
+        classics.beck(span=(19.0, 21.0)),
+        parameters={**classics.beck().parameters, "C": Parameter(1e-3)},
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 10.0, c.C)), inertia=inertia,
+    )  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rodfem.diagram.sweep.LOADS", 5)
+        diagram = trace(column, Discretization("pointwise", 8, 6), Plan(error_bars=False))
+    (flutter,) = diagram.special("flutter")
+    assert flutter.point.load == pytest.approx(BECK, rel=1e-9) and not diagram.warnings
+    assert [diagram[0].points[row].negative for row in (0, -1)] == [0, 2]
+    pencil = NonsymmetricSolver(diagram.solvers[0].system).at(diagram[0].points[0].x)
+    values = np.sort(pencil.spectrum.values.real)
+    assert (values < flutter.omega2).sum() >= 39  # of those that meet one is below, the other above
+
+
+def test_planes_that_pass_one_another_never_meet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A dead thrust beside one that follows: frequencies of two planes cross, and nothing more is computed for that."""
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 21)
+    diagram = trace(classics.partly_following(1.0, (0.0, 19.0), 1.9), Discretization("pointwise", 4, 6), Plan())
+    assert not diagram.special("flutter") and not diagram.warnings and len(diagram[0].points) == 21
