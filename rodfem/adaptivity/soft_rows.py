@@ -1,15 +1,15 @@
 """Soft modes along a branch that has been traced: at which of its points the index is not decided, and by what.
 
 Rows that one factorisation decided have none.  A mesh may make an eigenvalue of its own of one that is exponentially
-small: it pins what slides along the rod.  That shows at every row, on the mesh itself
-(:mod:`rodfem.stability.sliding`).  At the loads asked for and at the ends of branches, and all along a branch with a
-special point that a richer mesh does not have, indices are besides compared with those of a richer mesh.
+small: it pins what slides along the rod.  With error bars the eigenvalue nearest zero is therefore compared with that
+of a richer mesh, at the loads asked for and at the ends of branches; all along a branch if one of these is undecided,
+or a special point is not on the richer mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import compress, groupby
 from math import inf, isfinite
 
 from rodfem.adaptivity.mesh_sequence import Meshes
@@ -59,7 +59,22 @@ class SoftRows:
             if id(point) not in special and id(point) not in first:
                 compare = self.error_bars and doubtful
                 self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
+        if self.error_bars and doubtful:
+            self._leave_out_doubtful(branch, family=family)
         self._count_at_special_points(branch)
+
+    def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
+        """Make rows of the special points at which an eigenvalue is zero that is undecided at the rows after or before.
+
+        That is a zero of the mesh, not of the rod, if two rows next to one another are undecided, or one where the
+        richer mesh has no such point: a single one may be next to a special point by chance.
+        """
+        special = {id(s.point) for s in branch.special}
+        rows = [p for p in branch.points if id(p) not in special]
+        left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
+        for s in compress(branch.special, left_out):
+            self._of(s.point).examine(s.point, fixed_load=False, compare=True, family=family)
+        branch.special[:] = [s for s, out in zip(branch.special, left_out, strict=True) if not out]
 
     def _is_family(self, branch: Branch) -> bool:
         """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
@@ -133,3 +148,10 @@ class SoftRows:
             richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
             self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
         return self._states[point.mesh]
+
+
+def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
+    """Whether a ``special`` point has as many undecided ones of the ``rows`` next to it, on one side, as say so."""
+    number, at = 2 if isfinite(special.error_estimate) else 1, special.point.arclength
+    sides = [p for p in reversed(rows) if p.arclength < at], [p for p in rows if p.arclength > at]
+    return special.kind.singular and any(sum(p.undecided > 0 for p in side[:number]) == number for side in sides)

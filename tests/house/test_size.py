@@ -14,10 +14,10 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 42437,
-    "files of Python": 295,
+    "lines of Python": 42293,
+    "files of Python": 294,
     "lines of C": 1702,
-    "module constants with a number": 656,
+    "module constants with a number": 653,
     "functions of a complexity above 10": 149,
     "functions of six parameters or more": 90,
     "places that warn": 45,
