@@ -69,8 +69,7 @@ class SoftRows:
         That is a zero of the mesh, not of the rod, if two rows next to one another are undecided, or one where the
         richer mesh has no such point: a single one may be next to a special point by chance.
         """
-        special = {id(s.point) for s in branch.special}
-        rows = [p for p in branch.points if id(p) not in special]
+        rows = [p for p in branch.points if not any(p is s.point for s in branch.special)]
         left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
         for s in compress(branch.special, left_out):
             self._of(s.point).examine(s.point, fixed_load=False, compare=True, family=family)
