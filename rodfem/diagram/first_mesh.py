@@ -128,10 +128,11 @@ def check_start(solver: StaticSolver, span: tuple[float, float], warn: Callable[
 
 
 def _index(solver: BranchSolver, load: float) -> int | None:
-    """Index of the scene's start at a load; None where it is no equilibrium there."""
+    """Index of the scene's start at a load; None where it is no equilibrium there, or its energy not convex."""
     start, system = solver.start(load), solver.system
     x, outcome = solver.at_load(start, load)
     turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
-    if not outcome.converged or (load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT):
+    bent = load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT
+    if not outcome.converged or bent or solver.lost_convexity(x):
         return None
     return solver.inertia.at(x).count().negative
