@@ -77,9 +77,10 @@ class SoftRows:
 
     def _is_family(self, branch: Branch) -> bool:
         """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
-        span = self.meshes.solvers[0].system.scene.span
+        span, singular = self.meshes.solvers[0].system.scene.span, {id(s.point) for s in branch.special}
         rows = branch.points[1:] if branch.parent else branch.points  # a pitchfork begins without a slope
-        return all(abs(p.slope) < FLAT * abs(span[1] - span[0]) for p in rows)
+        rows = [p for p in rows if id(p) not in singular]
+        return bool(rows) and all(abs(p.slope) < FLAT * abs(span[1] - span[0]) for p in rows)
 
     def _count_at_special_points(self, branch: Branch) -> None:
         """Count at special points, too, the soft modes that the rows on either side of them have as negative.

@@ -246,7 +246,7 @@ class SpecialSearch:
         if why := taut_where_it_turns(solver, at.x):
             words.append(why)
             return None
-        if is_fold(solver, at.x, at.null):
+        if left.index != right.index and is_fold(solver, at.x, at.null):
             return None
         found = solved(solver, at, fold=False)
         if found is None:
