@@ -33,8 +33,8 @@ from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedSti
 DIP = 0.1
 """Eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most."""
 HALVINGS = 0, 6, 36
-"""Bisections after which a mode that passes zero is among those nearest zero: none in most steps, many next to dozens of
-softer ones."""
+"""Bisections after which a mode that passes zero is among those nearest zero: none in most steps, many next to dozens
+of softer ones."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is taken to stay zero."""
 ASIDE = 0.02
