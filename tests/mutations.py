@@ -378,41 +378,26 @@ FAULTS = {
         "if negative:\n            return\n        if negative:",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
-    "corners-where-interpolated-states-have-them": Fault(
-        f"{CONTINUATION}event_location.py",
-        "                self.curve.solve(s)",
-        "                self.curve.solve(s)\n            return zeros",
-        "tests/diagram/test_events_rough.py",
+    "events-where-the-sign-changes-from-row-to-row-alone": Fault(
+        f"{CONTINUATION}event_piece.py", "if rate(p) * rate(q) < 0]", "if False]", "tests/diagram/test_events.py"
     ),
-    "other-zeros-beside-a-zero": Fault(
-        f"{CONTINUATION}event_location.py",
-        "                zeros.look_around()",
-        "                zeros.locate()",
-        "tests/diagram/test_events_rough.py",
-    ),
-    "roots-beside-a-node": Fault(
-        f"{CONTINUATION}event_samples.py",
-        "            elif q - p > NARROW * (high - low):",
-        "            elif False:",
-        "tests/diagram/test_events_rough.py",
-    ),
-    "zeros-in-flat-values-are-exact": Fault(
-        f"{CONTINUATION}event_zeros.py",
-        "                distance *= WIDER",
-        "                break",
-        "tests/diagram/test_events_rough.py",
-    ),
-    "zeros-beside-a-row-that-is-nearly-zero": Fault(
-        f"{CONTINUATION}event_zeros.py",
-        "if abs(self.f(s)) < low",
-        "if False",
-        "tests/diagram/test_events_rough.py",
-    ),
-    "zeros-are-sought-in-round-off": Fault(
-        f"{CONTINUATION}event_zeros.py",
-        " and not self._is_round_off(s, z, values)",
-        "",
+    "events-all-along-a-branch": Fault(
+        "rodfem/diagram/events.py",
+        "if piece.is_zero(piece.first) and piece.is_zero(piece.last):",
+        "if False:",
         "tests/diagram/test_events.py",
+    ),
+    "events-know-no-round-off-of-states": Fault(
+        f"{CONTINUATION}event_piece.py",
+        "others = stepped(self.solver, x, self.row), x +",
+        "others = x, x +",
+        "tests/diagram/test_events.py",
+    ),
+    "events-of-nodes-have-bars-of-ends": Fault(
+        "rodfem/adaptivity/error_estimate.py", "LEFT = 0.5", "LEFT = 0.0", "tests/adaptivity/test_event_bars.py"
+    ),
+    "curves-turn-into-another-branch": Fault(
+        f"{CONTINUATION}states_between.py", "ALONG = 0.9", "ALONG = 0.0", "tests/diagram/test_events.py"
     ),
     "a-read-diagram-forgets-its-plan": Fault(
         "rodfem/diagram/saved.py",
@@ -422,8 +407,8 @@ FAULTS = {
     ),
     "convexity-is-looked-at-in-rows-alone": Fault(
         f"{CONTINUATION}convexity_between.py",
-        "if least > 0.0 or holds(t):",
-        "if least > 0.0 or t < 1.0 or holds(t):",
+        "if margin(t) > 0.0 or holds(t):",
+        "if margin(t) > 0.0 or t < 1.0 or holds(t):",
         "tests/continuation/test_convexity.py",
     ),
     "convexity-of-the-undeformed-state-alone": Fault(
@@ -707,24 +692,6 @@ FAULTS = {
         "for load in scene.loads() if scene.load in asked",
         "for load in scene.span if scene.load in asked",
         "tests/problem/test_scene_errors.py",
-    ),
-    "events-at-nodes-alone": Fault(
-        "rodfem/adaptivity/error_estimate.py",
-        "found, along = sampled[-1].x, max(each.along for each in sampled)",
-        "sampled = sampled[:1]; found, along = sampled[-1].x, nearest.along",
-        "tests/adaptivity/test_event_sampling.py",
-    ),
-    "events-in-jumps-have-bars": Fault(
-        "rodfem/adaptivity/event_sampling.py",
-        "if near > max(far / 2, noise)",
-        "if near > 2 * far + noise",
-        "tests/adaptivity/test_event_sampling.py",
-    ),
-    "events-at-rows-alone": Fault(
-        "rodfem/continuation/event_location.py",
-        "> NOISY * self.curve.length",
-        ">= 0.0",
-        "tests/diagram/test_events.py",
     ),
     "constraints-are-tried-at-one-place": Fault(
         "rodfem/problem/results.py",
@@ -1209,12 +1176,6 @@ FAULTS = {
         "(others if self.solver.lost_convexity(point.x) else convex).append(point)",
         "convex.append(point)",
         "tests/continuation/test_convexity.py",
-    ),
-    "events-know-no-round-off-of-states": Fault(
-        "rodfem/continuation/event_location.py",
-        "left = self.curve.nearest(s).left if self.curve.solved else None",
-        "left = None",
-        "tests/diagram/test_events_rough.py",
     ),
     "taut-rods-have-frequencies": Fault(
         "rodfem/diagram/sweep.py",
