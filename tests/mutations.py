@@ -379,7 +379,10 @@ FAULTS = {
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "events-where-the-sign-changes-from-row-to-row-alone": Fault(
-        f"{CONTINUATION}event_piece.py", "if rate(p) * rate(q) < 0]", "if False]", "tests/diagram/test_events.py"
+        f"{CONTINUATION}event_piece.py",
+        "if p.slope.item() * q.slope.item() < 0]",
+        "if False]",
+        "tests/diagram/test_events.py",
     ),
     "events-all-along-a-branch": Fault(
         "rodfem/diagram/events.py",

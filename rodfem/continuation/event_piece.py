@@ -9,6 +9,7 @@ turn it may be zero, too.  Each correction is a zero of the cubic between the ne
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import groupby, pairwise
 from math import sqrt
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Node, clear, places
 from rodfem.continuation.states_between import LEAST, STEADY, Chord, Knot, solve_at, stepped
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import generic
 from rodfem.problem.events import Event
@@ -54,7 +55,8 @@ def end(solver: BranchSolver, arclength: float, x: PETSc.Vec, direction: PETSc.V
     ``solver`` has the mesh.
     """
     tangent = direction * (1.0 / solver.system.norm(direction))
-    return End(arclength, x, tangent, _samples(solver, x, tangent))
+    states = x, x + tangent * DIFFERENCE, x - tangent * DIFFERENCE, x + _aside(solver.system, GENERIC)
+    return End(arclength, x, tangent, [solver.shape.sample(state) for state in states])
 
 
 class EventPiece(Chord):
@@ -69,19 +71,20 @@ class EventPiece(Chord):
         super().__init__(solver, a, b)
         self.event = event
         self.first, self.last = (self.node(end.x, end.tangent, end.samples) for end in (a, b))
-        self.level = ROUND_OFF / GENERIC * max(abs(event(x.samples[-1]) - event(x.samples[0])) for x in (a, b))
+        varied = (abs(self._change(p, x.samples[-1])) for p, x in ((self.first, a), (self.last, b)))
+        self.level = ROUND_OFF / GENERIC * max(varied)
 
     def node(self, x: PETSc.Vec, tangent: PETSc.Vec, seen: list[dict[str, Any]] | None = None) -> Node:
         """Node at a state with its unit tangent; what the number receives there may have been ``seen``."""
-        here, ahead, behind, *_ = map(self.event, seen or _samples(self.solver, x, tangent))
+        here, ahead, behind, *_ = seen or end(self.solver, 0.0, x, tangent).samples
         speed = float(self.row.dot(tangent))
-        slope = (ahead - behind) / (2 * DIFFERENCE * speed)
-        knot = Knot(x, tangent * (1.0 / speed), speed)
-        return Node(self.place(x), np.array([[here]]), np.array([[slope]]), 0, knot)
+        node = Node(self.place(x), np.array([[self.event(here)]]), np.zeros((1, 1)), 0)
+        slope = (self._change(node, ahead) - self._change(node, behind)) / (2 * DIFFERENCE * speed)
+        return replace(node, slope=np.array([[slope]]), kept=Knot(x, tangent * (1.0 / speed), speed))
 
     def is_zero(self, node: Node) -> bool:
         """Whether the number is zero to round-off."""
-        return abs(value(node)) <= self.level
+        return abs(node.H.item()) <= self.level
 
     def turns(self) -> list[Node]:
         """Nodes at which the number turns; raises :class:`ConvergenceError` where an equilibrium is not found."""
@@ -89,7 +92,7 @@ class EventPiece(Chord):
         known, nodes = places(first, last, 1), [first, last]
         if len(known) > 1:
             nodes.insert(1, self._solved(first, last, float(np.mean(known))))
-        return [self._located(p, q, 1) for p, q in pairwise(nodes) if rate(p) * rate(q) < 0]
+        return [self._located(p, q, 1) for p, q in pairwise(nodes) if p.slope.item() * q.slope.item() < 0]
 
     def zeros(self) -> list[Node]:
         """Nodes at which the number is zero, in order, both ends among them.
@@ -103,7 +106,7 @@ class EventPiece(Chord):
             if zero:
                 out.append(min(group, key=lambda node: min(node.s - first.s, last.s - node.s)))
         for p, q in pairwise(known):
-            if value(p) * value(q) < 0 and not (self.is_zero(p) or self.is_zero(q)):
+            if p.H.item() * q.H.item() < 0 and not (self.is_zero(p) or self.is_zero(q)):
                 out.append(self._located(p, q, 0))
         return sorted(out, key=lambda node: node.s)
 
@@ -115,21 +118,30 @@ class EventPiece(Chord):
         """
         x, system = node.kept.x, self.solver.system
         others = stepped(self.solver, x, self.row), x + _aside(system, ROUND_OFF)
-        off = max(abs(self.event(self.solver.shape.sample(other)) - value(node)) for other in others)
-        bend = abs(rate(self.last) - rate(self.first)) / (self.last.s - self.first.s)
-        level = abs(value(node)) + STEADY * off + bend * LEAST**2 / 2
-        return 2 * level / max(abs(rate(node)), sqrt(bend * level), TINY)
+        off = max(abs(self._change(node, self.solver.shape.sample(y))) for y in others)
+        bend = abs(self.last.slope.item() - self.first.slope.item()) / (self.last.s - self.first.s)
+        level = abs(node.H.item()) + STEADY * off + bend * LEAST**2 / 2
+        return 2 * level / max(abs(node.slope.item()), sqrt(bend * level), TINY)
+
+    def _change(self, node: Node, sample: dict[str, Any]) -> float:
+        """Change of the number from a node to a state beside it; none where it has no value there."""
+        try:
+            with np.errstate(invalid="ignore"):
+                return self.event(sample) - float(node.H.item())
+        except SceneError:
+            return 0.0
 
     def _located(self, p: Node, q: Node, order: int) -> Node:
         """Node between two others at which the number, or its derivative of an ``order``, changes its sign."""
-        of, within, tries = (value, rate)[order], (EXACT, LEAST)[order], 0
+        within, tries = (EXACT, LEAST)[order], 0
         while True:
             tries += 1
             known = places(p, q, order) if tries % HALVED else []
             node = self._solved(p, q, known[0] if known else 0.5)
             if min(node.s - p.s, q.s - node.s) <= within or (order == 0 and self.is_zero(node)):
                 return node
-            p, q = (node, q) if of(node) * of(p) > 0 else (p, node)
+            before, here = ((n.H, n.slope)[order].item() for n in (p, node))
+            p, q = (node, q) if here * before > 0 else (p, node)
 
     def _solved(self, p: Node, q: Node, t: float) -> Node:
         """Node at a part of the way between two others, solved for from the curve of the whole piece."""
@@ -158,24 +170,8 @@ def nearest(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec
     return node, piece.uncertainty(node)
 
 
-def value(node: Node) -> float:
-    """Value of the number."""
-    return float(node.H[0, 0])
-
-
-def rate(node: Node) -> float:
-    """Derivative of the number in the place."""
-    return float(node.slope[0, 0])
-
-
 def _aside(system: System, size: float) -> PETSc.Vec:
     """A change of state in a generic direction, of a ``size`` in natural sizes."""
     out = system.new_vector()
     out.array[:] = size * generic(np.arange(*out.getOwnershipRange()))
     return system.in_units(out, 1)
-
-
-def _samples(solver: BranchSolver, x: PETSc.Vec, tangent: PETSc.Vec) -> list[dict[str, Any]]:
-    """What the functions of events receive of a state and beside it, as an :class:`End` has it."""
-    states = x, x + tangent * DIFFERENCE, x - tangent * DIFFERENCE, x + _aside(solver.system, GENERIC)
-    return [solver.shape.sample(state) for state in states]

@@ -180,6 +180,18 @@ def test_an_event_that_is_zero_on_a_part_is_said_to_be() -> None:
     assert any(f"'ramp' is zero all along between loads 0 and {last:.8g}" in note for note in found.notes)
 
 
+def test_events_at_the_edge_of_their_values() -> None:
+    """A distance from the end of the range, and an angle that is zero where the rod is straight."""
+    edge = Event("edge", of=lambda state: float(np.sqrt(4.0 - state.load)))
+    found = rodfem.trace(COLUMN, MESH, replace(PLAN, events=(edge,)))
+    assert [s.point.load for s in found.special("event")] == [4.0]
+    rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 15.0))
+    angle = Event("angle", of=lambda state: 2 * np.arccos(abs(state.q[-1, 0])) - 1.0)
+    found = rodfem.trace(rod, Discretization("auto", 8, 6), Plan(depth=1, events=(angle,)))
+    (event,) = found.special("event")
+    assert event.point.load == pytest.approx(4 * ellipk(np.sin(0.5) ** 2) ** 2, rel=1e-7)
+
+
 def test_a_sweep_refuses_events() -> None:
     """It locates none: nothing would be found, without a word."""
     with pytest.raises(InputError, match=r"The event 'tip' is sought along branches"):
