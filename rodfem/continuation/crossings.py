@@ -66,7 +66,7 @@ class Node:
 class Crossing:
     """Eigenvalues that pass zero at ``s``: ``vectors`` (k, m) of H, the index ``before`` and ``after``.
 
-    The ``piece`` is that between two nodes in which they do.
+    The ``piece`` is that between two nodes in which they do, ``width`` the distance of the first from the last of them.
     """
 
     s: float
@@ -74,6 +74,7 @@ class Crossing:
     before: int
     after: int
     piece: tuple[Node, Node]
+    width: float = 0.0
 
 
 def coefficients(a: Node, b: Node) -> list[np.ndarray]:
@@ -169,7 +170,7 @@ def crossings(
         values, vectors = np.linalg.eigh(at(a, b, t))
         own = vectors[:, np.argsort(abs(values))[: len(group)]]
         change = -int(np.sign(np.linalg.eigvalsh(own.T @ rate(a, b, t) @ own)).sum())
-        out.append(Crossing(a.s + t * h, own, index, index + change, (a, b)))
+        out.append(Crossing(a.s + t * h, own, index, index + change, (a, b), (group[-1] - group[0]) * h))
         index += change
     return out
 

@@ -76,8 +76,9 @@ class Change:
 class Candidate:
     """Where a singular state is expected: ``x``, ``slope`` of the branch, modes near zero, and those that vanish.
 
-    These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece.  At a ``crossing``
-    eigenvalues pass zero; otherwise they touch it.  ``change`` is that of the index.
+    These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece, ``width`` the
+    distance of several crossings.  At a ``crossing`` eigenvalues pass zero; otherwise they touch it.  ``change`` is that
+    of the index.
     """
 
     x: PETSc.Vec
@@ -87,6 +88,7 @@ class Candidate:
     change: Change
     length: float
     crossing: bool = True
+    width: float = 0.0
 
     @property
     def null(self) -> list[PETSc.Vec]:
@@ -109,7 +111,7 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     critical = np.eye(len(modes))[:, :count]
     negative = crossing.before - (count + crossing.before - crossing.after) // 2
     change = Change(crossing.before, crossing.after, negative, piece.still)
-    return Candidate(x, slope, modes, critical, change, q.s - p.s)
+    return Candidate(x, slope, modes, critical, change, q.s - p.s, width=crossing.width)
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
@@ -170,7 +172,8 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
         special.null_vectors += special.nearby[:more]
         special.nearby = special.nearby[more:]
         special.point.zero += more
-        special.located_to += 2 * np.sort(abs(found.others))[more - 1] / abs(found.rate)
+        apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
+        special.located_to += 2 * max(apart, at.width * abs(piece.solver.system.scalar(at.slope)))
     return special
 
 

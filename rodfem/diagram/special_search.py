@@ -264,12 +264,14 @@ class SpecialSearch:
         Whether the load ``turns`` back in its piece tells the fold of this branch from that of another one.
         Raises :class:`Gap` for an imperfection that is not known, unless the branch has ``ended``.
         """
-        solver = piece.solver
-        if is_fold(solver, at.x, at.null) and (found := solved(solver, at, fold=True)) is not None:
+        solver, clearly = piece.solver, is_fold(piece.solver, at.x, at.null)
+        if clearly and turns and (found := solved(solver, at, fold=True)) is not None:
             return special_point(piece, at, found, fold=True)
         found = solved(solver, at, fold=False)
         if found is not None and found.size <= found.noise:
             return special_point(piece, at, found, fold=False)
+        if clearly and not turns and (fold := solved(solver, at, fold=True)) is not None:
+            return special_point(piece, at, fold, fold=True)
         gap = self._open_gap(piece, at, found, ended=ended) if found is not None else None
         fold = solved(solver, at, fold=True)
         if fold is not None and (turns or found is None):
