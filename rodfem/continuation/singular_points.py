@@ -77,8 +77,8 @@ class Candidate:
     """Where a singular state is expected: ``x``, ``slope`` of the branch, modes near zero, and those that vanish.
 
     These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece, ``width`` the
-    distance of several crossings.  At a ``crossing`` eigenvalues pass zero; otherwise they touch it.  ``change`` is that
-    of the index.
+    distance of several crossings, and ``change`` that of the index.  At a ``crossing`` eigenvalues pass zero; otherwise
+    they touch it.
     """
 
     x: PETSc.Vec

@@ -300,7 +300,7 @@ LOCI = (
         (1.6,), (1.6, 2.2, 2.5),
     ),
     Case(
-        "a stiffness followed over decades", "cubics between points of the curve pass where it is negative",
+        "a stiffness followed over decades", "a ten thousandth of its interval is more than its least value",
         "the whole curve, to 1e-9", "traced at the end", "greatest stretching stiffness of a ruler", loci_codim2.convex,
         (1e6,), (1e2, 1e3, 1e4, 1e5, 1e6),
     ),
