@@ -15,14 +15,13 @@ from math import inf, isfinite
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import VERTICAL
 from rodfem.continuation.kinds import EVENT, FOLD
 from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.soft_mode import index_range
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
 BARS = "richer meshes may decide that, ask for error bars"
-FLAT = 1e-6
-"""Slope of the load, in spans, below which all along a branch this is a family of equilibria at one load."""
 CLEARLY = 10.0
 """Times the uncertainty by round-off above which one is that of the mesh."""
 
@@ -79,7 +78,7 @@ class SoftRows:
         """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
         span = self.meshes.solvers[0].system.scene.span
         rows = branch.points[1:] if branch.parent else branch.points  # a pitchfork begins without a slope
-        return all(abs(p.slope) < FLAT * abs(span[1] - span[0]) for p in rows)
+        return all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
 
     def _count_at_special_points(self, branch: Branch) -> None:
         """Count at special points, too, the soft modes that the rows on either side of them have as negative.

@@ -23,8 +23,6 @@ from rodfem.fem.convexity import Convexity
 from rodfem.roots import zero_between
 from rodfem.tolerances import ROUND_OFF
 
-LOCATED = 1e-10
-"""Place to which a loss of convexity is located, relative to the step."""
 State = Callable[[float], PETSc.Vec]
 
 
@@ -49,7 +47,7 @@ def lost_between(convexity: Convexity, state: State, holds: Callable[[float], bo
         if least > 0.0 or holds(t):
             last = t
             continue
-        return Between(zero_between(margin, last, t, LOCATED) if margin(last) > 0.0 else t)
+        return Between(zero_between(margin, last, t, ROUND_OFF) if margin(last) > 0.0 else t)
     return Between(None, not samples.unresolved)
 
 

@@ -25,6 +25,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from rodfem.continuation.interpolant import REAL
+from rodfem.stability.dense import FINITE
 from rodfem.stability.reduced_stiffness import negative
 from rodfem.tolerances import TINY
 
@@ -36,10 +38,6 @@ SHORTEST = 1e-8
 """Length of a piece, in the metric, that is not divided."""
 SAME, ALIKE = 1e-12, 0.9
 """Distance of crossings, in the metric, that are one; cosine of the modes of different ones, at most."""
-FINITE = 1e-13
-"""Inverse of a root above which it is none, but round-off of an eigenvalue at infinity."""
-REAL = 1e-6
-"""Imaginary part of a root that is real."""
 
 
 @dataclass(frozen=True, eq=False)

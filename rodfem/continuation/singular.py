@@ -37,18 +37,15 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import TOLERANCE
+from rodfem.fem.newton import STALLED, TOLERANCE
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.bordered import Bordered
+from rodfem.stability.reduced_stiffness import DIFFERENCE
 from rodfem.tolerances import TINY
 
-DIFFERENCE = 1e-4
-"""Step of the differences, in the metric."""
 ITERATIONS = 10
 """Newton steps."""
-STALLED = 1e-6
-"""Below this, in the metric, a step that no longer shrinks is round-off."""
 FARTHEST = 0.5
 """A point farther than this from where it is expected, in the metric, is another one."""
 NOISE = 100.0

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import Knot, between
+from rodfem.continuation.prediction import ALIGNED, Knot, between
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import NewtonResult, correct
 from rodfem.roots import zero_between
@@ -32,8 +32,6 @@ STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
 SETTLES = 1e-2
 """Distance, in the metric, that a state which was solved for with damping may move without it."""
-ALONG = 0.9
-"""Cosine between the curve and the tangent of a branch below which that is the tangent of another one."""
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
 
@@ -204,7 +202,7 @@ def solved_on(solver: BranchSolver, curve: Curve, s: float, aside: float) -> Sol
         slope = float(row.dot(tangent))
     except ConvergenceError:  # a singular state
         slope = 0.0
-    if slope < ALONG:  # the curve knows the direction better
+    if slope < ALIGNED:  # the curve knows the direction better
         return Solved(s, there, x, direction, left)
     tangent.scale(solver.system.norm(direction) / slope)
     return Solved(s, there, x, tangent, left)

@@ -101,7 +101,7 @@ BIFURCATIONS = (
         "u^3 - a u = P", "distance in load", bifurcations.folds, (1e-2, 1e-6), POWERS[:5:2],
     ),
     Case(
-        STEP, "a dent of a spring", "a bend that is sharper than a step, and a straight branch on both sides", SAID,
+        STEP, "a dent of a spring", "a bend that is sharper than a step, and a straight branch on both sides", EXACT,
         "1 - 2 exp(-t^2), t = (u - 0.5123)/d", "width d", bifurcations.dent, (3e-2,), (1e-1, 3e-2, 1e-2),
     ),
     Case(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hard import bifurcations
 from hard.case import Case
 from hard.cases import CASES, SAID
 
@@ -38,3 +39,9 @@ def test_every_case_is_one_of_the_contract() -> None:
 def test_a_hard_case(case: Case, value: Any) -> None:
     found = case.measure(value)
     assert found.right or (case.promised == SAID and found.said), f"{found.error:.3g} {found.wrong} {found.said}"
+
+
+def test_a_branch_goes_on_beyond_a_bend_of_a_fifth_of_a_step() -> None:
+    """The polynomial through its last rows has another tangent there."""
+    found = bifurcations.dent(1e-2)
+    assert found.right and not found.said, f"{found.error:.3g} {found.wrong} {found.said}"
