@@ -60,7 +60,8 @@ class SoftRows:
                 self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
         if self.error_bars and doubtful:
             self._leave_out_doubtful(branch, family=family)
-        self._count_at_special_points(branch)
+        for fold in (s for s in branch.special if s.kind == FOLD):
+            self._change_at_fold(fold, branch.points)
 
     def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
         """Make rows of the special points at which an eigenvalue is zero that is undecided at the rows after or before.
@@ -76,49 +77,21 @@ class SoftRows:
 
     def _is_family(self, branch: Branch) -> bool:
         """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
-        span = self.meshes.solvers[0].system.scene.span
+        span, singular = self.meshes.solvers[0].system.scene.span, {id(s.point) for s in branch.special}
         rows = branch.points[1:] if branch.parent else branch.points  # a pitchfork begins without a slope
-        return all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
-
-    def _count_at_special_points(self, branch: Branch) -> None:
-        """Count at special points, too, the soft modes that the rows on either side of them have as negative.
-
-        A factorisation has those within its tolerance as zero.  At the rows richer meshes decide; at a special point,
-        where a richer mesh has an eigenvalue of either sign next to zero, the rows beside it do, if they agree and the
-        mesh itself has as many negative values beyond round-off at the special point.
-        """
-        at = {id(s.point): s for s in branch.special if s.kind.counted}
-        points = branch.points[1:] if branch.parent else branch.points  # its first is a special point of another
-        groups = [(at_special, list(rows)) for at_special, rows in groupby(points, lambda p: id(p) in at)]
-        for i, (at_special, rows) in enumerate(groups):
-            if not at_special:
-                continue
-            specials = [at[id(p)] for p in rows]
-            beside = [(groups[i - 1][1][-1], specials[0].negative_before)] if i else []
-            beside += [(group[0], specials[-1].negative_after) for _, group in groups[i + 1 : i + 2]]
-            more = {point.negative - index for point, index in beside}
-            if len(specials) == 1 and i:
-                self._change_at_fold(specials[0], groups[i - 1][1][::-1], *(rows for _, rows in groups[i + 1 : i + 2]))
-            number = more.pop() if len(more) == 1 else 0
-            settled = all(not p.undecided and sum(m.value < 0 for m in p.soft) >= number for p, _ in beside)
-            if number <= 0 or not settled:
-                continue
-            modes = [[m for m in self._of(s.point).persistent(s) if m.decided and m.value < 0] for s in specials]
-            if any(len(negative) < number for negative in modes):
-                continue
-            for s, negative in zip(specials, modes, strict=True):
-                s.negative_before, s.negative_after = s.negative_before + number, s.negative_after + number
-                s.point.negative, s.point.zero = s.point.negative + number, s.point.zero - number
-                s.point.soft = negative[:number]
+        rows = [p for p in rows if id(p) not in singular]
+        return bool(rows) and all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
 
     @staticmethod
-    def _change_at_fold(fold: SpecialPoint, before: Sequence[Point], after: Sequence[Point] = ()) -> None:
-        """Give a fold, where a count has one index on both sides, those of the nearest rows that are decided."""
-        if fold.kind != FOLD or fold.multiplicity != 1 or fold.negative_before != fold.negative_after:
+    def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
+        """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
+        if fold.multiplicity != 1 or fold.negative_before != fold.negative_after:
             return
-        left, right = (next((p.negative for p in rows if not p.undecided), None) for rows in (before, after))
-        if left is not None and right is not None and abs(left - right) == 1:
-            fold.negative_before, fold.negative_after = left, right
+        decided = [p for p in rows if not p.undecided and p is not fold.point]
+        left = [p.negative for p in decided if p.arclength < fold.point.arclength][-1:]
+        right = [p.negative for p in decided if p.arclength > fold.point.arclength][:1]
+        if left and right and abs(left[0] - right[0]) == 1:
+            fold.negative_before, fold.negative_after = left[0], right[0]
 
     def undecided(self, branch: Branch) -> Iterator[str]:
         """Yield a sentence on each piece of a branch whose index is not decided, or not compared with a richer mesh."""

@@ -21,7 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
-from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
@@ -100,17 +100,6 @@ class SoftStates:
         if self.uncompared:
             return None if nearest else 0
         return differing or int(nearest > 0)
-
-    def persistent(self, special: SpecialPoint) -> list[SoftMode]:
-        """Soft modes at a special point that are none of its null vectors, with their round-off on this mesh alone."""
-        x, system = special.point.x, self.solver.system
-        near = near_zero(self.solver.inertia.at(x))
-        kept = [i for i, v in enumerate(near.vectors) if across(system.metric, [v], special.null_vectors)]
-        names = self.names(x, [near.vectors[i] for i in kept])
-        return [
-            SoftMode(name, float(near.values[i]), float(near.uncertainty[i]))
-            for name, i in zip(names, kept, strict=True)
-        ]
 
     def _nearest(self, point: Point) -> float:
         """Estimated distance of the nearest eigenvalue from zero; 0 where one factorisation does not tell the index."""

@@ -121,12 +121,10 @@ class Tracer:
             return convexity.holds(here(point.p, point.x))
 
         with self.plane.kept():
-            found = lost_between(convexity, lambda t: here(*guess(t)[:2]), holds)
-            if found.lost is not None:
-                return f"the stored energy is not convex any more near {self._words(corrected(found.lost).p)}"
-        if found.resolved:
-            return ""
-        return f"the stored energy varies so fast that it may lose convexity unseen near {self._words(node.p)}"
+            lost = lost_between(convexity, lambda t: here(*guess(t)[:2]), holds)
+            if lost is None:
+                return ""
+            return f"the stored energy is not convex any more near {self._words(corrected(lost).p)}"
 
     def _words(self, p: np.ndarray) -> str:
         """Both parameters by name."""

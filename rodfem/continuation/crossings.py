@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from numpy.polynomial import Polynomial
 
 from rodfem.continuation.interpolant import REAL
 from rodfem.stability.dense import FINITE
@@ -169,6 +170,13 @@ def crossings(
         out.append(Crossing(a.s + t * h, own, index, index + change, (a, b)))
         index += change
     return out
+
+
+def places(a: Node, b: Node, order: int) -> list[float]:
+    """Where a cubic of one row vanishes, or its derivative of an ``order``: all t from 0 to 1, rising."""
+    cubic = Polynomial([float(A[0, 0]) for A in coefficients(a, b)])
+    found = cubic.deriv(order).roots()
+    return sorted(float(t.real) for t in found if abs(t.imag) < REAL and 0.0 <= t.real <= 1.0)
 
 
 def together(a: Node, b: Node, places: np.ndarray, tolerance: float) -> list[list[float]]:

@@ -90,12 +90,15 @@ def hermite(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """
     if a.tangent is None or b.tangent is None:
         raise ValueError("Both ends of a piece of a branch need a tangent.")
-    h = b.arclength - a.arclength
-    t = (s - a.arclength) / h
-    parts = [a.x, a.tangent, b.x, b.tangent]
+    return cubic([a.x, a.tangent, b.x, b.tangent], b.arclength - a.arclength, s - a.arclength)
+
+
+def cubic(ends: list[PETSc.Vec], h: float, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Cubic of length ``h`` at ``s``, and its derivative, by the ``ends``: value and derivative of each."""
+    t = s / h
     value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
     slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
-    return combine(parts, value), combine(parts, slope)
+    return combine(ends, value), combine(ends, slope)
 
 
 def between(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:

@@ -129,11 +129,17 @@ class SingularSystem:
             if not np.isfinite(size) or moved > FARTHEST:
                 return None
             x.axpy(1.0, step)
-            if size < TOLERANCE or (size < STALLED and size > 0.5 * before):
+            if size < TOLERANCE or (size > 0.5 * before and (size < STALLED or self._lost(x, step, made))):
                 step.scale(size if size < TOLERANCE else 1.0)  # what quadratic convergence leaves, or round-off
                 return self._state(x, step, made)
             before = size
         return None
+
+    def _lost(self, x: PETSc.Vec, step: PETSc.Vec, made: _Made) -> bool:
+        """Whether round-off of the eigenvalue at ``x`` moves the load by as much as a ``step`` to a branch point."""
+        found = self.inertia.at(x)
+        noise = max(found.noise(v) for v in made.null)
+        return not self.fold and abs(self.system.scalar(step) * made.rate) <= noise
 
     def _step(self, x: PETSc.Vec) -> tuple[PETSc.Vec, _Made]:
         """Newton's step, and what else is known then."""

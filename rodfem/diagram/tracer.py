@@ -306,7 +306,7 @@ class Tracer:
 
     def _ends_not_convex(self, branch: Branch, a: Point, b: Point) -> bool:
         """Whether the branch ends at the row ``a`` as the stored energy ceases to be convex between it and ``b``."""
-        why = lost_in_step(self.solver, a, b, self.observer.warn)
+        why = lost_in_step(self.solver, a, b)
         if why:
             branch.ended = self._rest(branch) or why
         return bool(why)

@@ -92,8 +92,8 @@ def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
         solver.system.set_load(x, low + t * (high - low))
         return x
 
-    found = lost_between(solver.convexity, state, lambda t: False)
-    assert found.lost == pytest.approx((1.0 - width - low) / (high - low), abs=1e-9)
+    lost = lost_between(solver.convexity, state, lambda t: False)
+    assert lost == pytest.approx((1.0 - width - low) / (high - low), abs=1e-9)
 
 
 @pytest.mark.long
