@@ -15,14 +15,13 @@ from math import inf, isfinite
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import VERTICAL
 from rodfem.continuation.kinds import EVENT, FOLD
 from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.soft_mode import index_range
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
 BARS = "richer meshes may decide that, ask for error bars"
-FLAT = 1e-6
-"""Slope of the load, in spans, below which all along a branch this is a family of equilibria at one load."""
 CLEARLY = 10.0
 """Times the uncertainty by round-off above which one is that of the mesh."""
 
@@ -81,7 +80,7 @@ class SoftRows:
         span, singular = self.meshes.solvers[0].system.scene.span, {id(s.point) for s in branch.special}
         rows = branch.points[1:] if branch.parent else branch.points  # a pitchfork begins without a slope
         rows = [p for p in rows if id(p) not in singular]
-        return bool(rows) and all(abs(p.slope) < FLAT * abs(span[1] - span[0]) for p in rows)
+        return bool(rows) and all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
 
     @staticmethod
     def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:

@@ -26,6 +26,8 @@ import numpy as np
 import scipy.linalg
 from numpy.polynomial import Polynomial
 
+from rodfem.continuation.interpolant import REAL
+from rodfem.stability.dense import FINITE
 from rodfem.stability.reduced_stiffness import negative
 from rodfem.tolerances import TINY
 
@@ -37,10 +39,6 @@ SHORTEST = 1e-8
 """Length of a piece, in the metric, that is not divided."""
 SAME, ALIKE = 1e-12, 0.9
 """Distance of crossings, in the metric, that are one; cosine of the modes of different ones, at most."""
-FINITE = 1e-13
-"""Inverse of a root above which it is none, but round-off of an eigenvalue at infinity."""
-REAL = 1e-6
-"""Imaginary part of a root that is real."""
 
 
 @dataclass(frozen=True, eq=False)

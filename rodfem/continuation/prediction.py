@@ -16,6 +16,8 @@ from rodfem.continuation.branch import Point
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 
+ALIGNED = 0.9
+"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
 ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
 

@@ -61,10 +61,9 @@ from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Factored, Inertia
+from rodfem.stability.reduced_stiffness import DIFFERENCE
 from rodfem.tolerances import TINY
 
-DIFFERENCE = 1e-4
-"""Step of the differences, in the metric."""
 ITERATIONS = 12
 """Newton steps."""
 FARTHEST = 0.5

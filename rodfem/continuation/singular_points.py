@@ -24,7 +24,7 @@ from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize
 from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import Index
-from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
+from rodfem.stability.reduced_stiffness import SOFT, Condensation, ReducedStiffness
 from rodfem.tolerances import SAME_LOAD, round_off
 
 COUPLED = 1e-5
@@ -37,8 +37,6 @@ INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
 """A derivative of the equations in the load smaller than this, relative to bending, or to the Jacobian, is zero."""
 NEARBY = 1e-2
 """Eigenvalue, over the lowest bending one, of modes that the border of a singular system has as well."""
-ZERO = 1e-6
-"""Eigenvalue, over the lowest bending one, that is zero where the load turns back and an eigenvalue touches zero."""
 
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
@@ -123,7 +121,7 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     condensation, (x, slope) = piece.condensation, piece.curve(p, q, s)
     reduced = condensation.at(x, _unit(piece.solver, slope), condensation.border(x))
     values, own = np.linalg.eigh(reduced.H)
-    zero = abs(values) < ZERO * piece.solver.inertia.scale
+    zero = abs(values) < SOFT * piece.solver.inertia.scale
     zero[abs(values).argmin()] = True
     negative = reduced.far + int((values[~zero] < 0).sum())
     modes = _modes(condensation, reduced, own[:, zero])

@@ -11,8 +11,8 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Node
+from rodfem.continuation.prediction import ALIGNED, between, cubic
 from rodfem.continuation.prediction import Knot as Row
-from rodfem.continuation.prediction import between, cubic
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import NewtonResult, correct
 from rodfem.roots import zero_between
@@ -35,8 +35,6 @@ STRAYED = 0.3
 singular state over the piece."""
 LEAST = 1e-9
 """That distance, in the metric, which is round-off."""
-ALONG = 0.9
-"""Cosine between the curve and the tangent of a state below which that is the tangent of another branch."""
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
 
@@ -192,4 +190,4 @@ class Chord(ABC):
             tangent = solver.tangent(self.row, at=x)
         except ConvergenceError:  # a singular state
             return self.node(x, slope)
-        return self.node(x, tangent if solver.row(slope).dot(tangent) > ALONG else slope)
+        return self.node(x, tangent if solver.row(slope).dot(tangent) > ALIGNED else slope)

@@ -10,12 +10,11 @@ import numpy as np
 
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.quaternions import of_vector, product
+from rodfem.problem.start import PLACES
 
 Start = Callable[[np.ndarray], np.ndarray] | None
 TURN = 2 * np.pi
 """Period of a rotation as a function of its angle: quaternions of opposite signs are one rotation."""
-SAMPLES = 1001
-"""Arclengths at which a start is followed along the rod."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +60,10 @@ class QuaternionField:
         """
         if start is None:
             return np.tile(IDENTITY, (s.size, 1))
-        every, place = np.unique(np.append(np.linspace(*interval, SAMPLES), s), return_inverse=True)
+        every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
         values = np.asarray(start(every), dtype=float)
         signs = np.cumprod(np.where((values[1:] * values[:-1]).sum(axis=1) < 0, -1.0, 1.0))
-        return np.asarray((values * np.append(1.0, signs)[:, None])[place.ravel()[SAMPLES:]])
+        return np.asarray((values * np.append(1.0, signs)[:, None])[place.ravel()[PLACES:]])
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
         """Value (size,) at an end at ``s`` that is clamped with a unit quaternion, or its negative: next to the start.
@@ -121,9 +120,9 @@ class AngleField:
         """Values (m, size) at arclengths (m,) of a scene's start, continuous along the rod from its left end."""
         if start is None:
             return np.zeros((s.size, 1))
-        every, place = np.unique(np.append(np.linspace(*interval, SAMPLES), s), return_inverse=True)
+        every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
         angles = np.unwrap(self._angle(np.asarray(start(every), dtype=float)), period=TURN)
-        return np.asarray(angles[place.ravel()[SAMPLES:], None])
+        return np.asarray(angles[place.ravel()[PLACES:], None])
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
         """Value (size,) at an end at ``s`` that is clamped with a unit quaternion: the one next to the start.

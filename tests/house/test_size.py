@@ -14,13 +14,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 41475,
+    "lines of Python": 41315,
     "files of Python": 290,
     "lines of C": 1702,
-    "module constants with a number": 607,
-    "functions of a complexity above 10": 134,
+    "module constants with a number": 563,
+    "functions of a complexity above 10": 132,
     "functions of six parameters or more": 75,
-    "places that warn": 43,
+    "places that warn": 42,
     "files that import internals of UFL and FFCx": 12,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
