@@ -122,7 +122,11 @@ class SoftRows:
 
 
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
-    """Whether a ``special`` point has as many undecided ones of the ``rows`` next to it, on one side, as say so."""
+    """Whether a ``special`` point has as many undecided ones of the ``rows`` next to it, on one side, as say so.
+
+    What is undecided at all of the rows is none of it.
+    """
     number, at = 2 if isfinite(special.error_estimate) else 1, special.point.arclength
+    still = min((p.undecided for p in rows), default=0)
     sides = [p for p in reversed(rows) if p.arclength < at], [p for p in rows if p.arclength > at]
-    return special.kind.singular and any(sum(p.undecided > 0 for p in side[:number]) == number for side in sides)
+    return special.kind.singular and any(sum(p.undecided > still for p in side[:number]) == number for side in sides)
