@@ -81,6 +81,7 @@ def summary(case: Case, found: list[dict[str, Any]]) -> list[str]:
              for kind, values in by.items()]  # fmt: skip
     return [
         case.name,
+        case.of,
         case.hard,
         f"{case.promised} ({case.source})",
         case.parameter,
@@ -156,7 +157,7 @@ def kills_of(store: Store) -> str:
 
 def page(store: Store, tries: int, scenes: int) -> str:
     """The page, with everything measured; so many runs are killed, and so many random scenes traced twice."""
-    head = ["case", "what makes it hard", "promised", "parameter", "measured", "error over bar"]
+    head = ["case", "row of the contract", "what makes it hard", "promised", "parameter", "measured", "error over bar"]
     parts = []
     for group, cases in CASES.items():
         rows = [summary(case, results(store, group, number, case)) for number, case in enumerate(cases)]
@@ -177,9 +178,9 @@ Written by `make bench` (`python -m benchmarks.robustness`) in {store.took() / 6
 {machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread; {strftime("%Y-%m-%d")}.
 
 Each case is a series of problems with a closed form or a published value, by one parameter; `tests/hard` has them, and
-tests some values of each. *Right*: what is promised, to the error bars that the program gives itself; the last column
-is the largest error over its bar (or over what is promised). **said**: the program says in a sentence what it could not
-decide. **wrong**: neither; there should be none. In all: {total}.
+tests some values of each. It tests a row of [the contract](resolution.md). *Right*: what is promised, to the error bars
+that the program gives itself; the last column is the largest error over its bar (or over what is promised). **said**:
+the program says in a sentence what it could not decide. **wrong**: neither; there should be none. In all: {total}.
 
 {chr(10).join(parts)}
 ## Error bars

@@ -35,8 +35,13 @@ SAME_STATE, SAME_SPECIAL = 1e-7, 1e-6
 """Equilibria, and special points, that agree to this in load, energy and stretch are one, up to a symmetry."""
 LOCATED = 10.0
 """Uncertainties of a load on one mesh by which that of another special point differs at least."""
+APART = 1e-5
+"""Equilibria nearer to each other than this, in the metric, are one."""
+SAME_EIGENVALUE = 1e-6
+"""Eigenvalues closer than this, relative to the greatest, are one."""
 DRIFT = 1e-6
-"""Largest drift scalar of an equilibrium, over the lowest bending eigenvalue: beyond it a mesh breaks a symmetry."""
+"""Largest drift scalar of an equilibrium, or of a unit vector, over the lowest bending eigenvalue: beyond it a mesh
+breaks a symmetry, or the vector is one of a Jordan block."""
 
 
 def unit(*values: float, one: float) -> float:

@@ -16,13 +16,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rodfem.tolerances import TINY
+from rodfem.tolerances import SAME_PLACE, TINY
 
 Floats = NDArray[np.float64]
 FEW, MOST = 16, 1024
 """Edges of the first polygon, and of the last one, where curves touch."""
-ONE_POINT = 1e-9
-"""Distance of the ends of a closed curve, relative to its size."""
 
 
 def writhe(curve: Callable[[Floats], Floats], ends: tuple[float, float], to: float = 1e-3) -> float:
@@ -47,7 +45,7 @@ def writhe(curve: Callable[[Floats], Floats], ends: tuple[float, float], to: flo
 
 def _points(curve: Callable[[Floats], Floats], ends: tuple[float, float], edges: int) -> Floats:
     points = curve(np.linspace(*ends, edges + 1))
-    if np.allclose(points[0], points[-1], rtol=0.0, atol=ONE_POINT * float(np.ptp(points))):
+    if np.allclose(points[0], points[-1], rtol=0.0, atol=SAME_PLACE * float(np.ptp(points))):
         points[-1] = points[0]
     return points
 

@@ -135,16 +135,16 @@ print(f"curvature {answer:.9f} (1/8); fold at {snap.point.load:.10f}, by Koiter 
 # %% [markdown]
 # ## Exercises
 #
-# **5.1** Where is the fold for $\varepsilon = 0.05$?
+# **5.1** Hold the rod by $b \cdot \theta$, $b_i = s_i$: the stiffness $h = 1/(b \cdot S^{-1} b)$ has the slope
+# $w \cdot S' w$, $w = h S^{-1} b$. Where is $P_1$, by a cubic from 2 to 3? (See [theory](../theory/special-points.md).)
 #
-# **5.2** A rigid column, hinged at its foot, a horizontal spring at its top: the energy is $\frac12\sin^2\theta +
-# p\cos\theta - \varepsilon\sin\theta$. Its pitchfork is *subcritical*. At which largest $p$ does it collapse for
-# $\varepsilon = 0.01$? How much of the perfect column's load is that?
+# **5.2** A rigid column on a hinge, a horizontal spring at its top: its energy $\frac12\sin^2\theta + p\cos\theta -
+# \varepsilon\sin\theta$ has a *subcritical* pitchfork. At which largest $p$ does it collapse for $\varepsilon = 0.01$?
 #
 # **5.3** A heavy column (exercise 2.2): $q = q_1(1 + c\,a^2)$. Find $c$, with $a$ the angle of the tip.
 
 # %% [markdown]
 # ## Where it breaks
 #
-# The law is local: at $\varepsilon = 0.02$ it is off by 0.06 %, later by more. Two modes at nearly one load make the
-# reduced energy one of two amplitudes, more sensitive to imperfections. Symmetric rods do that always (lesson 7).
+# The law is local: at $\varepsilon = 0.02$ it is off by 0.06 %. Two modes at nearly one load make the reduced energy
+# one of two amplitudes, more sensitive to imperfections. Symmetric rods do that always (lesson 7).

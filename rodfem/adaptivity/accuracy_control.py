@@ -21,14 +21,12 @@ from rodfem.continuation.observer import Observer
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.stability.inertia import ROUGH
-from rodfem.tolerances import SAME_LOAD, unit
+from rodfem.tolerances import SAME_LOAD, TINY, unit
 
 SHARP = 1e-9
 """For a better accuracy than this points get one more step of Newton's method, to round-off."""
 POLISHED = 1e-3
 """Distance, in the metric, that it may move a point by at most."""
-LEAST = 1e-30
-"""Floor of the indicator that others are divided by: it is zero where the mesh has the state exactly."""
 TRIES, MOST = 4, 16
 """Meshes tried at one place, and in a run."""
 SURE = 10.0
@@ -79,7 +77,7 @@ class AccuracyControl:
                 return
         with solver.system.clock.scope("error bars"):
             point.estimate = self._computed(point)
-        self.checked = Checked(max(indicator, LEAST), point.estimate)
+        self.checked = Checked(max(indicator, TINY), point.estimate)
         if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
             raise TooCoarse(point, point.estimate)
 

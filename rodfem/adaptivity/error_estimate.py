@@ -12,8 +12,8 @@ small, and a single value may agree on two meshes by accident, where what it has
 cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
 :data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
 may well exceed.  Of an ordinate that is taken inside of an element ``rho`` is of the largest change over that element,
-in which its error oscillates (:mod:`rodfem.adaptivity.ordinate_bound`).  Of an event ``d`` is to where its function has
-the same state at more places (:mod:`rodfem.adaptivity.event_sampling`).
+in which its error oscillates (:mod:`rodfem.adaptivity.ordinate_bound`).  Of an event it is at least what a sum over
+nodes has: half of it.
 
 The state, its tangent and the null vector are interpolated, so that this costs a few solves.
 """
@@ -26,16 +26,15 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.event_sampling import BESIDE, LEFT, refuse_jump, where_places_matter
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_location import Found, nearest_event, noise_of
+from rodfem.continuation.event_piece import nearest
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
-from rodfem.continuation.states_between import STEADY, Curve, stepped
+from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, halved, richer_system
@@ -51,10 +50,8 @@ RESOLVED_TO = 0.1
 order of which errors of loads are, is one per cent."""
 RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
-WINDOW = 0.02
-"""Half length, in the metric, of the piece of a branch on which an event is expected again."""
-REACH = 0.2
-"""Distance along the branch, in the metric, to which an event is sought whose function receives more places."""
+LEFT = 0.5
+"""Part of an error of an event that is left at most: that of a number of the nodes falls with their distance."""
 
 
 @dataclass(frozen=True)
@@ -173,44 +170,18 @@ class Enriched:
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
 
     def _at_event(self, point: Point, event: Event) -> Again:
-        """The point of the richer discretisation at which an event happens: the nearest one, of several.
-
-        Its function has the state at as many places as make it certain; what those differ by is left.
-        """
-        assert point.tangent is not None
-        noise = _noise_beside(self.coarse, event, point.x, point.tangent)
-        refuse_jump(self.coarse.shape, event, point.x, point.tangent, noise)
+        """The point of the richer discretisation at which an event happens: the nearest one, of several."""
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
-
-        nearest = nearest_event(self.solver, event, _straight(x, tangent), WINDOW)
-        sampled = self._sampled_finer(event, nearest, tangent)
-        found, along = sampled[-1].x, max(each.along for each in sampled)
-        loads, ordinates = np.array([(self.system.scalar(y.x), self.solver.shape.ordinate(y.x)) for y in sampled]).T
-        load, ordinate, units = float(loads[-1]), float(ordinates[-1]), self.solver.units
+        node, along = nearest(self.solver, event, x, tangent)
+        found, units = node.kept.x, self.solver.units
+        load, ordinate = self.system.scalar(found), self.solver.shape.ordinate(found)
         slope = abs(ordinate_along(self.solver, found, tangent))
-        left = (
-            abs(point.slope) * along + round_off(load, units.load) + float(np.ptp(loads)),
-            slope * along + round_off(ordinate, units.ordinate) + float(np.ptp(ordinates)),
-        )
+        load_left = abs(point.slope) * along + round_off(load, units.load)
+        left = slope * along + round_off(ordinate, units.ordinate)
         changed = self._indicators[1].changed(x, found, state=True)
-        rho = self.rho([point.x], [found])
-        if len(sampled) > 1:
-            rho = max(rho, LEFT)
-        return Again(found, load, ordinate, *left, self._ordinate(point.x, found, left[1], rho), rho, changed)
-
-    def _sampled_finer(self, event: Event, found: Found, tangent: PETSc.Vec) -> list[Found]:
-        """Where an event happens by its function's values at more and more places, first where it was ``found``.
-
-        There it happens by the values at nodes.  It is the only one where more places make no difference.
-        """
-        noise = _noise_beside(self.solver, event, found.x, tangent)
-        finer = where_places_matter(self.solver.shape, event, found.x, noise)
-        try:
-            return [found, *(nearest_event(self.solver, more, _straight(found.x, tangent), REACH) for more in finer)]
-        except ConvergenceError as trouble:
-            raise ConvergenceError(
-                f"the event {event.name!r} does not happen nearby where its function receives the states at more places"
-            ) from trouble
+        rho = max(self.rho([point.x], [found]), LEFT)
+        ordinate_error = self._ordinate(point.x, found, left, rho)
+        return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed)
 
     def _located(self, special: SpecialPoint) -> Again:
         """The fold or branch point on the richer discretisation, and its ordinate: the same singular system."""
@@ -236,13 +207,3 @@ class Enriched:
         self.origins.append((special, Origin(found.x, found.load, ordinate, load_left, left), rho))
         ordinate_error = self._ordinate(point.x, found.x, left, rho)
         return Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed)
-
-
-def _noise_beside(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec) -> float:
-    """Round-off of an event's values near a state, beside a jump that may be there."""
-    return min(noise_of(solver, event, x + tangent * d) for d in (-BESIDE[1], BESIDE[1]))
-
-
-def _straight(x: PETSc.Vec, tangent: PETSc.Vec) -> Curve:
-    """Straight line through a state."""
-    return lambda s: (x + tangent * s, tangent)

@@ -1,28 +1,27 @@
 """Soft modes along a branch that has been traced: at which of its points the index is not decided, and by what.
 
 Rows that one factorisation decided have none.  A mesh may make an eigenvalue of its own of one that is exponentially
-small: it pins what slides along the rod.  That shows at every row, on the mesh itself
-(:mod:`rodfem.stability.sliding`).  At the loads asked for and at the ends of branches, and all along a branch with a
-special point that a richer mesh does not have, indices are besides compared with those of a richer mesh.
+small: it pins what slides along the rod.  With error bars the eigenvalue nearest zero is therefore compared with that
+of a richer mesh, at the loads asked for and at the ends of branches; all along a branch if one of these is undecided,
+or a special point is not on the richer mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import compress, groupby
 from math import inf, isfinite
 
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import VERTICAL
 from rodfem.continuation.kinds import EVENT, FOLD
 from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.soft_mode import index_range
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
 BARS = "richer meshes may decide that, ask for error bars"
-FLAT = 1e-6
-"""Slope of the load, in spans, below which all along a branch this is a family of equilibria at one load."""
 CLEARLY = 10.0
 """Times the uncertainty by round-off above which one is that of the mesh."""
 
@@ -59,53 +58,40 @@ class SoftRows:
             if id(point) not in special and id(point) not in first:
                 compare = self.error_bars and doubtful
                 self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
-        self._count_at_special_points(branch)
+        if self.error_bars and doubtful:
+            self._leave_out_doubtful(branch, family=family)
+        for fold in (s for s in branch.special if s.kind == FOLD):
+            self._change_at_fold(fold, branch.points)
+
+    def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
+        """Make rows of the special points at which an eigenvalue is zero that is undecided at the rows after or before.
+
+        That is a zero of the mesh, not of the rod, if two rows next to one another are undecided, or one where the
+        richer mesh has no such point: a single one may be next to a special point by chance.
+        """
+        rows = [p for p in branch.points if not any(p is s.point for s in branch.special)]
+        left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
+        for s in compress(branch.special, left_out):
+            self._of(s.point).examine(s.point, fixed_load=False, compare=True, family=family)
+        branch.special[:] = [s for s, out in zip(branch.special, left_out, strict=True) if not out]
 
     def _is_family(self, branch: Branch) -> bool:
         """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
-        span = self.meshes.solvers[0].system.scene.span
+        span, singular = self.meshes.solvers[0].system.scene.span, {id(s.point) for s in branch.special}
         rows = branch.points[1:] if branch.parent else branch.points  # a pitchfork begins without a slope
-        return all(abs(p.slope) < FLAT * abs(span[1] - span[0]) for p in rows)
-
-    def _count_at_special_points(self, branch: Branch) -> None:
-        """Count at special points, too, the soft modes that the rows on either side of them have as negative.
-
-        A factorisation has those within its tolerance as zero.  At the rows richer meshes decide; at a special point,
-        where a richer mesh has an eigenvalue of either sign next to zero, the rows beside it do, if they agree and the
-        mesh itself has as many negative values beyond round-off at the special point.
-        """
-        at = {id(s.point): s for s in branch.special if s.kind.counted}
-        points = branch.points[1:] if branch.parent else branch.points  # its first is a special point of another
-        groups = [(at_special, list(rows)) for at_special, rows in groupby(points, lambda p: id(p) in at)]
-        for i, (at_special, rows) in enumerate(groups):
-            if not at_special:
-                continue
-            specials = [at[id(p)] for p in rows]
-            beside = [(groups[i - 1][1][-1], specials[0].negative_before)] if i else []
-            beside += [(group[0], specials[-1].negative_after) for _, group in groups[i + 1 : i + 2]]
-            more = {point.negative - index for point, index in beside}
-            if len(specials) == 1 and i:
-                self._change_at_fold(specials[0], groups[i - 1][1][::-1], *(rows for _, rows in groups[i + 1 : i + 2]))
-            number = more.pop() if len(more) == 1 else 0
-            settled = all(not p.undecided and sum(m.value < 0 for m in p.soft) >= number for p, _ in beside)
-            if number <= 0 or not settled:
-                continue
-            modes = [[m for m in self._of(s.point).persistent(s) if m.decided and m.value < 0] for s in specials]
-            if any(len(negative) < number for negative in modes):
-                continue
-            for s, negative in zip(specials, modes, strict=True):
-                s.negative_before, s.negative_after = s.negative_before + number, s.negative_after + number
-                s.point.negative, s.point.zero = s.point.negative + number, s.point.zero - number
-                s.point.soft = negative[:number]
+        rows = [p for p in rows if id(p) not in singular]
+        return bool(rows) and all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
 
     @staticmethod
-    def _change_at_fold(fold: SpecialPoint, before: Sequence[Point], after: Sequence[Point] = ()) -> None:
-        """Give a fold, where a count has one index on both sides, those of the nearest rows that are decided."""
-        if fold.kind != FOLD or fold.multiplicity != 1 or fold.negative_before != fold.negative_after:
+    def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
+        """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
+        if fold.multiplicity != 1 or fold.negative_before != fold.negative_after:
             return
-        left, right = (next((p.negative for p in rows if not p.undecided), None) for rows in (before, after))
-        if left is not None and right is not None and abs(left - right) == 1:
-            fold.negative_before, fold.negative_after = left, right
+        decided = [p for p in rows if not p.undecided and p is not fold.point]
+        left = [p.negative for p in decided if p.arclength < fold.point.arclength][-1:]
+        right = [p.negative for p in decided if p.arclength > fold.point.arclength][:1]
+        if left and right and abs(left[0] - right[0]) == 1:
+            fold.negative_before, fold.negative_after = left[0], right[0]
 
     def undecided(self, branch: Branch) -> Iterator[str]:
         """Yield a sentence on each piece of a branch whose index is not decided, or not compared with a richer mesh."""
@@ -133,3 +119,14 @@ class SoftRows:
             richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
             self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
         return self._states[point.mesh]
+
+
+def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
+    """Whether a ``special`` point has as many undecided ones of the ``rows`` next to it, on one side, as say so.
+
+    What is undecided at all of the rows is none of it.
+    """
+    number, at = 2 if isfinite(special.error_estimate) else 1, special.point.arclength
+    still = min((p.undecided for p in rows), default=0)
+    sides = [p for p in reversed(rows) if p.arclength < at], [p for p in rows if p.arclength > at]
+    return special.kind.singular and any(sum(p.undecided > still for p in side[:number]) == number for side in sides)

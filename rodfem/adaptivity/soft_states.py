@@ -21,9 +21,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
-from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
@@ -33,7 +32,6 @@ from rodfem.stability.inertia import NULL
 from rodfem.stability.motion_names import SHARE, MotionNames
 from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
 from rodfem.stability.round_off import SPARE, decide, quotient_error
-from rodfem.stability.sliding import Sliding
 from rodfem.stability.soft_mode import Judgement, SoftMode
 
 REFINEMENTS = 2
@@ -52,7 +50,6 @@ class SoftStates:
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
         """Nothing is computed before a state is given."""
         self.solver, self.names = solver, MotionNames(solver.system, solver.inertia.metric)
-        self.sliding = Sliding(self.names)
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
         self.uncompared = ""
@@ -74,47 +71,35 @@ class SoftStates:
         vectors, which are ``vanishing``, are zero.  Raises :class:`ConvergenceError` where constraints that depend on
         each other leave less than no negative eigenvalue.
         """
-        inertia, nearest, self.uncompared = self.solver.inertia, self._nearest(point), ""
-        differing = self._differing(point, fixed_load) if compare and self._richer else 0
-        least = max(NEAR * inertia.scale, SURE * nearest) if nearest else soft_limit(inertia)
-        sliding = self.sliding.suspects(inertia, point.x, least)
-        if nearest and not differing and not sliding:
+        inertia = self.solver.inertia
+        least = self._doubtful(point, fixed_load, compare=compare)
+        if least is None:
             return False
-        least = max(differing, sliding + 1 if sliding else 0)  # another eigenvalue may be nearer to zero
-        near = self._with_the_mesh(point, near_zero(inertia.at(point.x), least=least), differing, vanishing)
+        near = near_zero(inertia.at(point.x), least=least)
         found = self.judgement(point, near, fixed_load=fixed_load, family=family, vanishing=vanishing)
         if found.negative < 0:
             raise ConvergenceError(
                 f"The count of negative eigenvalues at load {point.load:.8g} gave {found.negative}: the constraints "
                 "depend on each other, or nearly; remove those that follow from the others."
             )
+        if point.negative_in_space is not None:  # that in the plane, and what is out of it
+            point.negative_in_space += found.negative - point.negative
         point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
-        point.soft = list(found.soft)
-        return bool(found.soft)
+        point.soft = [m for m in found.soft if not m.decided or abs(m.value) < soft_limit(inertia)]
+        return bool(point.soft)
 
-    def persistent(self, special: SpecialPoint) -> list[SoftMode]:
-        """Soft modes at a special point that are none of its null vectors, with their round-off on this mesh alone."""
-        x, system = special.point.x, self.solver.system
-        near = near_zero(self.solver.inertia.at(x))
-        kept = [i for i, v in enumerate(near.vectors) if across(system.metric, [v], special.null_vectors)]
-        names = self.names(x, [near.vectors[i] for i in kept])
-        return [
-            SoftMode(name, float(near.values[i]), float(near.uncertainty[i]))
-            for name, i in zip(names, kept, strict=True)
-        ]
+    def _doubtful(self, point: Point, fixed_load: bool, *, compare: bool) -> int | None:
+        """Number of eigenvalues nearest zero to be judged besides soft ones; None where there is nothing to judge.
 
-    def _with_the_mesh(self, point: Point, near: NearZero, least: int, vanishing: Sequence[PETSc.Vec]) -> NearZero:
-        """Eigenvalues with what the mesh makes of the motion along the rod in their uncertainty.
-
-        Those that are neither soft nor doubtful by that are left out, but for the ``least`` number of them.  Where the
-        ``vanishing`` ones are zero the mesh is part of the load, not of them.
+        Those of another sign on the richer mesh; if none is soft, the one nearest zero is compared with that of there.
         """
-        parts = np.where(self._zero(near, vanishing), 0.0, self.sliding.parts(point.x, near.vectors))
-        uncertainty = near.uncertainty + parts
-        limit = soft_limit(self.solver.inertia)
-        away = abs(near.values)
-        chosen = (away < limit) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
-        return near.chosen(chosen, uncertainty, self.solver.inertia.tolerance)
+        nearest, self.uncompared = self._nearest(point), ""
+        if not (compare and self._richer):
+            return None if nearest else 0
+        differing = self._differing(point, fixed_load)
+        if self.uncompared:
+            return None if nearest else 0
+        return differing or int(nearest > 0)
 
     def _nearest(self, point: Point) -> float:
         """Estimated distance of the nearest eigenvalue from zero; 0 where one factorisation does not tell the index."""

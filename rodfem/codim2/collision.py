@@ -17,9 +17,9 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.criterion import SPLIT, Destroyed
-from rodfem.codim2.others import UNSTABLE, beside_cluster
-from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
+from rodfem.codim2.criteria import FEWER, SPLIT
+from rodfem.codim2.plane import Destroyed, Guess, LocusPoint, Plane
+from rodfem.codim2.unstable import UNSTABLE, unstable
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
@@ -37,8 +37,8 @@ DIFFERENCE = 1e-3
 """Step of the central differences of ``D``, relative to the bounds."""
 INSIDE = 0.01
 """Greatest such step over the distance from what is not admissible, as a mass of zero: ``D`` has a pole there."""
-FEWER = 1e-5
-"""Pairs whose ``D`` differ by more than this, over the square of their mean, are not equal by a symmetry."""
+Zero = tuple[float, float, Measured, PETSc.Vec]
+"""Place of a zero of ``D`` on a line of parameters, its uncertainty, the cluster and the state there."""
 
 
 class Collision:
@@ -55,22 +55,18 @@ class Collision:
         """Size of a step: parameters over the widths of their bounds."""
         return float(np.linalg.norm(dp / self.plane.width))
 
-    def correct(
-        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0
-    ) -> LocusPoint:
-        """Point of the curve on the line through ``p`` across ``tangent``; raises :class:`ConvergenceError`.
+    def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
+        """As :class:`~rodfem.codim2.plane.Criterion` says; the direction of the state plays no part.
 
-        Where pairs that met at once do not any more, that is a :class:`~rodfem.codim2.criterion.Destroyed`.  ``near``
-        is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.  ``p`` (2,) and
-        the state ``x`` are the prediction; ``reach`` bounds how far ``x`` may move, in the metric.
+        Raises :class:`ConvergenceError`, and :class:`Destroyed` where pairs that met at once do not any more.
         """
-        node, here = self._onto(p, x, tangent, near, reach)
+        node, here = self._onto(guess, near, reach)
         width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
-        basis, forward = _basis(near), tangent[0] / width
+        basis, forward = _basis(near), guess[2] / width
         gradient, clearest = np.zeros(2), here
         steps = np.minimum(DIFFERENCE, INSIDE * self.plane.room(p) / width)
         for which in (0, 1):
-            system.line = self.plane.line(p, (np.arange(2) == which) * width)
+            system.line = self.plane.line(p, self.plane.axis(which))
             step = float(steps[which])
             low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-step, step))
             gradient[which] = (high.discriminant - low.discriminant) / (2 * step)
@@ -81,44 +77,38 @@ class Collision:
             raise Destroyed(f"its {here.cluster.size // 2} pairs of eigenvalues do not meet together any more")
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
         orientation = 1 if dq @ forward >= 0 else -1
-        system.line = self.plane.along(p, 0)
-        system.set_load(x, float(p[0]))
-        rest = beside_cluster(self.eigensolver.at(x), clearest.cluster.basis)
+        basis = clearest.cluster.basis
+        rest = unstable(self.eigensolver.at(self.plane.at(p, x)), basis.shape[1], basis)
         return replace(
             node,
             dp=orientation * dq * width,
             orientation=orientation,
             located_to=node.located_to + SPLIT * here.split * abs(gradient) / (gradient @ gradient) * width,
-            modes=as_vectors(system, clearest.cluster.basis),
+            modes=as_vectors(system, basis),
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
             lower=int(np.sign(gradient[0])),
         )
 
-    def onto(self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
-        """The same point with its parameters, state and double eigenvalue alone: no tangent, modes or counts.
+    def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
+        """See :class:`~rodfem.codim2.plane.Criterion`."""
+        return self._onto(guess, near, 1.0)[0]
 
-        ``p`` (2,), ``x``, ``tangent``, ``near`` and ``reach`` are those of :meth:`correct`, and so is what is raised.
-        """
-        return self._onto(p, x, tangent, near, reach)[0]
-
-    def _onto(
-        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float
-    ) -> tuple[LocusPoint, Measured]:
+    def _onto(self, guess: Guess, near: LocusPoint, reach: float) -> tuple[LocusPoint, Measured]:
         """Point of the curve on the line, and the cluster there; the tangent is the one that was given."""
-        width, system, forward = self.plane.width, self.solver.system, tangent[0] / self.plane.width
-        forward = forward / np.linalg.norm(forward)
+        p, x, dp, _ = guess
+        width, system = self.plane.width, self.solver.system
+        forward = dp / width / np.linalg.norm(dp / width)
         across = np.array([-forward[1], forward[0]])
         system.line = self.plane.line(p, across * width)
         t, last, here, x = self._collide(x, Cluster(_basis(near), near.omega2), reach)
         p = p + t * across * width
-        system.line = self.plane.along(p, 0)
-        system.set_load(x, float(p[0]))
+        x = self.plane.at(p, x)
         located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
         ordinate, still = self.solver.shape.ordinate(x), system.new_vector()
         return LocusPoint(p, x, forward * width, still, located, ordinate=ordinate, omega2=here.cluster.mean), here
 
-    def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
-        """Zero of ``D`` on the system's line of parameters: t, its uncertainty, the cluster, state.
+    def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
+        """Zero of ``D`` on the system's line of parameters.
 
         Secants take ``D`` from the eigenvalues, whose round-off is that of an eigensolver: they end near the zero, or
         where they no longer shrink.  The last digits are by ``D`` of both subspaces, right and left.
@@ -133,7 +123,7 @@ class Collision:
                 break
             step = -now.discriminant * (other - t) / (at_other - now.discriminant)
             if abs(step) < SHARP or (abs(step) < NOISE and abs(step) > 0.3 * before):
-                return self._by_both_sides(t, abs(step), slope, now, x)
+                return self._by_both_sides((t, abs(step), now, x), slope)
             if abs(other - t) > FAR:
                 slope = (at_other - now.discriminant) / (other - t)
             other, at_other, before = t, now.discriminant, abs(step)
@@ -143,15 +133,13 @@ class Collision:
             now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
         raise ConvergenceError("two eigenvalues do not collide near by")
 
-    def _by_both_sides(
-        self, t: float, last: float, slope: float, now: Measured, x: PETSc.Vec
-    ) -> tuple[float, float, Measured, PETSc.Vec]:
-        """Correct a zero of ``D`` near ``t`` twice, by its ``slope``: t, its uncertainty, the cluster, state.
+    def _by_both_sides(self, found: Zero, slope: float) -> Zero:
+        """Correct a zero of ``D`` that was ``found`` twice, by its ``slope``.
 
         The uncertainty is the last change and the round-off of ``D``.  Where left vectors are not found, as beside a
-        double zero at times, the zero stays that of the eigenvalues, uncertain by the ``last`` change of the secants.
+        double zero at times, the zero stays that of the eigenvalues, uncertain by the last change of the secants.
         """
-        found = t, last, now, x
+        t, _, now, x = found
         with suppress(ConvergenceError):
             for _ in range(2):
                 noise = noise_of(self.eigensolver.at(x), now)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import Interval
+from rodfem.codim2.plane import Interval
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number
@@ -22,7 +22,10 @@ COARSE = "This mesh does not resolve all states: errors of `at least` that may b
 AS_THEY_ARE = tuple(
     "scene title kind ordinate_name natural start lower planar unresolved constants discretization note".split()
 )
-"""Entries of a file that are attributes of a locus."""
+PAIRS, WORDS = ("bounds", "crossings"), ("labels", "words", "units", "ended")
+"""Entries of a file that are attributes of a locus: as they are, pairs of numbers, and pairs of words."""
+COLUMNS = "ordinate", "index", "located_to", "error", "omega2"
+"""Tables of a file that are attributes of a locus."""
 
 
 @dataclass
@@ -127,48 +130,34 @@ class Locus:
 
     def data(self) -> dict[str, Any]:
         """Plain lists, numbers and strings for a file; what was not computed is None."""
-        columns: dict[str, list] = {name: self.values[:, i].tolist() for i, name in enumerate(self.names)}
-        columns["ordinate"] = self.ordinate.tolist()
-        for key, table in (("index", self.index), ("located_to", self.located_to)):
-            columns[key] = table.tolist()
-        columns["error"] = [[v if np.isfinite(v) else None for v in row] for row in self.error.tolist()]
-        columns["omega2"] = [None if np.isnan(v) else v for v in self.omega2.tolist()]
-        out = {"format": LOCUS.mark(), **{name: getattr(self, name) for name in AS_THEY_ARE}}
-        return out | {
+        columns = {name: self.values[:, i].tolist() for i, name in enumerate(self.names)}
+        columns |= {name: _plain(getattr(self, name)) for name in COLUMNS}
+        return {
+            "format": LOCUS.mark(),
+            **{name: getattr(self, name) for name in AS_THEY_ARE},
+            **{name: [*map(list, getattr(self, name))] for name in PAIRS},
+            **{name: list(getattr(self, name)) for name in WORDS},
             "parameters": list(self.names),
-            "labels": list(self.labels),
-            "words": list(self.words),
-            "units": list(self.units),
-            "bounds": [list(b) for b in self.bounds],
             "columns": columns,
             "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
             "marks": [{"kind": m.kind, "row": m.row} for m in self.marks],
-            "ended": list(self.ended),
-            "crossings": [list(crossing) for crossing in self.crossings],
         }
 
     @classmethod
     def read(cls, path: Path) -> Locus:
         """Read what :meth:`save` has written, but for the states; raises :class:`InputError` where that is missing."""
         data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", "lower"))
-        columns, (first, second) = data["columns"], data["parameters"]
-        tables: dict[str, Any] = {
-            key: np.array(columns[key], dtype=float) for key in ("ordinate", "located_to", "error", "omega2")
-        }
+        columns, names = data["columns"], tuple(data["parameters"])
+        tables: dict[str, Any] = {name: np.array(columns[name], dtype=float) for name in COLUMNS}
         tables["error"][data["without_estimate"]] = np.inf
+        tables |= {name: [*map(tuple, data[name])] for name in PAIRS}
+        tables |= {name: tuple(data.get(name, ("", ""))) for name in WORDS}
         return cls(
             **{name: data[name] for name in AS_THEY_ARE if name in data},
-            names=(first, second),
-            labels=tuple(data["labels"]),
-            words=tuple(data.get("words", ("", ""))),
-            units=tuple(data.get("units", ("", ""))),
-            bounds=(tuple(data["bounds"][0]), tuple(data["bounds"][1])),
-            values=np.array([columns[first], columns[second]]).T,
-            index=np.array(columns["index"]),
+            **(tables | {"bounds": tuple(tables["bounds"]), "index": tables["index"].astype(int)}),
+            names=names,
+            values=np.array([columns[name] for name in names]).T,
             marks=[Mark(mark["kind"], mark["row"]) for mark in data["marks"]],
-            ended=tuple(data["ended"]),
-            crossings=[(load, ordinate) for load, ordinate in data["crossings"]],
-            **tables,
         )
 
     def save(self, path: Path) -> None:
@@ -199,3 +188,10 @@ def _same(special: SpecialPoint, place: tuple[float, float], units: Units) -> bo
     """Whether a special point of a scene of these natural sizes has the load and the ordinate of a ``place``."""
     point = special.point
     return same_special((point.load, point.ordinate), special.located_to, place, (units.load, units.ordinate))
+
+
+def _plain(table: np.ndarray) -> list:
+    """A table as lists of numbers, None where they are not finite."""
+    out = table.astype(object)
+    out[~np.isfinite(table)] = None
+    return list(out.tolist())

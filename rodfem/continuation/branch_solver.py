@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.compiled_step import Checked, CompiledStep
-from rodfem.continuation.corrector import SAME, STEPS, Corrector
+from rodfem.continuation.corrector import STEPS, Corrector
 from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
@@ -24,6 +24,7 @@ from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.round_off import decide
 from rodfem.stability.symmetric import SymmetricSolver
+from rodfem.tolerances import NEGLIGIBLE
 
 ASIDE = 0.1
 """How far beside a saddle the way down goes on, in the metric."""
@@ -180,7 +181,7 @@ class BranchSolver(StaticSolver):
         """
         last, system = known[-1], self.system
         if self._whole is not None:
-            made = self._whole(known, s, bounds, limits(system, STEPS, reach, TOLERANCE), SAME)
+            made = self._whole(known, s, bounds, limits(system, STEPS, reach, TOLERANCE), NEGLIGIBLE)
             if made is not None:
                 index = self.corrector.index(made.found, made.below, made.nearest)
                 numbers = made.aligned, made.length, made.energies

@@ -1,63 +1,56 @@
 """Loss of convexity of the stored energy between two states: it may be lost and regained within one step.
 
-The least eigenvalue of the second derivative of ``W`` (:mod:`rodfem.fem.convexity`) is sampled between the states, as
-events are (:mod:`rodfem.continuation.event_samples`): at states that are interpolated, which costs no solves.  Where a
-sample is not positive an equilibrium decides.
+The least eigenvalue of the second derivative of ``W`` (:mod:`rodfem.fem.convexity`) is a cubic between the states, by
+its values and difference quotients at both.  Where that turns, or at the second state, it may not be positive: an
+equilibrium decides.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
 
+import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_samples import sampled
+from rodfem.continuation.crossings import Node, places
 from rodfem.continuation.prediction import between
 from rodfem.continuation.states_between import solve_at
-from rodfem.errors import SMALLER_STEPS, ConvergenceError
+from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.roots import zero_between
-from rodfem.tolerances import ROUND_OFF
 
-LOCATED = 1e-10
-"""Place to which a loss of convexity is located, relative to the step."""
+LOCATED, DIFFERENCE = 1e-10, 1e-5
+"""Place to which a loss of convexity is located, and step of the difference quotients, both relative to the step."""
 State = Callable[[float], PETSc.Vec]
 
 
-class Between(NamedTuple):
-    """Where between 0 and 1 the energy is not convex any more, None for nowhere; whether samples ``resolve`` that."""
-
-    lost: float | None = None
-    resolved: bool = True
-
-
-def lost_between(convexity: Convexity, state: State, holds: Callable[[float], bool]) -> Between:
+def lost_between(convexity: Convexity, state: State, holds: Callable[[float], bool]) -> float | None:
     """First ``t`` between 0 and 1 at which ``W`` is not convex along ``state(t)``, as it is along ``state(0)``.
 
-    ``holds(t)`` decides about an interpolated state along which it is not.
+    ``holds(t)`` decides about an interpolated state along which it is not.  None where it stays convex.
     """
     if not convexity.alters:
-        return Between()
+        return None
     scales = convexity.scales(state(0.0), state(1.0))
     margin = cache(lambda t: convexity.margin(state(t), scales))
-    last, samples = 0.0, sampled(margin, 0.0, 1.0, (margin(0.0), margin(1.0)), lambda _: ROUND_OFF)
-    for t, least in samples.in_order():
-        if least > 0.0 or holds(t):
+
+    def node(t: float, beside: float) -> Node:
+        return Node(t, np.array([[margin(t)]]), np.array([[(margin(beside) - margin(t)) / (beside - t)]]), 0)
+
+    last = 0.0
+    for t in [*places(node(0.0, DIFFERENCE), node(1.0, 1.0 - DIFFERENCE), 1), 1.0]:
+        if margin(t) > 0.0 or holds(t):
             last = t
             continue
-        return Between(zero_between(margin, last, t, LOCATED) if margin(last) > 0.0 else t)
-    return Between(None, not samples.unresolved)
+        return zero_between(margin, last, t, LOCATED) if margin(last) > 0.0 else t
+    return None
 
 
-def lost_in_step(solver: BranchSolver, a: Point, b: Point, warn: Callable[[str], None]) -> str:
-    """Why a branch ends between the rows ``a`` and ``b`` on the mesh of a ``solver``; empty where ``W`` stays convex.
-
-    ``warn`` hears of a step in which it varies too fast for the samples.
-    """
+def lost_in_step(solver: BranchSolver, a: Point, b: Point) -> str:
+    """Why a branch ends between two rows on the mesh of a ``solver``; empty where ``W`` stays convex."""
 
     def place(t: float) -> float:
         return a.arclength + t * (b.arclength - a.arclength)
@@ -73,15 +66,5 @@ def lost_in_step(solver: BranchSolver, a: Point, b: Point, warn: Callable[[str],
         except ConvergenceError:  # where the energy is not convex the equations may be singular
             return False
 
-    found = lost_between(solver.convexity, state, holds)
-    if not found.resolved:
-        warn(unresolved(solver.system.scene.load, a.load, b.load))
-    return "" if found.lost is None else solver.not_convex(state(found.lost))
-
-
-def unresolved(name: str, a: float, b: float) -> str:
-    """Sentence on a step in which the energy varies too fast for the samples."""
-    return (
-        f"Between {name} = {a:.8g} and {b:.8g} the second derivative of the stored energy varies so fast that it may "
-        f"lose convexity unseen: {SMALLER_STEPS}."
-    )
+    lost = lost_between(solver.convexity, state, holds)
+    return "" if lost is None else solver.not_convex(state(lost))

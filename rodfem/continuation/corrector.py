@@ -34,14 +34,12 @@ from rodfem.fem.newton import NewtonResult, iterate, limits, result
 from rodfem.fem.state import State
 from rodfem.fem.system import dense_columns
 from rodfem.stability.inertia import FRESH, Factored, Index, Inertia
-from rodfem.tolerances import TINY
+from rodfem.tolerances import NEGLIGIBLE, TINY
 
 STEPS = 8
 """Iterations of Newton's method in a step along a branch, at most: a shorter step is cheaper than more of them."""
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
-SAME = 1e-12
-"""Correction, relative, below which a prediction is the state itself: a hundredth of Newton's tolerance."""
 NEAR = 1e-3
 """Distance of an eigenvalue from zero, over the lowest bending eigenvalue, below which the two shifts count."""
 
@@ -101,9 +99,9 @@ class Corrector:
     def corrected(self, x: PETSc.Vec, outcome: NewtonResult) -> Regular | None:
         """Factors of ``S`` at a state that :meth:`correct` has just converged to; None where they do not serve.
 
-        Those of the correction itself, where it was the only one and moved the state by less than :data:`SAME`.
+        Those of the correction itself, where it was the only one and moved the state by less than :data:`NEGLIGIBLE`.
         """
-        if self.compiled is None or outcome.iterations > 1 or outcome.error > SAME or self.system.damping:
+        if self.compiled is None or outcome.iterations > 1 or outcome.error > NEGLIGIBLE or self.system.damping:
             return self.factor(x)
         return self._counted(self.compiled, x, self.inertia.held)
 

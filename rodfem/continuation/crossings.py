@@ -24,7 +24,10 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from numpy.polynomial import Polynomial
 
+from rodfem.continuation.interpolant import REAL
+from rodfem.stability.dense import FINITE
 from rodfem.stability.reduced_stiffness import negative
 from rodfem.tolerances import TINY
 
@@ -36,10 +39,6 @@ SHORTEST = 1e-8
 """Length of a piece, in the metric, that is not divided."""
 SAME, ALIKE = 1e-12, 0.9
 """Distance of crossings, in the metric, that are one; cosine of the modes of different ones, at most."""
-FINITE = 1e-13
-"""Inverse of a root above which it is none, but round-off of an eigenvalue at infinity."""
-REAL = 1e-6
-"""Imaginary part of a root that is real."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +64,7 @@ class Node:
 class Crossing:
     """Eigenvalues that pass zero at ``s``: ``vectors`` (k, m) of H, the index ``before`` and ``after``.
 
-    The ``piece`` is that between two nodes in which they do.
+    The ``piece`` is that between two nodes in which they do, ``width`` the distance of the first from the last of them.
     """
 
     s: float
@@ -73,6 +72,7 @@ class Crossing:
     before: int
     after: int
     piece: tuple[Node, Node]
+    width: float = 0.0
 
 
 def coefficients(a: Node, b: Node) -> list[np.ndarray]:
@@ -168,9 +168,16 @@ def crossings(
         values, vectors = np.linalg.eigh(at(a, b, t))
         own = vectors[:, np.argsort(abs(values))[: len(group)]]
         change = -int(np.sign(np.linalg.eigvalsh(own.T @ rate(a, b, t) @ own)).sum())
-        out.append(Crossing(a.s + t * h, own, index, index + change, (a, b)))
+        out.append(Crossing(a.s + t * h, own, index, index + change, (a, b), (group[-1] - group[0]) * h))
         index += change
     return out
+
+
+def places(a: Node, b: Node, order: int) -> list[float]:
+    """Where a cubic of one row vanishes, or its derivative of an ``order``: all t from 0 to 1, rising."""
+    cubic = Polynomial([float(A[0, 0]) for A in coefficients(a, b)])
+    found = cubic.deriv(order).roots()
+    return sorted(float(t.real) for t in found if abs(t.imag) < REAL and 0.0 <= t.real <= 1.0)
 
 
 def together(a: Node, b: Node, places: np.ndarray, tolerance: float) -> list[list[float]]:

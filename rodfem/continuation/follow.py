@@ -17,12 +17,10 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import predict
+from rodfem.continuation.prediction import ALIGNED, predict
 from rodfem.continuation.step_control import StepControl
 from rodfem.tolerances import SAME_LOAD
 
-ALIGNED = 0.9
-"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
 FAILURES = 2
 """Failures after each other from which a step follows the tangent of the last point alone."""
 PILE = 64

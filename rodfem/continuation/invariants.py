@@ -98,7 +98,7 @@ class Invariants:
             what = "moments" if name.startswith("rotation") else "forces"
             raise ConvergenceError(
                 f"{self._at(point)} reactions and loads do not balance: their {what} add up to {work[worst]:.1e} for a "
-                f"{name}, in units of bending; use smaller steps."
+                f"{name}, in units of bending; use more elements or smaller steps."
             )
 
     def _round_off(self, point: Point) -> float:

@@ -21,19 +21,18 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import hermite, lagrange, predict
+from rodfem.continuation.prediction import ROWS, hermite, lagrange, predict
 from rodfem.continuation.states_between import solve_at
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
+from rodfem.tolerances import APART
 
-NEAR = 1e-5
-"""Defect, in the metric, below which rows are joined: equilibria nearer to each other are one in a search, too."""
 SHARE = 0.1
 """Defect, relative to the correction of the prediction, from which on a step is suspected."""
 FAR = 1e-2
 """Correction, in the metric, from which on a step is suspected whatever its defect."""
-APART = 0.25
+TORN = 0.25
 """Defect, relative to the chord, of two rows that are not joined."""
 HALVINGS = 14
 """How many times a piece is halved: a bend of a smaller part of a step is taken for a jump."""
@@ -43,8 +42,6 @@ GROWN = 1.5
 """Defect over length, relative to that of the step before, from which on a step is suspected."""
 PLACES = (0.5, 0.43)
 """Where a piece is divided; at the second place if no equilibrium is found at the first, which may be singular."""
-ROWS = 4
-"""Number of rows through whose tangents the tangent is interpolated."""
 GAUSS = 0.5 / np.sqrt(3.0)
 """Distance of the two points of Gauss' rule from the middle of a piece of length one: exact for cubics."""
 
@@ -56,7 +53,7 @@ def suspected(solver: BranchSolver, rows: Sequence[Point]) -> bool:
     """
     *known, b = rows
     off = defect(solver.system, rows[-ROWS:], known[-1], b)
-    if off <= NEAR:
+    if off <= APART:
         return False
     prediction, _ = predict(known, b.arclength)
     moved = _across(solver.system, b.x - prediction, b.x - known[-1].x)
@@ -68,8 +65,8 @@ def suspected(solver: BranchSolver, rows: Sequence[Point]) -> bool:
     return off / _length(known[-1], b) > GROWN * before
 
 
-def halvings(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] = ()) -> int | None:
-    """How many times the piece between two rows is halved until equilibria join them; None where none do.
+def joined(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] = ()) -> bool:
+    """Whether equilibria join two rows, by halving the piece between them.
 
     The rows ``a``, ``b`` have tangents on the mesh of ``solver``.  Halves whose defects do not vanish are halved again.
     On one branch a defect decreases faster than its piece; that of a jump stays.  One in proportion to its piece is
@@ -78,22 +75,17 @@ def halvings(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] 
     """
     middle = between(solver, a, b) if len(rates) < HALVINGS else None
     if middle is None:
-        return None
+        return False
     rows = (a, middle, b)
     off = defect(solver.system, rows, a, b)
     rates = (*rates, off / _length(a, b))
     recent = rates[-STEADY:]
-    if off <= NEAR or (len(recent) == STEADY and max(recent) < PROPORTIONAL * min(recent)):
-        return 1
-    if rates[-1] > APART:
-        return None
-    most = 0
-    for p, q in ((a, middle), (middle, b)):
-        more = 0 if defect(solver.system, rows, p, q) <= NEAR else halvings(solver, p, q, rates)
-        if more is None:
-            return None
-        most = max(most, more)
-    return 1 + most
+    if off <= APART or (len(recent) == STEADY and max(recent) < PROPORTIONAL * min(recent)):
+        return True
+    if rates[-1] > TORN:
+        return False
+    halves = ((a, middle), (middle, b))
+    return all(defect(solver.system, rows, p, q) <= APART or joined(solver, p, q, rates) for p, q in halves)
 
 
 def _length(a: Point, b: Point) -> float:

@@ -16,6 +16,8 @@ from rodfem.continuation.branch import Point
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 
+ALIGNED = 0.9
+"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
 ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
 
@@ -88,12 +90,20 @@ def hermite(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """
     if a.tangent is None or b.tangent is None:
         raise ValueError("Both ends of a piece of a branch need a tangent.")
-    h = b.arclength - a.arclength
-    t = (s - a.arclength) / h
-    parts = [a.x, a.tangent, b.x, b.tangent]
+    return cubic([a.x, a.tangent, b.x, b.tangent], b.arclength - a.arclength, s - a.arclength)
+
+
+def cubic(ends: list[PETSc.Vec], h: float, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Cubic of length ``h`` at ``s``, and its derivative, by the ``ends``: value and derivative of each."""
+    value, slope = cubic_weights(h, s)
+    return combine(ends, value), combine(ends, slope)
+
+
+def cubic_weights(h: float, s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (4,) of values and slopes at both ends in their cubic of length ``h`` at ``s``, and in its derivative."""
+    t = s / h
     value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
-    slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
-    return combine(parts, value), combine(parts, slope)
+    return value, np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
 
 
 def between(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:

@@ -16,14 +16,15 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Crossing, Node
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.piece import STRAYED, Piece
+from rodfem.continuation.piece import Piece
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
+from rodfem.continuation.states_between import STRAYED
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize
 from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import Index
-from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
+from rodfem.stability.reduced_stiffness import SOFT, Condensation, ReducedStiffness
 from rodfem.tolerances import SAME_LOAD, round_off
 
 COUPLED = 1e-5
@@ -36,8 +37,6 @@ INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
 """A derivative of the equations in the load smaller than this, relative to bending, or to the Jacobian, is zero."""
 NEARBY = 1e-2
 """Eigenvalue, over the lowest bending one, of modes that the border of a singular system has as well."""
-ZERO = 1e-6
-"""Eigenvalue, over the lowest bending one, that is zero where the load turns back and an eigenvalue touches zero."""
 
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
@@ -75,8 +74,9 @@ class Change:
 class Candidate:
     """Where a singular state is expected: ``x``, ``slope`` of the branch, modes near zero, and those that vanish.
 
-    These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece.  At a ``crossing``
-    eigenvalues pass zero; otherwise they touch it.  ``change`` is that of the index.
+    These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece, ``width`` the
+    distance of several crossings, and ``change`` that of the index.  At a ``crossing`` eigenvalues pass zero; otherwise
+    they touch it.
     """
 
     x: PETSc.Vec
@@ -86,6 +86,7 @@ class Candidate:
     change: Change
     length: float
     crossing: bool = True
+    width: float = 0.0
 
     @property
     def null(self) -> list[PETSc.Vec]:
@@ -108,7 +109,7 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     critical = np.eye(len(modes))[:, :count]
     negative = crossing.before - (count + crossing.before - crossing.after) // 2
     change = Change(crossing.before, crossing.after, negative, piece.still)
-    return Candidate(x, slope, modes, critical, change, q.s - p.s)
+    return Candidate(x, slope, modes, critical, change, q.s - p.s, width=crossing.width)
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
@@ -120,7 +121,7 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     condensation, (x, slope) = piece.condensation, piece.curve(p, q, s)
     reduced = condensation.at(x, _unit(piece.solver, slope), condensation.border(x))
     values, own = np.linalg.eigh(reduced.H)
-    zero = abs(values) < ZERO * piece.solver.inertia.scale
+    zero = abs(values) < SOFT * piece.solver.inertia.scale
     zero[abs(values).argmin()] = True
     negative = reduced.far + int((values[~zero] < 0).sum())
     modes = _modes(condensation, reduced, own[:, zero])
@@ -169,7 +170,8 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
         special.null_vectors += special.nearby[:more]
         special.nearby = special.nearby[more:]
         special.point.zero += more
-        special.located_to += 2 * np.sort(abs(found.others))[more - 1] / abs(found.rate)
+        apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
+        special.located_to += 2 * max(apart, at.width * abs(piece.solver.system.scalar(at.slope)))
     return special
 
 

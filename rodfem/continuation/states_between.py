@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from bisect import bisect
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import Knot, between
+from rodfem.continuation.crossings import Node
+from rodfem.continuation.prediction import ALIGNED, between, cubic
+from rodfem.continuation.prediction import Knot as Row
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import NewtonResult, correct
 from rodfem.roots import zero_between
@@ -24,16 +26,15 @@ ON_THE_WAY = 0.5
 """Distance of a state from where it is expected, over that from the nearer neighbour, below which it is on the way."""
 INTERPOLATED = 1e-7
 """Distance of a state from where it is expected, in the metric, that is the error of the interpolation."""
-ASIDE = 1e-6
-"""Distance beside a singular point at which the equations are solved, relative to the curve."""
-APART = 1e-9
-"""Least distance of two states of the curve, relative to it: two that are nearer tell no direction."""
 STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
 SETTLES = 1e-2
 """Distance, in the metric, that a state which was solved for with damping may move without it."""
-ALONG = 0.9
-"""Cosine between the curve and the tangent of a branch below which that is the tangent of another one."""
+STRAYED = 0.3
+"""Distance of a state from where it is expected, over that from the nearer end, at which it is another branch's; of a
+singular state over the piece."""
+LEAST = 1e-9
+"""That distance, in the metric, which is round-off."""
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
 
@@ -101,17 +102,6 @@ def _expected(solver: BranchSolver, curve: Curve, p: Point, q: Point, load: floa
     return s
 
 
-def solve_beside(solver: BranchSolver, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:
-    """Solve at ``s``, or at ``s + aside`` if the bordered matrix is singular there; returns state and parameter.
-
-    ``solver`` has the mesh, and ``curve(s)`` returns a predicted state and the direction of the branch there.
-    """
-    try:
-        return solve_at(solver, curve, s), s
-    except ConvergenceError:
-        return solve_at(solver, curve, s + aside), s + aside
-
-
 def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point | None:
     """Point at arclength ``s`` between the points ``a`` and ``b`` of a branch of ``solver``; None where it is not."""
     try:
@@ -122,50 +112,6 @@ def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point |
     if max(solver.system.distance(a.x, x), solver.system.distance(x, b.x)) > whole:
         return None
     return solver.point(x, s, solver.tangent(solver.row(between(a, b, s)[1]), at=x))
-
-
-class Solved(NamedTuple):
-    """An equilibrium ``x`` on the plane across the curve at ``s``: it is at ``arclength``, ``s`` or beside it.
-
-    The ``tangent`` is the derivative of a curve through it.  One more step of Newton's method has ``left`` that much:
-    the round-off of the state, by which equilibria that are solved for in another way differ.
-    """
-
-    s: float
-    arclength: float
-    x: PETSc.Vec
-    tangent: PETSc.Vec
-    left: PETSc.Vec
-
-
-class EventCurve:
-    """A curve from one state to another, through all that have been ``solved`` for between them, in order.
-
-    Near a state that is solved for its error is that of the square of the distance from there: a few such states leave
-    nothing of it but round-off where it matters.
-    """
-
-    def __init__(self, solver: BranchSolver, first: Knot, last: Knot) -> None:
-        """The curve from the ``first`` to the ``last`` state; ``solver`` has the mesh."""
-        self.solver, self.ends, self.length = solver, (first, last), last.arclength - first.arclength
-        self.solved: list[Solved] = []
-        self._knots: list[Knot] = [first, last]
-
-    def __call__(self, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """State and direction at ``s``."""
-        i = bisect(self._knots, s, 1, len(self._knots) - 1, key=lambda knot: knot.arclength)
-        return between(self._knots[i - 1], self._knots[i], s)
-
-    def solve(self, s: float) -> None:
-        """Lead the curve through the equilibrium at ``s``; raises :class:`ConvergenceError`."""
-        knot = solved_on(self.solver, self, s, ASIDE * self.length)
-        others = (other for other in self.solved if abs(other.arclength - knot.arclength) > APART * self.length)
-        self.solved = sorted([*others, knot], key=lambda knot: knot.arclength)
-        self._knots = [self.ends[0], *self.solved, self.ends[1]]
-
-    def nearest(self, s: float) -> Solved:
-        """The equilibrium that was solved for nearest to ``s``."""
-        return min(self.solved, key=lambda knot: abs(knot.s - s))
 
 
 def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
@@ -190,21 +136,58 @@ def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
     return x - step if system.solve(equations, step) else x
 
 
-def solved_on(solver: BranchSolver, curve: Curve, s: float, aside: float) -> Solved:
-    """The equilibrium across a ``curve`` at ``s``, or ``aside`` of it; raises :class:`ConvergenceError`.
+@dataclass(frozen=True, eq=False)
+class Knot:
+    """A state of the branch: ``x``, and the derivative ``slope`` of the curve in the place.
 
-    ``solver`` has the mesh.
+    The ``speed`` is the derivative of the place along the unit tangent.
     """
-    x, there = solve_beside(solver, curve, s, aside)
-    direction = curve(there)[1]
-    row = solver.row(direction)
-    left = x - stepped(solver, x, row)
-    try:
-        tangent = solver.tangent(row, at=x)
-        slope = float(row.dot(tangent))
-    except ConvergenceError:  # a singular state
-        slope = 0.0
-    if slope < ALONG:  # the curve knows the direction better
-        return Solved(s, there, x, direction, left)
-    tangent.scale(solver.system.norm(direction) / slope)
-    return Solved(s, there, x, tangent, left)
+
+    x: PETSc.Vec
+    slope: PETSc.Vec
+    speed: float
+
+
+class Chord(ABC):
+    """The curve between the states ``a`` and ``b`` of a branch on the mesh of a ``solver``.
+
+    Places are along the chord: ``s = d . M (x - x_a)`` with the unit vector ``d`` from the one state to the other.  A
+    state at a place is solved for on the plane across the chord, so that places are smooth along the branch, and
+    differences of the arclengths of neighbouring rows.
+    """
+
+    def __init__(self, solver: BranchSolver, a: Row, b: Row) -> None:
+        """Measure the chord."""
+        self.solver, self.begin = solver, a.arclength
+        self.chord = b.x - a.x
+        self.length = self.solver.system.norm(self.chord)
+        self.chord.scale(1.0 / self.length)
+        self.row, self.origin = self.solver.row(self.chord), a.x
+
+    @abstractmethod
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec) -> Node:
+        """Node at a state with its unit tangent."""
+
+    def place(self, x: PETSc.Vec) -> float:
+        """Where a state is."""
+        return float(self.row.dot(x - self.origin))
+
+    def curve(self, p: Node, q: Node, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+        """State and derivative at a place between two nodes."""
+        return cubic([p.kept.x, p.kept.slope, q.kept.x, q.kept.slope], q.s - p.s, s - p.s)
+
+    def solve(self, p: Node, q: Node, s: float) -> Node | None:
+        """Node at a place between two others; None where there is no equilibrium near where it is expected."""
+        solver, (guess, slope) = self.solver, self.curve(p, q, s)
+        try:
+            x = solve_at(solver, lambda _: (guess, self.chord), s)
+        except ConvergenceError:
+            return None
+        if solver.system.distance(x, guess) > STRAYED * min(s - p.s, q.s - s) + LEAST:
+            return None
+        slope.scale(1.0 / solver.system.norm(slope))
+        try:
+            tangent = solver.tangent(self.row, at=x)
+        except ConvergenceError:  # a singular state
+            return self.node(x, slope)
+        return self.node(x, tangent if solver.row(slope).dot(tangent) > ALIGNED else slope)

@@ -8,11 +8,10 @@ from math import inf
 from rodfem.continuation.branch import Point
 from rodfem.errors import InputError
 from rodfem.problem.kinds import finite, real, whole
+from rodfem.tolerances import NEGLIGIBLE
 
 SHRINK, GROW = 0.4, 1.6
 """Least and greatest ratio of a step to the one before."""
-NO_MOVE = 1e-12
-"""A correction smaller than this counts as one of this size."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class StepControl:
 
     def after(self, step: float, moved: float, order: int) -> float:
         """Length of the next step; the correction ``moved`` the prediction, that of a predictor of an ``order``."""
-        factor = (self.aim / max(moved, NO_MOVE)) ** (1 / order)
+        factor = (self.aim / max(moved, NEGLIGIBLE)) ** (1 / order)
         return min(step * min(max(factor, SHRINK), GROW), self.largest)
 
     def accepts(self, before: Point, after: Point) -> bool:

@@ -9,9 +9,11 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import VERTICAL_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.normal_form import SEEN
 from rodfem.continuation.singular import SingularSystem
 from rodfem.continuation.singular_points import LEVEL, Change, singular_point
 from rodfem.continuation.states_between import solve_at_load
+from rodfem.continuation.static_solver import STILL
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import across, project_out
@@ -24,14 +26,10 @@ FIRST = 0.05
 """Distance of the first point of a branch from the branch point that it leaves; at least it is :data:`NEAREST`."""
 SHORTEST = 1e-4
 """Amplitude, in the metric, below which no further one is tried from a branch point."""
-SEEN = 100
-"""Ratio of the distance of a fold from a branch point, in load, to the uncertainty of that, for which it is located."""
 CLOSE, STEEP = 2.0, 50.0
 """How far from its prediction the first point of a branch may lie, in amplitudes: usually, and at most."""
 FIXED = 1e-6
 """Norm of a unit direction's image by a symmetry below which it moves nothing."""
-SHIFT = 1e-6
-"""Shift of a singular Jacobian, in units of the lowest bending eigenvalue."""
 
 
 def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
@@ -65,13 +63,13 @@ def _load_response(solver: BranchSolver, special: SpecialPoint) -> PETSc.Vec:
     """Change of state with the load off the null vectors: the other branch where a side branch ends.
 
     The Jacobian is singular there, and the load is orthogonal to its null vectors up to an error that its inverse would
-    blow up: it is shifted, which changes the answer by about as much as the shift, :data:`SHIFT`, relative to it.
+    blow up: it is shifted, which changes the answer by about as much as the shift, :data:`STILL`, relative to it.
     """
     system = solver.system
     out = system.new_vector()
     x = special.point.x
     system.set_phase(x)
-    system.at(x).factor(solver.axis, SHIFT * system.stiffness_scale)
+    system.at(x).factor(solver.axis, STILL * system.stiffness_scale)
     system.solve(solver.axis, out)
     project_out(out, special.null_vectors, system.metric)
     return out

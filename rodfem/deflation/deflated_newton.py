@@ -30,10 +30,8 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.fem.newton import LARGEST
-from rodfem.tolerances import TINY
+from rodfem.tolerances import NEGLIGIBLE, TINY
 
-POLE = 1e-12
-"""Least distance from a known equilibrium, in the metric, and least divisor of a deflated step."""
 MOST = 60
 """Deflated Newton steps of one try."""
 NEAR = 1e-4
@@ -102,9 +100,9 @@ class DeflatedNewton:
         image = self.system.metric * step
         slope = 0.0
         for d, apart in self.known.nearest(x):
-            d = max(d, POLE)
+            d = max(d, NEGLIGIBLE)
             slope -= 2 * apart.dot(image) / (d * d * (1 + d * d))
-        return 1.0 / (1.0 - slope) if abs(1.0 - slope) > POLE else 1.0 / POLE
+        return 1.0 / (1.0 - slope) if abs(1.0 - slope) > NEGLIGIBLE else 1.0 / NEGLIGIBLE
 
     def _advance(self, x: PETSc.Vec, step: PETSc.Vec, factor: float) -> bool:
         """Add ``factor`` times a step, halved while the stored energy has no value there; False if it never has."""

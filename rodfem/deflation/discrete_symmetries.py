@@ -22,10 +22,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.system import System
-from rodfem.tolerances import SAME_PLACE, same_place
-
-ACCURACY = 1e-12
-"""Relative difference of ``F(T x) . T y`` and ``F(x) . y`` below which a map is a symmetry."""
+from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
 
 @dataclass(frozen=True)
@@ -150,7 +147,7 @@ def mirrors(system: System, x: PETSc.Vec, among: Sequence[Mirror] | None = None)
     beside = generic_state(system, base, 0.2, 2)
     reference, scale = _work(system, base, beside)
     works = ((mirror, _work(system, mirror(system, base), mirror(system, beside))[0]) for mirror in among)
-    return [mirror for mirror, work in works if abs(work - reference) < ACCURACY * scale]
+    return [mirror for mirror, work in works if abs(work - reference) < NEGLIGIBLE * scale]
 
 
 def _work(system: System, x: PETSc.Vec, y: PETSc.Vec) -> tuple[float, float]:

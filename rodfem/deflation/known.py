@@ -14,9 +14,9 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.states_between import solve_at_load
 from rodfem.deflation.group_orbit import Orbits
-from rodfem.deflation.search import SAME
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine
+from rodfem.tolerances import APART
 
 
 def equilibria_at(
@@ -31,7 +31,7 @@ def equilibria_at(
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
         for point in _along(solver, [here(p) for p in branch.points], load, singular_states(branch)):
-            if all(apart >= SAME for apart, _ in known.nearest(point.x)):
+            if all(apart >= APART for apart, _ in known.nearest(point.x)):
                 found.append(point)
                 known.add(point.x)
     return found

@@ -27,12 +27,8 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import System
 from rodfem.problem.end import TURNS
-from rodfem.tolerances import DRIFT, SAME_LOAD
+from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD
 
-IMAGE = 1e-12
-"""Relative difference of stored energies above which a state is no mirror image of another."""
-SAME = 1e-5
-"""Equilibria nearer to each other than this, in the metric, are one."""
 LEAST, GREATEST = 0.3, 3.0
 """Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
 SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
@@ -140,11 +136,11 @@ class Deflation(DeflatedNewton):
         """Add a state and its images to what is known."""
         self.bases.append(x)
         self.energies.append(self.solver.energy(x))
-        if self.nearest_known(x) > SAME:
+        if self.nearest_known(x) > APART:
             self.known.add(x)
         for mirror in list(self.mirrors):
             image = mirror(self.system, x)
-            if mirror in self.mirrors and self.nearest_known(image) > SAME:
+            if mirror in self.mirrors and self.nearest_known(image) > APART:
                 self._deflate_image(image, self.energies[-1], mirror)
 
     def _deflate_image(self, image: PETSc.Vec, energy: float, mirror: Mirror) -> None:
@@ -155,7 +151,7 @@ class Deflation(DeflatedNewton):
         """
         point, _ = self._judge(image)
         scale = max(abs(energy), self.solver.inertia.scale)
-        if point is not None and abs(point.energy - energy) > IMAGE * scale:
+        if point is not None and abs(point.energy - energy) > NEGLIGIBLE * scale:
             self.found.append(point)
             self.tally.nearly += 1
             self.mirrors.remove(mirror)
@@ -171,7 +167,7 @@ class Deflation(DeflatedNewton):
         system.set_load(x, self.load)  # steps at fixed load may have moved it by round-off
         if not outcome.converged:
             return None, FAILED
-        if self.nearest_known(x) < SAME:
+        if self.nearest_known(x) < APART:
             return None, KNOWN
         try:
             point = solver.point(x, 0.0, solver.load_tangent(x, True), outcome)

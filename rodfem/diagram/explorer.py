@@ -19,7 +19,7 @@ from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.known import equilibria_at
-from rodfem.deflation.search import SAME, find_equilibria
+from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.equivalence import equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.first_state import first_state
@@ -30,7 +30,7 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.soft_mode import index_range
-from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
+from rodfem.tolerances import APART, SAME_SPECIAL, SAME_STATE
 
 TAIL = 8
 """Rows before the end of a side branch, at least, among which its mirror image is recognised."""
@@ -81,7 +81,7 @@ class Explorer(Tracer):
         known = Orbits(self.solver.system)
         for other in equilibria_at(self.solver, self.branches[first:], point.load, self.here):
             known.add(other.x)
-        return any(apart < SAME for apart, _ in known.nearest(point.x))
+        return any(apart < APART for apart, _ in known.nearest(point.x))
 
     def _convex(self, points: list[Point]) -> list[Point]:
         """Those ``points`` along which the stored energy is convex; the others are mentioned."""

@@ -28,6 +28,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.stability.condensed import SHIFT
+from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import unit
 
@@ -104,7 +105,7 @@ def check_start(solver: StaticSolver, span: tuple[float, float], warn: Callable[
 
     ``span`` is the range, and ``warn`` hears of an index that is the mesh's.  Of a rod that bends from the start on,
     only the first load is looked at.  Raises :class:`InputError` where the mesh of the ``solver`` cannot hold the
-    half-waves at all.  Collective.
+    half-waves at all, :class:`SceneError` where constraints depend on one another.  Collective.
     """
     if not isinstance(solver, BranchSolver):
         return
@@ -128,10 +129,13 @@ def check_start(solver: StaticSolver, span: tuple[float, float], warn: Callable[
 
 
 def _index(solver: BranchSolver, load: float) -> int | None:
-    """Index of the scene's start at a load; None where it is no equilibrium there."""
+    """Index of the scene's start at a load; None where it is no equilibrium there, or its energy not convex."""
     start, system = solver.start(load), solver.system
     x, outcome = solver.at_load(start, load)
     turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
-    if not outcome.converged or (load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT):
+    bent = load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT
+    if not outcome.converged or bent or solver.lost_convexity(x):
         return None
+    if may_depend(solver.shape, x):  # then a count is round-off
+        require_independent_constraints(solver.shape, x, start)
     return solver.inertia.at(x).count().negative

@@ -11,12 +11,10 @@ from rodfem.continuation.static_solver import StaticSolver
 from rodfem.deflation.discrete_symmetries import candidates, mirrors
 from rodfem.tolerances import NEGLIGIBLE
 
-ZERO = 1e-9
-"""Ordinate, relative to the greatest one, below which it has no side."""
 CARRIED = 1e-3
 """Distance of a state's image from another state, over the distance of the two, below which the one is the other."""
 OTHER = 1e-6
-"""Difference of two ordinates, relative to the greatest one, above which they are two."""
+"""Difference of two ordinates, relative to the greatest one, above which they are two; one below it has no side."""
 SHARES = (0.5, 1.0)
 """Places along a branch, as shares of its rows, at whose states an image is asked for."""
 
@@ -30,7 +28,7 @@ def image_of(branch: Branch, solver: StaticSolver) -> str:
     points = [point for point in branch.points if point.mesh == solver.mesh]
     chosen = [points[round(share * (len(points) - 1))] for share in SHARES] if points else []
     size = max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])
-    if any(abs(point.ordinate) <= ZERO * size for point in chosen) or not chosen:
+    if any(abs(point.ordinate) <= OTHER * size for point in chosen) or not chosen:
         return ""
     system, phase = solver.system, solver.system.phase
     found = candidates(system)

@@ -13,11 +13,10 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.frequencies import Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.stability.round_off import resolve
+from rodfem.tolerances import DRIFT
 
 ROWS = 4
 """Rows one after the other that have as many zero eigenvalues, before these are said to stay."""
-CHAINED = 1e-6
-"""Drift scalar of a unit vector, over the lowest bending eigenvalue, from which on it is one of a Jordan block."""
 
 
 def family_of(pencil: NonsymmetricPencil, found: Frequencies, least: int) -> str:
@@ -41,7 +40,7 @@ def family_of(pencil: NonsymmetricPencil, found: Frequencies, least: int) -> str
     for i in np.flatnonzero(abs(found.values) < found.noise).tolist():
         mode = system.new_vector()
         mode.array[:] = found.vectors[:, i].real
-        if system.drift(mode) <= CHAINED * system.stiffness_scale * system.norm(mode):
+        if system.drift(mode) <= DRIFT * system.stiffness_scale * system.norm(mode):
             moving.append(pencil.motion(found.vectors[:, [i]].real))
     number = min(len(moving), least)
     if number == 0:

@@ -32,8 +32,9 @@ from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedSti
 
 DIP = 0.1
 """Eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most."""
-HALVINGS = 6
-"""Bisections after which a mode that passes zero is among those nearest zero."""
+HALVINGS = 0, 6, 36
+"""Bisections after which a mode that passes zero is among those nearest zero: none in most steps, many next to dozens
+of softer ones."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is taken to stay zero."""
 ASIDE = 0.02
@@ -148,16 +149,16 @@ class SpecialSearch:
     def _nodes(self, a: Point, b: Point) -> tuple[Piece, Node, Node]:
         """The piece from ``a`` to ``b`` with its ends, and a border with all modes that pass zero between them.
 
-        Where the last one has become that of others, or lacks one, it is made anew: of the modes nearest zero at the
-        one end or the other, else of those where the index changes.
+        Where the last one has become that of others, or lacks one, it is made anew of the modes nearest zero: those of
+        ``b``, else those where the index changes.
         """
         phi = self._prepare(a)
         piece, p, q = self._ends(a, b, phi)
-        for x in (a.x, b.x, None):
+        for halvings in HALVINGS:
             if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
                 break
             self._forget()
-            self._phi = self._on(b).border(self._changing(piece, p, q) if x is None else x)
+            self._phi = self._on(b).border(self._changing(piece, p, q, halvings))
             piece, p, q = self._ends(a, b, self._phi)
         first, still = p.kept.reduced, min(n.kept.reduced.zero for n in (p, q))
         if still:
@@ -181,14 +182,14 @@ class SpecialSearch:
         assert b.tangent is not None
         return piece, piece.node(a.x, a.tangent, self._reduced(a)), piece.node(b.x, b.tangent, self._reduced(b))
 
-    def _changing(self, piece: Piece, p: Node, q: Node) -> PETSc.Vec:
+    def _changing(self, piece: Piece, p: Node, q: Node, halvings: int) -> PETSc.Vec:
         """A state near which the index changes between two nodes."""
-        for _ in range(HALVINGS):
+        for _ in range(halvings):
             middle = piece.solve(p, q, (p.s + q.s) / 2)
             if middle is None:
                 break
             p, q = (middle, q) if middle.index == p.index else (p, middle)
-        return p.kept.x
+        return q.kept.x
 
     def _between(self, a: Point, b: Point, *, ended: bool = False) -> list[SpecialPoint]:
         """Special points between two rows, of which those between are singular."""
@@ -215,7 +216,8 @@ class SpecialSearch:
                 turns = piece.turn(*crossing.piece) is not None
                 special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
                 if special is None:
-                    self._steps.ask(a, b)
+                    if not ended:
+                        self._steps.ask(a, b)
                     words.append(missing(a.load, b.load))
                 else:
                     out.append(special)
@@ -244,7 +246,7 @@ class SpecialSearch:
         if why := taut_where_it_turns(solver, at.x):
             words.append(why)
             return None
-        if is_fold(solver, at.x, at.null):
+        if left.index != right.index and is_fold(solver, at.x, at.null):
             return None
         found = solved(solver, at, fold=False)
         if found is None:
@@ -262,12 +264,14 @@ class SpecialSearch:
         Whether the load ``turns`` back in its piece tells the fold of this branch from that of another one.
         Raises :class:`Gap` for an imperfection that is not known, unless the branch has ``ended``.
         """
-        solver = piece.solver
-        if is_fold(solver, at.x, at.null) and (found := solved(solver, at, fold=True)) is not None:
+        solver, clearly = piece.solver, is_fold(piece.solver, at.x, at.null)
+        if clearly and turns and (found := solved(solver, at, fold=True)) is not None:
             return special_point(piece, at, found, fold=True)
         found = solved(solver, at, fold=False)
         if found is not None and found.size <= found.noise:
             return special_point(piece, at, found, fold=False)
+        if clearly and not turns and (fold := solved(solver, at, fold=True)) is not None:
+            return special_point(piece, at, fold, fold=True)
         gap = self._open_gap(piece, at, found, ended=ended) if found is not None else None
         fold = solved(solver, at, fold=True)
         if fold is not None and (turns or found is None):

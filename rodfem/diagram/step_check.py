@@ -11,13 +11,11 @@ from math import inf
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.jumping import halvings, suspected
+from rodfem.continuation.jumping import joined, suspected
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.work import EnergyBalance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 
-BENT, NARROWEST = 2, 6
-"""How many times a step that bends may be halved until it is one, and how many times steps are, at most, where not."""
 SHORTER = 2
 """How many times steps are made shorter about one piece."""
 PARTS = 8
@@ -49,19 +47,14 @@ class ShorterSteps:
         """Steps of at most ``largest`` up to the arclength ``until``."""
         self._pieces = [_Piece(-inf, until, largest, 0)]
 
-    def ask(self, a: Point, b: Point, parts: int = PARTS, *, once: bool = False) -> None:
-        """Make steps shorter from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are already.
-
-        The piece is divided into so many ``parts``; ``once``: steps that are short already do.
-        """
+    def ask(self, a: Point, b: Point) -> None:
+        """Make steps shorter from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are already."""
         first, last = a.arclength, b.arclength
-        if once and any(piece.since <= first < piece.until for piece in self._pieces):
-            return
         inside = [piece for piece in self._pieces if piece.since < last and first < piece.until]
         tries = 1 + max((piece.tries for piece in inside), default=0)
         if tries <= SHORTER:
             length = last - first
-            new = _Piece(first, last + length, length / parts, tries)
+            new = _Piece(first, last + length, length / PARTS, tries)
             self._pieces = [piece for piece in self._pieces if piece not in inside] + [new]
             raise Unresolved
 
@@ -93,20 +86,13 @@ class StepCheck:
         if len(rows) < 2 or solver.system.damping or any(p.tangent is None for p in rows):
             return
         a, b = rows[-2:]
-        divided = halvings(solver, a, b) if suspected(solver, rows) else 0
-        if divided is None:
+        if suspected(solver, rows) and not joined(solver, a, b):
             steps.ask(a, b)
             self.observer.warn(
                 f"Between loads {a.load:.8g} and {b.load:.8g} the branch may have been left for another one beside it: "
                 f"no equilibria were found that join them; {SMALLER_STEPS}."
             )
             return
-        if divided > BENT:  # in a bend so narrow there may be pairs of special points
-            steps.ask(a, b, 2 ** min(divided, NARROWEST))
-            self.observer.warn(
-                f"Between loads {a.load:.8g} and {b.load:.8g} the branch bends within a small part of a step: "
-                f"special points may be missing there; {SMALLER_STEPS}."
-            )
         if not self._balance(solver, rows):
             steps.ask(a, b)
             raise ConvergenceError(

@@ -16,7 +16,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
-from rodfem.continuation.convexity_between import lost_between, unresolved
+from rodfem.continuation.convexity_between import lost_between
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
@@ -156,7 +156,7 @@ class Sweep:
 
     def _lost_convexity(self, a: PETSc.Vec, b: PETSc.Vec) -> str:
         """Why a sweep ends between the equilibria ``a`` and ``b``; empty where the stored energy stays convex."""
-        solver, name = self.solver, self._load
+        solver = self.solver
 
         def state(t: float) -> PETSc.Vec:
             return a * (1.0 - t) + b * t
@@ -165,10 +165,8 @@ class Sweep:
             x = b if t == 1.0 else at_load(solver, a, solver.system.scalar(state(t)))
             return not solver.lost_convexity(x)
 
-        found = lost_between(solver.convexity, state, holds)
-        if not found.resolved:
-            self.observer.warn(unresolved(name, *(solver.system.scalar(x) for x in (a, b))))
-        return "" if found.lost is None else solver.not_convex(state(found.lost))
+        lost = lost_between(solver.convexity, state, holds)
+        return "" if lost is None else solver.not_convex(state(lost))
 
     def _dependent(self, x: PETSc.Vec) -> str:
         """Why a sweep ends before the equilibrium ``x``; empty where its constraints do not depend on one another.

@@ -20,13 +20,11 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.switching import between
 from rodfem.diagram.equivalence import equivalent
 from rodfem.stability.inertia import NULL, Factored
-from rodfem.tolerances import SAME_STATE
+from rodfem.tolerances import LOCATED, SAME_STATE
 
 SAME_DETERMINANT = 1e-3
 """Logarithm of the ratio of two determinants, or of two eigenvalues, that are one: of the last iterates of Newton's
 method, and of meshes that are not symmetric."""
-LOCATED = 10.0
-"""Distance from the load of a branch point, over the bound to which it is located, that has a sign."""
 LOOKED_AT = 3
 """Eigenvalues nearest zero, beyond those that count as zero, between which the shift lies."""
 

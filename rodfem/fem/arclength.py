@@ -23,10 +23,10 @@ class Arclength:
         self._fields = fields
 
     @cached_property
-    def everywhere(self) -> sp.csr_matrix:
+    def derivative(self) -> sp.csr_matrix:
         """Matrix (local size, local size) of the derivative at nodes, the mean of the cells that share one.
 
-        Zero for scalars.
+        Zero for scalars and at clamped degrees of freedom.
         """
         fields, size = self._fields, len(self._fields.number)
         mean = sp.csr_matrix((size, size))
@@ -37,12 +37,7 @@ class Arclength:
             sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
             shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
             mean += sp.diags(1.0 / shared) @ sums @ slopes
-        return mean.tocsr()
-
-    @cached_property
-    def derivative(self) -> sp.csr_matrix:
-        """The same, zero at clamped degrees of freedom, too."""
-        return sp.diags(np.where(self._fields.number < 0, 0.0, 1.0)) @ self.everywhere
+        return sp.diags(np.where(fields.number < 0, 0.0, 1.0)) @ mean.tocsr()
 
     @cached_property
     def jumps(self) -> sp.csr_matrix:

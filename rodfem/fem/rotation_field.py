@@ -10,12 +10,11 @@ import numpy as np
 
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.quaternions import of_vector, product
+from rodfem.problem.start import PLACES
 
 Start = Callable[[np.ndarray], np.ndarray] | None
-TWICE = 4 * np.pi
-"""Period of a quaternion as a function of the angle of rotation."""
-SAMPLES = 1001
-"""Arclengths at which a start is followed along the rod."""
+TURN = 2 * np.pi
+"""Period of a rotation as a function of its angle: quaternions of opposite signs are one rotation."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +60,10 @@ class QuaternionField:
         """
         if start is None:
             return np.tile(IDENTITY, (s.size, 1))
-        every, place = np.unique(np.append(np.linspace(*interval, SAMPLES), s), return_inverse=True)
+        every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
         values = np.asarray(start(every), dtype=float)
         signs = np.cumprod(np.where((values[1:] * values[:-1]).sum(axis=1) < 0, -1.0, 1.0))
-        return np.asarray((values * np.append(1.0, signs)[:, None])[place.ravel()[SAMPLES:]])
+        return np.asarray((values * np.append(1.0, signs)[:, None])[place.ravel()[PLACES:]])
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
         """Value (size,) at an end at ``s`` that is clamped with a unit quaternion, or its negative: next to the start.
@@ -79,8 +78,8 @@ class QuaternionField:
 class AngleField:
     """The angle about the normal of the plane, e1 or e2 (``normal`` 0 or 1), from the undeformed state.
 
-    It is not confined to one turn: a quaternion tells angles apart up to ``4 pi``, and the number of turns beyond is
-    that of the scene's start.
+    It is not confined to one turn: rotations tell angles apart up to ``2 pi``, and the number of whole turns is that of
+    the scene's start.
     """
 
     normal: int
@@ -121,9 +120,9 @@ class AngleField:
         """Values (m, size) at arclengths (m,) of a scene's start, continuous along the rod from its left end."""
         if start is None:
             return np.zeros((s.size, 1))
-        every, place = np.unique(np.append(np.linspace(*interval, SAMPLES), s), return_inverse=True)
-        angles = np.unwrap(self._angle(np.asarray(start(every), dtype=float)), period=TWICE)
-        return np.asarray(angles[place.ravel()[SAMPLES:], None])
+        every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
+        angles = np.unwrap(self._angle(np.asarray(start(every), dtype=float)), period=TURN)
+        return np.asarray(angles[place.ravel()[PLACES:], None])
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
         """Value (size,) at an end at ``s`` that is clamped with a unit quaternion: the one next to the start.
@@ -132,7 +131,7 @@ class AngleField:
         """
         angle = self._angle(np.array(rotation))
         near = self.start(start, np.array([s]), interval)[0]
-        return np.asarray(angle + TWICE * np.round((near - angle) / TWICE))
+        return np.asarray(angle + TURN * np.round((near - angle) / TURN))
 
     def _angle(self, q: np.ndarray) -> np.ndarray:
         return np.asarray(2 * np.arctan2(q[..., self.normal + 1], q[..., 0]))

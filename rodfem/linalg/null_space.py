@@ -24,11 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from rodfem.errors import InputError
-
-DEPENDENT = 1e-12
-"""A column whose part orthogonal to the others is smaller than this, relative to the largest entry, depends on them."""
-NEGLIGIBLE = 1e-14
-"""Entries of ``C`` below this, relative to the largest, are zero."""
+from rodfem.tolerances import NEGLIGIBLE
 
 
 @dataclass(frozen=True)
@@ -137,8 +133,8 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
 def require_independent(R: np.ndarray, scale: float, columns: np.ndarray) -> None:
     """Raise :class:`InputError` if a factor R (b, c, c) is singular; ``columns`` (b, c) numbers its columns."""
     diagonal = abs(np.diagonal(R, axis1=1, axis2=2))
-    if R.shape[1] < R.shape[2] or (diagonal < DEPENDENT * scale).any():
-        bad = columns[:, : diagonal.shape[1]][diagonal < DEPENDENT * scale]
+    if R.shape[1] < R.shape[2] or (diagonal < NEGLIGIBLE * scale).any():
+        bad = columns[:, : diagonal.shape[1]][diagonal < NEGLIGIBLE * scale]
         which = f" (number {', '.join(map(str, bad[:5]))} along the rod)" if len(bad) else ""
         raise InputError(f"Constraints depend on one another{which}: remove those that follow from the others.")
 

@@ -18,17 +18,13 @@ from rodfem.stability.assessment import Assessor
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.left_right import alone, upper
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
+from rodfem.stability.symmetric import CONVERGED
+from rodfem.tolerances import SAME_EIGENVALUE
 
-EQUAL = 1e-6
-"""Eigenvalues closer than this, relative to the greatest, are one: their modes are any basis of a plane."""
 SEEN = 1e-3
 """Response of a mode to a functional, relative to the greatest one, below which the functional does not observe it."""
 DOUBLE = 1e-3
 """Eigenvalues nearer than this, relative, to a double one are that: round-off parts them by its square root."""
-
-
-CONVERGED = 1e-7
-"""Backward error above which a pair without a potential is none."""
 
 
 class Turned(NamedTuple):
@@ -155,7 +151,7 @@ def equal(values: np.ndarray) -> list[list[int]]:
     """Positions of ascending ``values`` in groups of equal ones."""
     groups: list[list[int]] = []
     for i, value in enumerate(values):
-        if groups and value - values[i - 1] <= EQUAL * abs(values).max():
+        if groups and value - values[i - 1] <= SAME_EIGENVALUE * abs(values).max():
             groups[-1].append(i)
         else:
             groups.append([i])

@@ -9,16 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from reprlib import Repr
 from typing import Any
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, STATES, read_json
+from rodfem.problem.arguments import SHORT
 
 Test = Callable[[Any], bool]
-SHORT = Repr()
-SHORT.maxother = SHORT.maxstring = 60
 ROW, POINT = ("load", "ordinate"), ("kind", "load", "ordinate", "negative_before", "negative_after", "zero", "row")
 """Entries of every row and of every special point."""
 

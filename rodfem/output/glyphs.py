@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.output.solids import Solid, across, ball, box, coil, profile_of, round_arrow, straight_arrow, sweep
-from rodfem.output.view import sign_of
+from rodfem.output.view import POINT, sign_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
 from rodfem.tolerances import TINY
@@ -28,10 +28,6 @@ Floats = NDArray[np.float64]
 GREY, DARK, STEEL, LOAD = "#9A9A9A", "#6E6E6E", "#707C8A", "#B3123E"
 BLOCK, WIRE, ARROW, RAIL = 2.4, 0.22, 13.0, 3.4
 """Half the size of a block, radius of a wire, length of an arrow, in radii of the rod; half rails in half blocks."""
-LEAST = 1e-9
-"""Load relative to the greatest one, or stiffness, below which none is drawn."""
-PUSHES = 1e-6
-"""Cosine of a force and the way into the rod above which it pushes."""
 
 
 def glyphs_of(
@@ -77,9 +73,9 @@ def glyphs_of(
             out.append(ball(at, 2.2 * radius, DARK))
         clear = 2.2 * size if held else 0.5 * BLOCK * radius
         F, M = support.loads(R)
-        if np.linalg.norm(F) > LEAST * force:
+        if np.linalg.norm(F) > POINT * force:
             out.append(_force(at, F / force, clear, outward, radius))
-        if np.linalg.norm(M) > LEAST * moment:
+        if np.linalg.norm(M) > POINT * moment:
             out.append(round_arrow(at + (clear + radius) * outward, M, 5.0 * radius, 0.45 * radius, LOAD, view[2]))
     for tie in setting.ties:
         out += _tie(tie, s, centres, home, radius, view)
@@ -216,14 +212,14 @@ def _stiff(stiffness: Floats) -> list[Floats]:
         values, vectors = np.diag(stiffness), np.eye(3)
     else:
         values, vectors = np.linalg.eigh(stiffness)
-    return [v for value, v in zip(values, vectors.T, strict=True) if value > 1e-3 * max(float(values.max()), LEAST)]
+    return [v for value, v in zip(values, vectors.T, strict=True) if value > 1e-3 * max(float(values.max()), POINT)]
 
 
 def _force(at: Floats, force: Floats, clear: float, outward: Floats, radius: float) -> Solid:
     """Arrow of a force: it ends at the rod where it pushes against it, and begins there where it pulls."""
     size = ARROW * radius * max(float(np.linalg.norm(force)), 0.4)
     way = force / np.linalg.norm(force)
-    pushes = way @ outward < -PUSHES
+    pushes = way @ outward < -POINT
     start = at - (clear + size) * way if pushes else at + (0.5 * clear if abs(way @ outward) < 0.5 else clear) * way
     return straight_arrow(start, start + size * way, 0.48 * radius, LOAD)
 

@@ -14,13 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rodfem.continuation.kinds import FLUTTER, FREQUENCY, KINDS
+from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.frequency_curves import DIVERGED, GROWTH, PAIR, FrequencyCurve, curves, ranges_of, top
 from rodfem.output.sheet import DPI, HALO, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
 
-BESIDE, TEXT, SHARES = ((8.0, -16.0), (8.0, 6.0), (8.0, -34.0)), np.array([4.0, 1.0]), np.linspace(0.0, 1.0, 9)
-"""Where the load stands beside its mark, in points; size of its text, over that of letters; places along lines."""
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
 WIDTH, EVERY = 1.8, 0.03
@@ -110,25 +108,9 @@ def _mark(axes: Axes, special: Mapping[str, Any]) -> None:
     omega = abs(complex(special["omega2"])) ** 0.5
     axes.plot(special["load"], omega, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
     here = float(special["load"]), float(omega)
-    place = _clear(axes, here) if special["kind"] == FLUTTER and omega else (0.0, 14.0)
+    place = (8.0, 6.0) if omega else (0.0, 14.0)
     text = axes.annotate(f"{special['load']:.6g}", here, place, textcoords="offset points")
     text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
-
-
-def _clear(axes: Axes, here: tuple[float, float]) -> tuple[float, float]:
-    """Where of :data:`BESIDE` the text of a mark covers least of the curves: its left lower corner, in points."""
-    points, counts = 72 / axes.figure.dpi, []
-    axes.figure.draw_without_rendering()
-    origin = axes.transData.transform(here)
-    size = TEXT * axes.xaxis.label.get_size()
-    for x, y in BESIDE:
-        count = 0
-        for line in axes.get_lines():
-            on_paper = (axes.transData.transform(line.get_xydata()) - origin) * points
-            between = np.concatenate([on_paper[:-1] + share * np.diff(on_paper, axis=0) for share in SHARES])
-            count += int(((between >= (x, y - 1)) & (between <= (x + size[0], y + 1 + size[1]))).all(axis=1).sum())
-        counts.append(count)
-    return BESIDE[int(np.argmin(counts))]
 
 
 def _footer(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:

@@ -37,8 +37,6 @@ AFTER, ASIDE = 0.3, 30.0
 LEGEND, BELOW = 3, (0.5, -0.14)
 """Columns of the legend, one less of a rod in its plane, whose words are more, and its place in shares of the axes:
 under them, as the whole plane may be shaded."""
-ROOM = 0.1
-"""Share of the height above and below the curves, for the indices that stand beside them."""
 
 
 def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
@@ -73,7 +71,6 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
         figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         axes = figure.subplots()
         axes.set_axisbelow(True)
-        axes.margins(y=ROOM)
         _draw_curves(axes, loci)
         filled = _fill_stable_regions(axes, loci)
         _name(figure, axes, loci)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Solid, curve_of, profile_of, rod, straight_arrow
-from rodfem.output.view import POINT, axis_of, on_feet, view_of
+from rodfem.output.solids import Solid, curve_of, profile_of, rod
+from rodfem.output.view import axis_of, on_feet, view_of
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.whole_files import draft_of
@@ -27,15 +27,8 @@ from rodfem.whole_files import draft_of
 __all__ = ["draw_shape", "draw_shape_safely", "main"]
 
 Floats = NDArray[np.float64]
-SIZE, ROOM, HEAD = (1600, 1000), 0.84, 0.22  # pixels, shares of the height above the caption, and for the triad's line
-NARROW = 1.5  # width over height below which that line is always kept free: beside a rod there is no room
+SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the caption
 ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
-TRIAD, ARROW, AROUND = (
-    np.array([125.0, 130.0]),
-    70.0,
-    125.0,
-)  # the triad: from corners, its arrows, half its box; pixels
-FOOT, SUBSCRIPTS = 110.0, "₁₂₃"  # pixels of the lines at the foot
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
@@ -100,15 +93,11 @@ def draw_shape(
         _add(pyvista, plotter, solid)
     _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
     points = np.concatenate([solid.points for solid in solids])
-    corner, place, scale = _look(plotter, points, view, 5.0 * thickness, size)
-    arrows, names = triad(view, corner, 2.0 * ARROW / size[1] * scale)
-    for solid in arrows:
-        _add(pyvista, plotter, solid)
-    share, down = ARROW / np.array(size), np.array([0.0, 15.0 / size[1]])
-    axes = [(name, *(place - down + share * at), DARK) for name, at in names]
+    _look(plotter, points, view, 5.0 * thickness, size)
+    plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", color=DARK, x_color=DARK, y_color=DARK, z_color=DARK)
     loaded = any(solid.color == LOAD for solid in solids)
     text = state.caption if caption is None else caption
-    _write(plotter, [*_labels(text, loaded, size), *axes, *_notes(state)], size)
+    _write(plotter, [*_labels(text, loaded, size), *_notes(state)], size)
     return _shoot(plotter, path)
 
 
@@ -273,40 +262,7 @@ def _add_directors(pyvista: Any, plotter: Any, centres: Floats, directors: Float
         plotter.add_mesh(arrows, color=colour, **STYLE)
 
 
-def triad(view: Floats, corner: Floats, size: float) -> tuple[list[Solid], list[tuple[str, Floats]]]:
-    """Arrows along e1, e2, e3 from a point, and their names with places (2,) in units of ``size`` from there.
-
-    The name of a direction nearly along the line of sight goes opposite to the two others, those of two directions that
-    look alike are put together.
-    """
-    arrows = [straight_arrow(corner, corner + size * e, 0.03 * size, DARK) for e in np.eye(3)]
-    seen = view[:2].T
-    length = np.linalg.norm(seen, axis=1)
-    places = seen * (1.0 + 0.35 / np.maximum(length, POINT))[:, None]
-    last = int(np.argmin(length))
-    if length[last] < 0.5:
-        opposite = -np.delete(seen, last, axis=0).sum(axis=0)
-        places[last] = 0.6 * opposite / np.linalg.norm(opposite)
-    names: list[tuple[str, Floats]] = []
-    for i, at in enumerate(places):
-        alike = [j for j, (_, other) in enumerate(names) if np.linalg.norm(at - other) < 0.4]
-        if alike:
-            names[alike[0]] = f"{names[alike[0]][0]}, e{SUBSCRIPTS[i]}", names[alike[0]][1]
-        else:
-            names.append((f"e{SUBSCRIPTS[i]}", at))
-    return arrows, names
-
-
-def _corners(size: tuple[int, int]) -> list[Floats]:
-    """Places for the triad as shares of width and height (2,) from the lower left corner: above, then below."""
-    width, height = size
-    places = (TRIAD[0], height - TRIAD[1]), (TRIAD[0], FOOT + TRIAD[1]), (width - TRIAD[0], FOOT + TRIAD[1])
-    return [np.array(place) / np.array(size) for place in places]
-
-
-def _look(
-    plotter: Any, points: Floats, view: Floats, margin: float, size: tuple[int, int]
-) -> tuple[Floats, Floats, float]:
+def _look(plotter: Any, points: Floats, view: Floats, margin: float, size: tuple[int, int]) -> None:
     """Set a camera without perspective that sees all points (n, 3), above the caption.
 
     Parameters
@@ -319,36 +275,16 @@ def _look(
         Length that is kept free around them.
     size
         Width and height of the picture in pixels.
-
-    Returns
-    -------
-    corner, place, scale
-        The place of the triad in space (3,) and as shares of the picture (2,), and half the height of the picture.
-        It is a corner with nothing in it, or else above all.
     """
     seen, aspect = points @ view.T, size[0] / size[1]
     low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
     middle, half = (low + high) / 2, (high - low) / 2
-    for head in (0.0, HEAD):
-        scale = max(half[1] / (ROOM - head), half[0] / aspect)
-        centre = middle[:2] - (0.0, ((1.0 - ROOM) / 2 - 0.8 * head) * scale)  # the caption's line, and the triad's
-        on_screen = ((seen[:, :2] - centre) / scale / np.array([aspect, 1.0]) + 1.0) / 2.0
-        free = [at for at in _corners(size) if not _covers(at, on_screen, size)]
-        if free and (head or aspect >= NARROW):
-            break
-    place = free[0] if free and not head else _corners(size)[0]
-    focus = np.append(centre, middle[2]) @ view
+    scale = max(half[1] / ROOM, half[0] / aspect)
+    focus = (middle - (0.0, (1.0 - ROOM) / 2 * scale, 0.0)) @ view  # the caption's line is below
     plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * view[2]), tuple(focus), tuple(view[1])]
     plotter.camera.enable_parallel_projection()
     plotter.camera.parallel_scale = scale
     plotter.renderer.ResetCameraClippingRange()
-    shift = (2 * place - 1) * scale * np.array([aspect, 1.0])
-    return focus + shift @ view[:2], place, scale
-
-
-def _covers(place: Floats, on_screen: Floats, size: tuple[int, int]) -> bool:
-    """Whether a triad at a place (2,) covers one of the points (n, 2), all as shares of the picture."""
-    return bool((abs(on_screen - place) * np.array(size) < AROUND).all(axis=1).any())
 
 
 def draw_shape_safely(

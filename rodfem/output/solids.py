@@ -18,8 +18,6 @@ Floats = NDArray[np.float64]
 
 FLATTEST = 7.0
 """Greatest proportion of the sides of a rod's cross-section that is drawn."""
-SLIMMEST = 0.3
-"""Least size of a cross-section that is drawn, relative to the greatest one of the rod."""
 SIDES = 24
 
 
@@ -166,7 +164,7 @@ def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats)
     ``section`` has second moments of area (m, 2, 2) at arclengths (m,), up to a factor; round without it.  The outline
     has their principal axes and their proportion, ``sqrt(J1 / J2)``, as far as it is not flatter than :data:`FLATTEST`;
     it is an ellipse where it is nearly round, and tends to a rectangle where it is flat.  Its area is proportional to
-    the fourth root of their determinant, as far as that is not smaller than :data:`SLIMMEST` allows.
+    the fourth root of their determinant.
     """
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     if section is None:
@@ -177,7 +175,7 @@ def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats)
     values, axes = np.linalg.eigh(J)  # ascending
     ratio = np.minimum(np.sqrt(values[:, 1] / values[:, 0]), FLATTEST)
     size = (values[:, 0] * values[:, 1]) ** 0.125
-    size = np.maximum(size / size.max(), SLIMMEST)
+    size = size / size.max()
     power = 2.0 / np.clip(1.0 + ratio, 2.0, 5.0)  # of a superellipse |x|^(2/power) + |y|^(2/power) = 1
     half = np.stack([size / np.sqrt(ratio), size * np.sqrt(ratio)], axis=1)
     local = np.einsum("kj,nji->nki", circle, axes)  # along the principal axes

@@ -26,7 +26,7 @@ class StableRegion(NamedTuple):
     end: Floats
 
 
-def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], count: int = COUNT) -> StableRegion | None:
+def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> StableRegion | None:
     """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
 
     Parameters
@@ -35,8 +35,6 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], cou
         Contents of the file of the locus; its stable side is that on which its index is zero.
     loci
         Those of all loci of the plane, ``one`` among them.
-    count
-        At how many values of the second parameter the bounds are given.
 
     Returns
     -------
@@ -51,7 +49,7 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], cou
     if passed(one).any() or not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
         return None
     order = np.argsort(x)
-    grid = np.linspace(x.min(), x.max(), count)
+    grid = np.linspace(x.min(), x.max(), COUNT)
     edge = np.interp(grid, x[order], y[order])
     end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
     for another in loci:

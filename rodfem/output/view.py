@@ -31,10 +31,8 @@ LEVEL = 0.1
 """Cosine below which an axis of space is across a direction, for its sense."""
 ARCHED = 0.05
 """Mean distance of a rod from the line of its ends, relative to its size, from which on it is an arch."""
-STRAIGHT = 1e-3
-"""Displacement relative to the rod's size below which the rod has not moved."""
-CLOSED = 1e-6
-"""Distance of the ends, relative to the rod's size, below which they meet."""
+UNSEEN = 1e-3
+"""Displacement, or distance of the ends, relative to the rod's size, which a picture does not show."""
 POINT = 1e-9
 """A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
 
@@ -79,17 +77,17 @@ def view_of(
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
     shape, tilt = moved.T @ moved / len(moved), TILT
-    if np.linalg.norm(chord) < CLOSED * size and down is None:
+    if np.linalg.norm(chord) < UNSEEN * size and down is None:
         (right, up), tilt = _plane(reference + moved), STEEP
     elif down is not None:
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
-        right = _principal(shape + spread, up, STRAIGHT * size, side)
-        level = abs(right @ chord) < STRAIGHT * size  # an upright rod has no way of its own to go
+        right = _principal(shape + spread, up, UNSEEN * size, side)
+        level = abs(right @ chord) < UNSEEN * size  # an upright rod has no way of its own to go
         right = right * sign_of(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] if level else chord))
     else:
         right = _snapped(chord / np.linalg.norm(chord))
-        up = upwards(_principal(shape, right, STRAIGHT * size, side))
+        up = upwards(_principal(shape, right, UNSEEN * size, side))
         up = up * (_standing(up, reference, load) if feet and load is not None else 1.0)
         if load is not None:
             aside = load - (load @ right) * right

@@ -35,14 +35,13 @@ class Event:
         ``state.q`` (m, 4) are arclength, centreline and unit quaternions from left to right, nondimensional or in the
         units of the scene; multipliers, the load and further fields have their names in ``states.h5``.
 
-    Along a branch it is looked at in five states of each step, the rows among them, and in more where these do not tell
-    how it varies.  One that comes and goes between two of them, up to 0.29 of the step apart, is not seen:
-    ``StepControl(largest=...)`` bounds the steps.
+    Between two rows of a branch it is a cubic, by its values there and its derivatives along the branch, for which the
+    function receives states beside the rows, too.  Where the cubic vanishes, or turns near zero, equilibria decide.
+    What it does within a step besides is not seen: ``StepControl(largest=...)`` bounds the steps.
 
     The function receives the nodes, the ends of the rod among them: ``state.r[:, 0].max()`` is that of the highest
-    node, and ``numpy.interp`` or a sum is taken over nodes.  What this misses of the rod is in the error bar of the
-    special point, for which the function receives states at more places, too (another ``m``).  A function that jumps
-    from node to node, as the place of the highest one, has no error bar: interpolate.
+    node, and ``numpy.interp`` or a sum is taken over nodes.  The error bar is by nodes that are twice as close: that of
+    a sum over nodes holds, that of a largest value among nodes, or of a line between two, may by accident not.
     """
 
     name: str

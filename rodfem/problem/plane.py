@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 ASIDE = 1e-3
 """Displacement over length, strain or rotation out of the plane, to either side, at which energies are tried."""
-PUSHES = 1e-12
-"""Difference between the two sides of the plane, relative to the values there, that is round-off."""
 Places = dict[Symbol, np.ndarray]
 
 
@@ -128,7 +126,7 @@ def _check_functions_of_states(scene: Scene, normal: int) -> None:
     for what, energy in energies:
         value = Values(energy)
         one, other = (_defined(value(side)) for side in sides)
-        if (abs(one - other) > PUSHES * np.maximum(abs(one), abs(other))).any():
+        if (abs(one - other) > NEGLIGIBLE * np.maximum(abs(one), abs(other))).any():
             raise SceneError(
                 f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
                 "are not alike to it; leave that out, or planar out of the scene."

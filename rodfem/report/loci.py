@@ -16,8 +16,6 @@ from rodfem.report.labels import html_of
 from rodfem.tolerances import same_special
 
 NEEDED = ("parameters", "columns", "marks", "start", "labels", "kind", "bounds")
-REGION = 120
-"""Values of the second parameter at which the page has the bounds of a region."""
 
 
 def loci_of(folder: Path, data: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -31,7 +29,7 @@ def loci_of(folder: Path, data: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> list[list[float]] | None:
     """The stable region beside a locus: values of the second parameter, and its two bounds of the load there."""
     same = [other for other in loci if other["parameters"] == one["parameters"]]
-    region = stable_region(one, same, REGION)
+    region = stable_region(one, same)
     return region and [column.tolist() for column in region]
 
 

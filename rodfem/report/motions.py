@@ -22,13 +22,12 @@ from rodfem.report.packing import packed
 from rodfem.report.readings import eigenvalue_in_words
 from rodfem.report.shapes import Shapes
 from rodfem.report.stage import Stage
+from rodfem.tolerances import SAME_EIGENVALUE
 
 Floats = NDArray[np.float64]
 
 EXACT, COUNTED = "0 (exact)", "0"
 """Eigenvalues of a symmetry, and of one that vanishes as far as the state's count tells."""
-SAME = 1e-6
-"""Relative difference of an eigenvalue from another of the state up to which they are one."""
 SMALL = 1e-3
 """Share of the greatest eigenvalue below which such differences are relative to this share."""
 
@@ -69,7 +68,8 @@ def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: 
     if typical is not None:
         known, least = [mode.value for mode in shown], SMALL * abs(typical.value).max(initial=0.0)
         new = [
-            not any(abs(x - mu) <= SAME * max(abs(mu), least) for x in known) and not (known and motion == SYMMETRY)
+            not any(abs(x - mu) <= SAME_EIGENVALUE * max(abs(mu), least) for x in known)
+            and not (known and motion == SYMMETRY)
             for mu, motion in zip(typical.value, typical.motion, strict=True)
         ]
         shown += [

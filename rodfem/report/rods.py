@@ -23,7 +23,7 @@ from rodfem.report.bodies import FLAT, Shelf
 from rodfem.report.branches import branch_data
 from rodfem.report.motions import modes_of, motions_of
 from rodfem.report.packing import packed, plain
-from rodfem.report.shapes import Shapes, shapes_of, stations
+from rodfem.report.shapes import BUDGET, Shapes, shapes_of, stations
 from rodfem.report.stage import Stage, stage_of
 
 Floats = NDArray[np.float64]
@@ -34,8 +34,6 @@ OVER = 1.02
 """Distance of the stripe from the axis, relative to that of the surface."""
 UNIFORM = 1e-6
 """Difference of outlines, in radii of the rod, up to which they are one."""
-BUDGET = 400_000
-"""Points of all states together above which some are left out: about 28 MB of the page."""
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:

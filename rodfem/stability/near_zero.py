@@ -2,8 +2,8 @@ r"""The eigenvalues near zero at a state, and what round-off leaves open of each
 
 The uncertainty on one mesh is the larger of two numbers: the round-off of the Rayleigh quotient
 (:func:`~rodfem.stability.round_off.quotient_error`), and that of the state itself, which Newton's method solves for to
-:data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh makes of sliding along the rod
-:mod:`rodfem.stability.sliding` knows, what it adds to all of them a richer mesh (:mod:`rodfem.adaptivity.soft_states`).
+:data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh adds to that a richer one tells
+(:mod:`rodfem.adaptivity.soft_states`).
 """
 
 from __future__ import annotations
@@ -40,20 +40,6 @@ class NearZero:
     uncertainty: np.ndarray
     firm: int
     zero: int
-
-    def chosen(self, which: np.ndarray, uncertainty: np.ndarray, tolerance: float) -> NearZero:
-        """Those that are marked in ``which`` (number,), with their part of another ``uncertainty`` (number,).
-
-        The others count as a count with that ``tolerance`` has them.
-        """
-        others = self.values[~which]
-        return NearZero(
-            self.values[which],
-            [v for v, kept in zip(self.vectors, which, strict=True) if kept],
-            uncertainty[which],
-            self.firm + int((others < -tolerance).sum()),
-            self.zero + int((abs(others) <= tolerance).sum()),
-        )
 
 
 def soft_limit(inertia: Inertia) -> float:
@@ -97,11 +83,13 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     counted = np.argsort(abs(quotients))[inside:]
     firm = index.negative - int((quotients[counted] < 0).sum())
     order = np.argsort(quotients)
-    near = NearZero(quotients[order], [members[i] for i in order], uncertainty[order], firm, found.drifts)
+    values, uncertainty = quotients[order], uncertainty[order]
     # in a wide band of round-off most eigenvalues are told from zero by their quotients
-    away = abs(near.values)
-    soft = (away < SOFT * inertia.scale) | (away <= near.uncertainty) | (np.argsort(np.argsort(away)) < least)
-    return near.chosen(soft, near.uncertainty, 0.0)
+    away = abs(values)
+    soft = (away < SOFT * inertia.scale) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
+    vectors = [members[i] for i, is_soft in zip(order, soft, strict=True) if is_soft]
+    firm += int((values[~soft] < 0).sum())
+    return NearZero(values[soft], vectors, uncertainty[soft], firm, found.drifts + int((values[~soft] == 0).sum()))
 
 
 def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judgement:

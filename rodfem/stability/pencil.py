@@ -22,11 +22,10 @@ from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors, ordering, preferred
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.validation import trouble_with_inertia
+from rodfem.tolerances import NEGLIGIBLE
 
-MASSLESS = 1e-12
-"""A symmetry mode with less kinetic energy than this, relative, has none."""
-SLICED = 1e-10
-"""Relative tolerance of SLEPc for all eigenvalues of an interval."""
+UNSYMMETRIC, SLICED = 1e-13, 1e-10
+"""Relative tolerances of SLEPc for a pencil without symmetry, and for all eigenvalues of an interval."""
 OF_VECTORS = 1e-9
 """The same for vectors of a symmetric pencil: the error of its eigenvalues is the square."""
 FACTORS = "rodfem_st_"
@@ -176,7 +175,7 @@ def weighed_modes(
     if given and not system.scene.units.ordinary:  # rotations and positions have masses of different units
         scaled = mass.copy()
         scaled.diagonalScale(system.sizes, system.sizes)
-    least = MASSLESS * scaled.norm(PETSc.NormType.INFINITY) if given else 0.0
+    least = NEGLIGIBLE * scaled.norm(PETSc.NormType.INFINITY) if given else 0.0
     images = [mass * mode for mode in given]
     squares, turn = np.linalg.eigh(
         np.array([[np.real(g.dot(m)) for m in images] for g in given]).reshape(len(given), len(given))

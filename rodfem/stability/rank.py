@@ -25,9 +25,8 @@ from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.blocks import Pencil
 from rodfem.stability.projection import factored
+from rodfem.tolerances import NEGLIGIBLE
 
-DEPENDENT = 1e-12
-"""A singular value below this, relative to the greatest column of ``C``, is zero."""
 DIRECTION = 1e-6
 """Relative tolerance of ARPACK for the vector of the least singular value."""
 PASSES = 8
@@ -101,7 +100,7 @@ def _without_noise(pencil: Pencil, C: sp.spmatrix, length: float) -> sp.spmatrix
     """
     C = sp.csc_matrix(sp.diags(units(pencil, length)) @ C)
     largest = np.asarray(abs(C).max(axis=0).todense()).ravel()
-    C.data[abs(C.data) <= DEPENDENT * np.repeat(largest, np.diff(C.indptr))] = 0.0
+    C.data[abs(C.data) <= NEGLIGIBLE * np.repeat(largest, np.diff(C.indptr))] = 0.0
     C.eliminate_zeros()
     return C
 
@@ -126,12 +125,12 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0, re
     if not C.shape[1]:
         return np.inf
     sigma, vector = smallest_singular(C)
-    if sigma > DEPENDENT * greatest(C, 0):
+    if sigma > NEGLIGIBLE * greatest(C, 0):
         return sigma
     # in metres and newtons of a molecule, say, columns are of very different sizes
     equal = _equilibrated(_without_noise(pencil, C, length))
     least, vector = smallest_singular(equal)
-    if least > DEPENDENT * greatest(equal, 0):
+    if least > NEGLIGIBLE * greatest(equal, 0):
         return sigma
     raise SceneError(dependent(pencil, scalars, vector, sigma, remedy))
 

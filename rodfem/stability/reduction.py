@@ -26,14 +26,12 @@ from slepc4py import SLEPc
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.blocks import Pencil
-from rodfem.stability.pencil import eigensolver, seek, use_inverse
+from rodfem.stability.pencil import UNSYMMETRIC, eigensolver, seek, use_inverse
 from rodfem.stability.projection import INVERSES, Projection, ShiftedInverse
 
 TRANSFORMS = ("shift-invert", "cayley")
 FACTORISATIONS = 3
 """Of the eigenvalues of a symmetric pencil near a shift: there, and to count on both sides of it."""
-TOLERANCE = 1e-13
-"""Relative tolerance of SLEPc."""
 BEYOND = 1e-6
 """Part of the farthest distance from the target by which a count reaches farther."""
 SPURIOUS = 1e-8
@@ -119,7 +117,7 @@ class Reduction:
         # round-off.  At a breakdown, which double eigenvalues bring about early, SLEPc would find it indefinite.
         stiffness, mass = (self._operator(matrix) for matrix in (self.projection.K, self.projection.M))
         solver = eigensolver(stiffness, mass, "rodfem_reduced_", symmetric=False)
-        seek(solver, target, number, min(2 * number + 20, n), TOLERANCE)
+        seek(solver, target, number, min(2 * number + 20, n), UNSYMMETRIC)
         spectral = solver.getST()
         if transform == "cayley":
             spectral.setType(SLEPc.ST.Type.CAYLEY)

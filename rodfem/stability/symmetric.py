@@ -38,6 +38,7 @@ from rodfem.stability.pencil import (
     symmetry_modes,
     with_factors,
 )
+from rodfem.tolerances import SAME_EIGENVALUE
 
 HIT = 1e-8
 """A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
@@ -46,8 +47,6 @@ HIT = 1e-8
 EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
-DISTINCT = 1e-6
-"""Eigenvalues closer than this, relative to the greatest, are one where the values found are counted."""
 CONVERGED = 1e-7
 """Residual, relative to the stiffness, above which a pair is rejected: the Krylov space broke down."""
 LEAST_SPREAD = 1e-3
@@ -248,7 +247,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def certifies(self, values: np.ndarray) -> bool:
         """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
-        small = DISTINCT * max(abs(values).max(), self.scale)
+        small = SAME_EIGENVALUE * max(abs(values).max(), self.scale)
         distinct = values < values[-1] - small
         return (
             self.below(values[0] - small) == 0
@@ -275,7 +274,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         if len(values) < number:
             return Modes(values, vectors, errors, False)
         held.last = sum(vector.array_r for vector in vectors)
-        cut = values[number - 1] + DISTINCT * max(abs(values[number - 1]), held.scale)
+        cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), held.scale)
         known = int((values < cut).sum())
         return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 

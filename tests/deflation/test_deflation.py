@@ -24,12 +24,13 @@ from rodfem.deflation.deflated_newton import DeflatedNewton
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
 from rodfem.deflation.known import equilibria_at
-from rodfem.deflation.search import NEW, SAME, Deflation, find_equilibria, turned_state
+from rodfem.deflation.search import NEW, Deflation, find_equilibria, turned_state
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
+from rodfem.tolerances import APART
 
 K0 = 3 * pi
 CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
@@ -150,7 +151,7 @@ def test_ruler() -> None:
     image = mirror(found.follower.system, buckled.x)
     assert found.follower.system.distance(image, buckled.x) > 0.5
     assert force(found.follower, image) < 1e-9
-    assert search.nearest_known(image) < SAME
+    assert search.nearest_known(image) < APART
 
     explorer = Explorer(found.follower, Plan((0.0, 12.0), error_bars=False), Observer(), lambda: None)
     up, down = both_ways(buckled)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import erf, inf, log, pi
 from typing import Any
 
-import numpy as np
 import ufl
 from classics import SUPPORTS, column
 from continuation.test_unfolding import cantilever, fold_of
@@ -13,7 +12,7 @@ from hard.case import Change, Measured, compare, run, said, singular
 from hard.stiffness import EULER
 from hard.two_freedoms import scene
 
-from rodfem import Discretization, StepControl
+from rodfem import Discretization
 from rodfem.continuation.kinds import IMPERFECT
 
 MEND = 1e-4
@@ -112,23 +111,3 @@ def imperfect(lateral: float) -> Measured:
     if len(found) != 1:
         return Measured(inf, 1.0, said(diagram), f"{found} where one fold was expected")
     return compare(found, [Change(fold_of(lateral), found[0].negative_before, found[0].negative_after)], said(diagram))
-
-
-def beside(apart: float) -> Measured:
-    """Three branches ``u = g(P) + (0, d, 2 d)``, ``g = 0.2 P/(P^2 + 0.1^2)^(1/2)``, of which an outer one is followed.
-
-    Both of these have index 0: no change of it, and no special point, tells that the branch has been left.  Steps are
-    up to 0.5 long.
-    """
-    bend, high, d = 0.1, 0.2, apart
-
-    def potential(u: Any, f2: Any, c: Any) -> Any:
-        y = u - high * c.P / ufl.sqrt(c.P**2 + c.b**2) - c.a
-        return (0.25 * y**4 / c.a**2 - 0.5 * y**2) + 0.5 * f2
-
-    model = scene(potential, (-1.0, 1.0), a=d, b=bend)
-    diagram = run(model, MESH, error_bars=False, steps=StepControl(first=0.5, largest=0.5, aim=0.1))
-    off = [p.ordinate - high * p.load / np.hypot(p.load, bend) for p in diagram[0].points]
-    first = 2 * d * round(off[0] / (2 * d))
-    wrong = "" if diagram[0].ended == "end of range" else diagram[0].ended
-    return Measured(max(abs(x - first) for x in off), 1e-8, said(diagram), wrong)

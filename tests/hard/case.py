@@ -52,8 +52,12 @@ class Measured:
 
 @dataclass(frozen=True)
 class Case:
-    """A series of problems of one kind, by a parameter: the tests run ``few`` of its values, the page ``all``."""
+    """A series of problems of one kind, by a parameter: the tests run ``few`` of its values, the page ``all``.
 
+    ``of`` names what is promised: a row of the contract in docs/resolution.md.
+    """
+
+    of: str
     name: str
     hard: str
     promised: str

@@ -14,8 +14,8 @@ from hard.two_freedoms import scene as two_freedoms
 from scipy.linalg import eigh
 
 from rodfem import Discretization, Plan, Ring, trace
-from rodfem.codim2.codim2_points import PASSES
 from rodfem.codim2.locus import COARSE, Locus
+from rodfem.codim2.points import PASSES
 from rodfem.forms import loads
 
 WAVES, MODES = 3, 40

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,6 +12,7 @@ from hard.case import Case
 from hard.cases import CASES, SAID
 
 pytestmark = pytest.mark.alone
+CONTRACT = Path(__file__).parents[2] / "docs" / "resolution.md"
 APART = "loci"
 """A group that has a file of its own."""
 EVERY = [(case, value) for name, group in CASES.items() if name != APART for case in group for value in case.few]
@@ -25,13 +28,20 @@ def test_every_case_is_tested() -> None:
     assert all(case.few for group in CASES.values() for case in group)
 
 
+def test_every_case_is_one_of_the_contract() -> None:
+    """It names the row of "Promised" in docs/resolution.md that it tests."""
+    promised = CONTRACT.read_text().partition("## Promised")[2].partition("\n\n|")[2].partition("\n\n")[0]
+    rows = set(re.findall(r"^\|? ?([^|]+?) \|", promised, flags=re.MULTILINE))
+    assert {case.of for group in CASES.values() for case in group} <= rows
+
+
 @pytest.mark.parametrize(("case", "value"), [value_of(*every) for every in EVERY])
 def test_a_hard_case(case: Case, value: Any) -> None:
     found = case.measure(value)
     assert found.right or (case.promised == SAID and found.said), f"{found.error:.3g} {found.wrong} {found.said}"
 
 
-def test_steps_are_shortened_about_a_narrow_bend() -> None:
-    """Two folds 3e-4 apart in load are found, not only said to be missing perhaps."""
-    found = bifurcations.dent(3e-4)
+def test_a_branch_goes_on_beyond_a_bend_of_a_fifth_of_a_step() -> None:
+    """The polynomial through its last rows has another tangent there."""
+    found = bifurcations.dent(1e-2)
     assert found.right and not found.said, f"{found.error:.3g} {found.wrong} {found.said}"

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
-from benchmarks import fronts
+from benchmarks import fronts, reduced_stiffness
 from benchmarks.auto.output import AutoError
 from benchmarks.auto.problems import PROBLEMS
 from benchmarks.auto.program import check, require_auto
@@ -67,9 +68,10 @@ def test_figures_are_drawn_from_the_page_alone(tmp_path: Path) -> None:
     assert not plots.draw(Path(shutil.copy(DOCS / "rods.md", tmp_path)))
 
 
-def test_the_picture_of_the_elimination_is_drawn(tmp_path: Path) -> None:
-    fronts.main(tmp_path / "fronts.png")
-    assert (tmp_path / "fronts.png").stat().st_size > 20_000
+@pytest.mark.parametrize("picture", [fronts, reduced_stiffness])
+def test_a_picture_is_drawn(tmp_path: Path, picture: ModuleType) -> None:
+    picture.main(tmp_path / "drawn.png")
+    assert (tmp_path / "drawn.png").stat().st_size > 20_000
 
 
 def test_nothing_measured_is_lost(tmp_path: Path) -> None:

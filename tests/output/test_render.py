@@ -18,7 +18,7 @@ from rodfem.errors import InputError
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
-from rodfem.output.render import _read, draw_shape_safely, triad
+from rodfem.output.render import _read, draw_shape_safely
 from rodfem.output.solids import FLATTEST, SIDES, profile_of, round_arrow
 from rodfem.output.typical import typical_state
 from rodfem.output.view import view_of
@@ -240,7 +240,7 @@ def test_picture_shows_a_clamp_where_there_is_one(folder: Path) -> None:
     pytest.importorskip("pyvista")
     file = saved(folder / "states.h5", column(clamped(), free()))
     assert draw_shape_safely(file, "straight", 0, folder / "shape.png", caption="") is None
-    pixels = imread(folder / "shape.png")[300:840, :, :3]  # without the triad and the caption
+    pixels = imread(folder / "shape.png")[300:840, :, :3]  # without the axes and the caption
     grey = (np.ptp(pixels, axis=2) < 0.08) & (abs(pixels.mean(axis=2) - 0.55) < 0.2)
     assert np.count_nonzero(grey[:, :800]) > 2000 and np.count_nonzero(grey[:, 800:]) < 20
 
@@ -325,15 +325,6 @@ def test_an_arch_stands_where_a_load_presses_on_its_crown() -> None:
         for load, feet in ((crown, True), (None, True), (-crown, False)):  # nothing presses, or holds: e1, or e2
             seen = view_of(arch, -0.1 * arc * crown, load=load, feet=feet)
             assert seen[1] @ crown * crown[np.argmax(abs(crown) > 0)] > 0
-
-
-@pytest.mark.parametrize("way", [E1, E2, -E2, np.array([0.6, 0.8, 0.0])])
-def test_names_of_the_axes_do_not_overlap(way: np.ndarray) -> None:
-    view = view_of(STRAIGHT["r"], np.sin(pi * S)[:, None] * way)
-    arrows, names = triad(view, E1, 2.0)
-    assert [x.points[-1].tolist() for x in arrows] == [(E1 + 2.0 * e).tolist() for e in np.eye(3)]
-    assert "".join(sorted("".join(name for name, _ in names))).strip(", ") == "eee₁₂₃"
-    assert min(np.linalg.norm(a - b) for (_, a), (_, b) in combinations(names, 2)) > 0.35
 
 
 def branch(name: str, negative: list[int], special: list[dict] = [], **more: Any) -> dict[str, Any]:  # noqa: B006

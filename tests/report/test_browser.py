@@ -29,8 +29,8 @@ from scipy.ndimage import uniform_filter
 
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
+from rodfem.output.stable_region import COUNT
 from rodfem.output.view import POINT
-from rodfem.report.loci import REGION
 from rodfem.report.packing import packed
 from rodfem.report.page import page_of
 from rodfem.report.payload import payload_of
@@ -462,7 +462,7 @@ def test_the_plane_of_loci_shows_states(opened: Callable[..., Any]) -> None:
     last = len(locus["x"]) - 1
     click(page, *page.execute_script(IN_PLANE, locus["x"][last // 4], locus["load"][last // 4]))
     until(page, lambda: shown(page) == (names[branch], row))
-    other, edge, end = (column[REGION // 2] for column in locus["region"])
+    other, edge, end = (column[COUNT // 2] for column in locus["region"])
     click(page, *page.execute_script(IN_PLANE, other, 0.3 * edge + 0.7 * end))
     until(page, lambda: shown(page) != (names[branch], row))
     load = page.execute_script("return import('report/store').then((store) => store.state.load)")

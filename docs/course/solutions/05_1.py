@@ -1,29 +1,15 @@
-"""The curve that one has to enter from above, bent against the imperfection."""
+"""The stiffness of one amplitude, the rest of the rod following, is zero where the second variation is singular."""
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from ufl import cos, derivative, dx
 
-import rodfem
-from rodfem import Ordinate, Scene, clamped, free
-from rodfem.forms.energy import bending_and_twist
+from lesson.by_hand import angle, assemble, nodes
 
-
-def bent(s):
-    half = -0.85 * np.sin(np.pi * s / 2)
-    return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=1)
-
-
-column = Scene(
-    name="column",
-    interval=(0.0, 1.0),
-    rod="unshearable and inextensible",
-    energy=lambda v, k, c: bending_and_twist(k, (2.0, 1.0, 1.0)),
-    parameters={"P": 1.0, "eps": 0.05},
-    load="P",
-    ends=(clamped(), free(force=lambda c: (c.eps, 0.0, -c.P))),
-    ordinate=Ordinate("tip displacement", s=1.0, of=lambda r, q: r[0]),
-    span=(4.0, 1.0),
-    planar="e2",
-    start=bent,
-)
-(snap,) = rodfem.trace(column).special("fold")
-answer = snap.point.load
+theta = angle()
+free, forms = nodes(theta) > 0, (theta.dx(0) ** 2 / 2 * dx, cos(theta) * dx)
+K, G = (assemble(derivative(derivative(form, theta), theta))[np.ix_(free, free)] for form in forms)
+b = nodes(theta)[free]  # a tilt of the whole rod
+follows = [np.linalg.solve(K + load * G, b) for load in (2.0, 3.0)]
+stiffness = CubicHermiteSpline((2.0, 3.0), [1 / (b @ y) for y in follows], [y @ G @ y / (b @ y) ** 2 for y in follows])
+answer = float(stiffness.roots(extrapolate=False)[0])

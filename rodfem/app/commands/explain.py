@@ -8,10 +8,8 @@ from shutil import get_terminal_size
 from textwrap import fill
 
 from rodfem.app.cli import Parser
+from rodfem.app.terminal import WIDTH
 from rodfem.output.glossary import ENTRIES, explanation, is_entry, title
-
-WIDTH = 110
-"""Columns of a paragraph."""
 
 
 def main(words: Sequence[str]) -> None:

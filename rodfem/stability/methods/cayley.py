@@ -8,8 +8,8 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.stability.method import Found, Interval, SymmetricMethod
 from rodfem.stability.reduction import FACTORISATIONS, Reduction, cayley_parameters
-from rodfem.stability.symmetric import DISTINCT
 from rodfem.stability.workspace import Workspace
+from rodfem.tolerances import SAME_EIGENVALUE
 
 APART = 1e-3
 """Eigenvalues closer than this, relative to the greatest, are one for the parameters of the transform."""
@@ -42,7 +42,7 @@ class Cayley(SymmetricMethod):
             except ConvergenceError:
                 continue
             made += FACTORISATIONS
-            first = found.values[0] - DISTINCT * max(abs(found.values).max(), LEAST)
+            first = found.values[0] - SAME_EIGENVALUE * max(abs(found.values).max(), LEAST)
             if found.certified and below.below(first) == 0:
                 break
         else:

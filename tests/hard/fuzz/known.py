@@ -111,11 +111,6 @@ def pair(b: float, apart: float) -> Timed:
     return Timed("pair", lambda t: (t - b - apart) * (t - b + apart), (b - apart, b + apart))
 
 
-def corner(b: float) -> Timed:
-    """A corner at zero."""
-    return Timed("corner", lambda t: abs(t - b), (b,))
-
-
 def steep(b: float) -> Timed:
     """Two steps that differ in sign."""
     return Timed("step", lambda t: tanh(200 * (t - b)), (b,))

@@ -202,12 +202,11 @@ def events(draw: Draw) -> list[Timed]:
     if not draw.maybe(0.8):
         return []
     b, height = draw.number(0.07, 0.93), draw.number(-0.95, 0.95)
-    kinds = ("sine", "sine", "touch", "pair", "corner", "step", "above")
+    kinds = ("sine", "sine", "touch", "pair", "pair", "step", "above")
     made = {
-        "sine": lambda: known.sine(int(draw.among(1, 2, 3, 7, 12, 60)), height),
+        "sine": lambda: known.sine(int(draw.among(1, 2, 3, 5, 7, 9)), height),
         "touch": lambda: known.touching(b),
         "pair": lambda: known.pair(b, 10.0 ** draw.number(-5.0, -1.2)),
-        "corner": lambda: known.corner(b),
         "step": lambda: known.steep(b),
         "above": lambda: known.above(b),
     }

@@ -1,5 +1,7 @@
 """Answers of lesson 5: branch points and imperfections."""
 
+from math import pi
+
 from lesson.answer import Answer
 
 ANSWERS = (
@@ -12,12 +14,12 @@ ANSWERS = (
         ((1 / 4, "Divide the fourth derivative by 4!, and the second by 2!."),),
     ),
     Answer(
-        "load of the fold of the imperfect column, eps = 0.05",
-        2.66604501656597,
-        "exact, in elliptic integrals",
+        "critical load of the column, by the stiffness of one amplitude at P = 2 and 3",
+        pi**2 / 4,
+        "exact pi^2/4",
         1e-6,
-        "Enter the other curve from above: start bent against the transverse load, and go down.",
-        ((2.6709824215169577, "That is Koiter's law, which is right for small eps only."),),
+        "h' = (y . S' y) / (b . y)^2 with y = S^-1 b, at both loads: scipy's CubicHermiteSpline has roots.",
+        ((2.4670751, "That is no cubic: use the slopes, too."),),
     ),
     Answer(
         "largest load of the rigid column, eps = 0.01",

@@ -11,29 +11,25 @@ several is taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from petsc4py import PETSc
 
-from rodfem.codim2.criterion import Criterion
-from rodfem.codim2.parameter_plane import LocusPoint, Plane, Sought
+from rodfem.codim2.plane import Criterion, LocusPoint, Plane, Prediction, Sought
 from rodfem.continuation.prediction import lagrange
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine
 from rodfem.tolerances import TINY
 
-WINDOWS, WIDE = tuple(0.016 / 4**i for i in range(5)), tuple(0.064 / 2**i for i in range(6))
-"""Half widths of windows, as arclengths, from wide to narrow: the second ones for ends of folds, singular there."""
+WINDOWS = tuple(0.064 / 2**i for i in range(11))
+"""Half widths of windows, as arclengths, from wide to narrow."""
 POINTS = 8
 """Points of a window: an even number, none of them in the middle, where the end of a fold is singular."""
 LAST, TIMES = 2, 3.0
 """Coefficients of a polynomial by which it is known how wrong the others are, and to which factor: they are few."""
 INSIDE = 0.5
 """Part of the window, about its middle, in which what is sought must be."""
-COARSE = 1e-5
-"""Uncertainty along the curve, an arclength, where no window can be filled: what differences for a tangent displace."""
 
 
 @dataclass(frozen=True)
@@ -46,22 +42,24 @@ class Place:
 
     s: float
     ds: float
-    through: tuple[Chebyshev, Chebyshev]
+    through: list[Chebyshev]
     nodes: list[LocusPoint]
     half: float
-    apart: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    apart: np.ndarray
     windows: tuple[float, ...] = ()
 
     @property
     def p(self) -> np.ndarray:
         """Both parameters there, (2,)."""
-        return np.array([float(q(self.s)) for q in self.through])
+        return self._parameters(self.s)
 
     @property
     def dp(self) -> np.ndarray:
         """Uncertainties of both parameters that those along the curve bring, (2,)."""
-        moved = [[float(q(self.s + side)) for q in self.through] - self.p for side in (-self.ds, self.ds)]
-        return np.asarray(abs(np.array(moved)).max(axis=0))
+        return np.maximum(*(abs(self._parameters(self.s + side) - self.p) for side in (-self.ds, self.ds)))
+
+    def _parameters(self, s: float) -> np.ndarray:
+        return np.array([float(q(s)) for q in self.through])
 
     def interpolated(self, node: LocusPoint) -> LocusPoint:
         """The point there by the polynomials alone, with what ``node``, close by, has else: nothing is solved for."""
@@ -98,7 +96,7 @@ def place(
 def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, half: float) -> Place:
     """Where ``sought`` is, by points of a window of this ``half`` width; raises :class:`ConvergenceError`."""
     t = _arclengths(half)
-    nodes = [criterion.onto(*_ahead(plane, node, float(s)), (node.dp, node.dx), node) for s in t]
+    nodes = [criterion.onto(ahead(plane, node, float(s)), node) for s in t]
     tables = [[sought.of(n) for n in nodes], *np.array([n.p for n in nodes]).T]
     f, *through = (Chebyshev.fit(t, values, POINTS - 1, domain=[-half, half]) for values in tables)
     # each coefficient may be wrong by as much as the last two: by |T_k(0)| times that the value, |T_k'(0)| the slope
@@ -115,24 +113,15 @@ def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sou
     ds = wrong / max(abs(float(slope(s))), TINY)
     if not abs(s) + ds < INSIDE * half:
         raise ConvergenceError("what is sought is not in the window")
-    return Place(s, ds, (through[0], through[1]), nodes, half)
+    return Place(s, ds, through, nodes, half, np.zeros(2))
 
 
-def shifted(criterion: Criterion, plane: Plane, node: LocusPoint, s: float) -> LocusPoint:
-    """Point of the curve at arclength ``s`` along the tangent of ``node``.
-
-    It is that of a ``criterion`` in the ``plane``.  Raises :class:`ConvergenceError` where there is none, or out of the
-    bounds.
-    """
-    return criterion.correct(*_ahead(plane, node, s), (node.dp, node.dx), node)
-
-
-def _ahead(plane: Plane, node: LocusPoint, s: float) -> tuple[np.ndarray, PETSc.Vec]:
-    """Parameters and state on the tangent of ``node``; raises :class:`ConvergenceError` out of the bounds."""
+def ahead(plane: Plane, node: LocusPoint, s: float) -> Prediction:
+    """Point on the tangent of ``node``; raises :class:`ConvergenceError` out of the bounds."""
     p = node.p + s * node.dp
     if plane.outside(p) is not None:
         raise ConvergenceError("the window leaves the bounds")
-    return p, node.x + node.dx * s
+    return p, node.x + node.dx * s, node.dp, node.dx
 
 
 def _arclengths(half: float) -> np.ndarray:

@@ -1,0 +1,296 @@
+"""Points of codimension two between two nodes of a locus: cusps, and ends of folds and of flutter; and turning points.
+
+At a *cusp* of a fold its curvature vanishes and both parameters turn back, while the coupling of its null vector with
+the parameters does not vanish.  Where it does, in both of them at one place, the fold *ends on a branch point*: beyond
+it the curve is its own mirror image.  It may also *pass a branch point*, to other parameters.  A double eigenvalue that
+vanishes ends a curve of flutter.
+
+What changes sign between two nodes is located.  What changes it twice is looked for where a parabola or cubic through
+the nodes has its extremum: such a step is parted there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rodfem.codim2.place import ahead, place
+from rodfem.codim2.plane import REACH, Criterion, LocusPoint, Plane, Sought, between
+from rodfem.continuation.kinds import GAP
+from rodfem.errors import ConvergenceError
+from rodfem.output.digits import number
+from rodfem.roots import zero_between
+
+LOCATED = 1e-8
+"""Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
+UNPLACED = 1e-5
+"""Uncertainty along the curve, an arclength, of what cannot be placed: what differences for a tangent displace."""
+CERTAIN = 10.0
+"""Uncertainties of a parameter by which it changes towards a turning point: less is the round-off of a constant."""
+NONE = 1e-10
+"""Part of a unit tangent along one parameter, or of a coupling over that with the other one, that is round-off: it has
+no sign."""
+VANISHED, PASSED = 0.05, 1e-3
+"""Share that is left of a coupling where it vanishes, at an end and beside a cusp: its place is known to no more."""
+ASIDE = 1e-2
+"""Distance from a cusp, over that of the nodes, at which the tangent has the direction that it has beside it."""
+TRIES = 8
+"""Parabolas by which a least value in a step is sought, and times that a step is parted for more cusps than one."""
+DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
+"""The end of a curve of flutter: its double eigenvalue vanishes."""
+ENDS = "the fold ends on a branch point"
+DIVERGES = "the double eigenvalue vanishes: divergence"
+PASSES = "the fold passes a branch point"
+"""Marks of rows; at the last one the coupling vanishes as well, but the fold goes on."""
+
+Row = tuple[LocusPoint, str]
+"""A point of a locus and the kind of its mark; empty for none."""
+Test = Callable[[LocusPoint], float]
+"""What vanishes at a point of codimension two."""
+
+
+class Codim2Points:
+    """Finds what lies between two nodes of a locus of a ``criterion`` in a ``plane``."""
+
+    def __init__(self, criterion: Criterion, plane: Plane) -> None:
+        """Keep what solves for points, and the plane."""
+        self.criterion, self.plane = criterion, plane
+
+    def between(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> tuple[list[Row], str]:
+        """Rows between two nodes, in their order, and why the curve ends there; empty where it does not.
+
+        ``a`` and ``b`` are one after the other, and ``before`` is the node before them, None where there is none.
+        """
+        if self._reverses(a, b):
+            coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
+            if coupling is None or self._coupling_vanishes(coupling, a, b, VANISHED):
+                share = float(a.coupling @ a.coupling) / float((a.coupling - b.coupling) @ a.coupling)
+                end = coupling and self._end_of_fold(coupling, a, b)
+                row, where = self._end(a, b, share, end)
+                return [(row, ENDS)], f"{ENDS} {where}, or turns back within {GAP:g} of the bounds from one"
+        if a.omega2 * b.omega2 < 0:
+            zero = self.located(a, b, DOUBLE_ZERO.of)
+            row, where = self._end(a, b, a.omega2 / (a.omega2 - b.omega2), zero and self._double_zero(zero, a))
+            return [(row, DIVERGES)], f"{DIVERGES} {where}"
+        return self._rows(a, b, before, TRIES), ""
+
+    def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
+        """Point between two neighbours at which a parameter has a value; none where it cannot be located.
+
+        The neighbours are ``a`` and ``b``; parameter number ``which`` (0 or 1) has the given ``value`` there, but where
+        the curve turns back next to it.
+        """
+        node, axis = self.located(a, b, lambda n: float(n.p[which]) - value), self.plane.axis(which)
+        if node is None:
+            return []
+        try:
+            return [self.criterion.correct((np.where(axis, value, node.p), node.x, axis, None), node, REACH)]
+        except ConvergenceError:
+            return [node]
+
+    # --- rows ------------------------------------------------------------------------------------------------------
+
+    def _rows(self, a: LocusPoint, b: LocusPoint, other: LocusPoint | None, depth: int) -> list[Row]:
+        """What is between two nodes, beside an ``other`` one, in a step that may be parted ``depth`` times."""
+        rows = list[Row]()
+        for p, q in pairwise([a, *self._hidden(a, b, other), b]):
+            rows += self._piece(p, q, depth) + [(q, "")] * (q is not b)
+        return rows
+
+    def _piece(self, a: LocusPoint, b: LocusPoint, depth: int) -> list[Row]:
+        """What is between two nodes where the curvature has another sign at most once, or by pieces beside that."""
+        if a.curvature * b.curvature >= 0:
+            turns = self._turns(a, b)
+            for turn, _ in turns if depth else []:
+                sides = self._sides(turn, a, b)
+                if sides and sides[0].curvature * sides[1].curvature < 0:  # a cusp, of an even number
+                    return self._rows(a, sides[0], None, 0) + self._piece(sides[0], b, depth - 1)
+            return turns
+        cusp = self.located(a, b, lambda n: n.curvature)
+        if cusp is None:
+            return []
+        left, right, sides = list[Row](), list[Row](), self._sides(cusp, a, b)
+        if sides and depth:
+            (p, q), less = sides, depth - 1
+            left, right = self._rows(a, p, q, less), self._rows(q, b, p, less)
+        if self._coupling_vanishes(cusp, a, b, PASSED):
+            # no solution locates it: corrections slide along the curve of branch points
+            return [*left, (_within(cusp, a, b), PASSES), *right]
+        return [*left, (self._placed(cusp, _reversal(self.plane, a, b)), "cusp"), *right]
+
+    def _sides(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
+        """Points on both sides of a ``node`` between two others, none where these are as close."""
+        aside = ASIDE * (b.s - a.s)
+        both = node.s - aside, node.s + aside
+        return [self._at(a, b, s) for s in both] if a.s < both[0] and both[1] < b.s else []
+
+    def _turns(self, a: LocusPoint, b: LocusPoint) -> list[Row]:
+        """Points between two nodes at which a parameter has an extremum."""
+        found = list[Row]()
+        flat = np.minimum(abs(a.dp), abs(b.dp)) <= NONE * self.plane.width
+        for i in np.flatnonzero((a.dp * b.dp < 0) & ~flat & _changes(a, b)):
+            turn = self.located(a, b, lambda n, i=i: float(n.dp[i]))  # type: ignore[misc]
+            sought = Sought(lambda n, i=i: float(n.p[i]), stationary=True)  # type: ignore[misc]
+            if turn is not None and _moves(turn, a, b, i):
+                found.append((self._placed(turn, sought), f"turns in {self.plane.names[i]}"))
+        return sorted(found, key=lambda item: item[0].s)
+
+    # --- what has one sign at both nodes ---------------------------------------------------------------------------
+
+    def _hidden(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> list[LocusPoint]:
+        """A point between two nodes where something has another sign than at both, if there is one."""
+        for s, of in _extrema(a, b, before):
+            node = self._beyond_zero(a, b, s, of)
+            if node is not None:
+                return [node]
+        return []
+
+    def _beyond_zero(self, a: LocusPoint, b: LocusPoint, s: float | None, of: Test) -> LocusPoint | None:
+        """Point near arclength ``s`` where ``of`` has the other sign than at both nodes, by successive parabolas."""
+        sign, last = np.sign(of(a)), np.inf
+        for _ in range(TRIES):
+            if s is None or not a.s < s < b.s:
+                return None
+            try:
+                node = self._at(a, b, s)
+            except ConvergenceError:
+                return None
+            value = sign * of(node)
+            if value < 0:
+                return node
+            if value >= last:
+                return None
+            last, s = value, _vertex((a.s, s, b.s), (sign * of(a), value, sign * of(b)))
+        return None
+
+    # --- where it is -----------------------------------------------------------------------------------------------
+
+    def _at(self, a: LocusPoint, b: LocusPoint, s: float) -> LocusPoint:
+        """Point of the curve between two nodes at an arclength; raises :class:`ConvergenceError`."""
+        return replace(self.criterion.correct(between(a, b, s), a), s=s)
+
+    def located(self, a: LocusPoint, b: LocusPoint, f: Test) -> LocusPoint | None:
+        """Point between two others at which ``f`` vanishes; None where it cannot be located."""
+        try:
+            return self._at(a, b, zero_between(lambda s: f(self._at(a, b, s)), a.s, b.s, LOCATED))
+        except (ConvergenceError, ValueError):
+            return None
+
+    def _placed(self, node: LocusPoint, sought: Sought) -> LocusPoint:
+        """The point near ``node`` that is ``sought``, with uncertainties of its place along the curve, too."""
+        try:
+            found = place(self.criterion, self.plane, node, sought)
+            better = self.criterion.correct(ahead(self.plane, node, found.s), node)
+        except ConvergenceError:
+            along = np.maximum(abs(node.dp), UNPLACED * self.plane.width)
+            return replace(node, located_to=node.located_to + UNPLACED * along)
+        located = better.located_to + found.dp
+        return replace(better, s=node.s + found.s, located_to=located, sought=sought, windows=found.windows)
+
+    # --- ends ------------------------------------------------------------------------------------------------------
+
+    def _reverses(self, a: LocusPoint, b: LocusPoint) -> bool:
+        """Whether coupling and tangent change their signs between two nodes, in each parameter that has some.
+
+        Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.  Where it
+        goes on to others it passes the branch point.
+        """
+        coupled = _coupled(a, b)
+        moves = np.minimum(abs(a.dp), abs(b.dp)) > NONE * self.plane.width
+        turned = (a.coupling * b.coupling < 0)[coupled].all() and (a.dp * b.dp < 0)[moves].all()
+        return bool(coupled.any() and moves.any() and turned)
+
+    def _coupling_vanishes(self, node: LocusPoint, a: LocusPoint, b: LocusPoint, share: float) -> bool:
+        """Whether at most a ``share`` of the coupling at two nodes is left at ``node``, in all parameters."""
+        size = np.minimum(abs(a.coupling), abs(b.coupling))
+        return bool((abs(node.coupling) <= share * size)[_coupled(a, b)].all())
+
+    def _end_of_fold(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
+        """The end near ``node`` of a fold on a branch point, by interpolation between its two sides.
+
+        No point can be corrected to it: there the curve of branch points passes, on which corrections may slide along.
+        Nor has the fold a tangent of its own there, but for the cubic between ``a`` and ``b``.
+        """
+        node, sought = replace(self._on_cubic(a, b, node.s), p=node.p, x=node.x), _reversal(self.plane, a, b)
+        try:
+            found = place(self.criterion, self.plane, node, sought)
+        except ConvergenceError:
+            return _within(node, a, b)
+        end = found.interpolated(node)
+        end.ordinate = self.criterion.solver.shape.ordinate(end.x)
+        return replace(end, s=node.s + found.s, sought=sought, windows=found.windows)
+
+    def _double_zero(self, node: LocusPoint, a: LocusPoint) -> LocusPoint:
+        """The end near ``node`` of flutter, with the count of the node ``a`` before: a double zero has no sign."""
+        end = self._placed(node, DOUBLE_ZERO)
+        return replace(end, rest=end.rest + len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0)))
+
+    def _end(self, a: LocusPoint, b: LocusPoint, share: float, end: LocusPoint | None) -> tuple[LocusPoint, str]:
+        """The last row and words for its place: ``end``, or else, or if that is not between the nodes, on their cubic.
+
+        There the line through both values of what vanishes is zero, at a ``share`` of the step: it is off by no more
+        than it is from either of them.
+        """
+        if end is None or self.criterion.length(end.p - a.p, end.x - a.x) > b.s - a.s:
+            end = _within(self._on_cubic(a, b, a.s + share * (b.s - a.s)), a, b)
+        each = zip(self.plane.names, end.p, end.located_to, strict=True)
+        return end, f"near {', '.join(f'{name} = {number(v, error)}' for name, v, error in each)}"
+
+    def _on_cubic(self, a: LocusPoint, b: LocusPoint, s: float) -> LocusPoint:
+        """Point of the cubic between two nodes, with what the first one has else."""
+        p, x, dp, dx = between(a, b, s)
+        size = self.criterion.length(dp, dx)
+        return replace(a, p=p, x=x, dp=dp / size, dx=dx / size, s=s, ordinate=self.criterion.solver.shape.ordinate(x))
+
+
+def _within(node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
+    """A point of which no more is known than that it is as close as the farther one of two nodes."""
+    return replace(node, located_to=np.maximum(abs(node.p - a.p), abs(node.p - b.p)) + a.located_to)
+
+
+def _reversal(plane: Plane, a: LocusPoint, b: LocusPoint) -> Sought:
+    """Where both parameters turn back at once between two nodes, as at a cusp: what turns most is stationary."""
+    turned = (b.dp - a.dp) / plane.width**2
+    return Sought(lambda n: float(turned @ n.p), stationary=True)
+
+
+def _extrema(a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> list[tuple[float | None, Test]]:
+    """Arclengths between two nodes at which something that has one sign at both comes near zero, or passes it."""
+    found = list[tuple[float | None, Test]]()
+    if before is not None and a.curvature * b.curvature > 0:
+        nodes = (before, a, b)
+        found.append((_vertex([n.s for n in nodes], [n.curvature for n in nodes]), lambda n: n.curvature))
+    for i in np.flatnonzero((a.dp * b.dp > 0) & _changes(a, b)):
+        chord = (b.p[i] - a.p[i]) / (b.s - a.s)
+        if np.sign(a.dp[i]) * (3 * chord - (a.dp[i] + b.dp[i]) / 2) < min(abs(a.dp[i]), abs(b.dp[i])):
+            found.append(((a.s + b.s) / 2, lambda n, i=i: float(n.dp[i])))  # type: ignore[misc]
+    return found
+
+
+def _vertex(s: Sequence[float], values: Sequence[float]) -> float | None:
+    """Argument at which the parabola through three values comes nearest to zero or passes it; None without one."""
+    second, first, _ = np.polyfit(np.array(s) - s[1], values, 2)
+    if second * values[1] <= 0:
+        return None
+    return float(s[1] - first / (2 * second))
+
+
+def _coupled(a: LocusPoint, b: LocusPoint) -> np.ndarray:
+    """Whether the null vector is coupled with each of the parameters (2,) at two nodes, round-off apart."""
+    size = np.minimum(abs(a.coupling), abs(b.coupling))
+    return np.asarray(size > NONE * size.max())
+
+
+def _changes(a: LocusPoint, b: LocusPoint) -> np.ndarray:
+    """Whether each parameter (2,) may change between two nodes by more than its uncertainty: else nothing is sought."""
+    most = np.maximum(abs(a.dp), abs(b.dp)) * (b.s - a.s)
+    return np.asarray(most > CERTAIN * np.minimum(a.located_to, b.located_to))
+
+
+def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:
+    """Whether a parameter at its extremum differs from that at the neighbours by more than its uncertainty."""
+    moved = max(abs(turn.p[which] - a.p[which]), abs(turn.p[which] - b.p[which]))
+    return bool(moved > CERTAIN * turn.located_to[which])
