@@ -11,7 +11,8 @@ constraints are eliminated by as many solves as ``L`` has columns.  Directions w
 to there.  LAPACK finds all eigenvalues of ``T``; of a large ``T`` SLEPc finds the greatest.
 
 Round-off ``dT`` moves a simple eigenvalue by up to ``|dT| |z|`` for its right and left vectors ``w`` and ``z``, with
-``|w| = 1`` and ``z.w = 1`` (Wilkinson, The Algebraic Eigenvalue Problem, 1965, chapter 2).
+``|w| = 1`` and ``z.w = 1``, and one of two that meet by no more than ``(|dT| |T|)^(1/2)``, where ``z`` has no bound
+(Wilkinson, The Algebraic Eigenvalue Problem, 1965, chapter 2).
 """
 
 from __future__ import annotations
@@ -123,13 +124,14 @@ class Condensed:
         """All finite eigenvalues, or some where the mass has a rank above :data:`ALL`."""
         if self.rank > ALL:
             return self._some()
-        nu, right = np.linalg.eig(self.dual.T @ self.inverse)
+        matrix, size = self.dual.T @ self.inverse, np.linalg.norm(self.lower)
+        nu, right = np.linalg.eig(matrix)
         try:
             left = np.linalg.inv(right)
         except np.linalg.LinAlgError:
             left = np.linalg.pinv(right)
-        size = np.linalg.norm(self.lower)
-        noise = ROUNDED * size * max(np.linalg.norm(self.inverse), size) * np.linalg.norm(left, axis=1)
+        rounded = ROUNDED * size * max(np.linalg.norm(self.inverse), size)
+        noise = np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))
         order = np.argsort(-abs(nu), kind="stable")
         order = order[abs(nu[order]) > noise[order]]
         return Eigenpairs(nu[order], right[:, order], left[order], noise[order])
