@@ -59,7 +59,7 @@ class CriticalLoads:
         self._ahead = list[Meeting]()  # parts of the next step at which eigenvalues may meet
 
     def between(self, a: Side, b: Side, behind: Side | None, still: int) -> Told:
-        """What happens between two rows, in its order: eigenvalues that collide, real ones that pass through zero.
+        """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish.
 
         Steps are given one after the other, each with the row ``behind`` it; ``still`` eigenvalues are zero at all
         loads.  What is not clear is said.

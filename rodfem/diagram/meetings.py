@@ -59,7 +59,10 @@ class _Rows(NamedTuple):
 
 
 def meetings(row: Spectrum, before: Spectrum, behind: Spectrum, t: float = 1.0) -> list[Meeting]:
-    """What comes near zero between a row and its neighbours, at ``-t`` and one step ahead, in parts of that step."""
+    """What comes near zero between a ``row`` and its neighbours, in parts ``t`` of the step ahead.
+
+    They are a part ``t`` of that step ``before`` the row, and the whole of it ``behind`` it.
+    """
     if not (row.complete and row.right.shape[0] == before.right.shape[0] == behind.right.shape[0]):
         return []  # too many to find all of them, or sections have mass at some loads only
     count = len(row.values)

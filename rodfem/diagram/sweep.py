@@ -299,9 +299,9 @@ class Sweep:
             branch.unexplained.append(change)
             self.observer.warn(str(change))
         elif told.entered > 0:
-            self.observer.note(
-                f"  {told.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} "
-                "by no more than round-off"
+            self.observer.warn(
+                f"{told.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} by "
+                f"no more than round-off: the rows before, which count {a.negative}, may count too few."
             )
 
     def _within_bars(self, branch: Branch) -> None:

@@ -95,7 +95,10 @@ class Condensed:
     """A pencil on its unknowns with mass, in units of natural sizes, about a ``shift``."""
 
     def __init__(self, mass: sp.csr_matrix, solve: Solve, solve_transposed: Solve, shift: float) -> None:
-        """Take the mass, and what solves with ``S - shift M`` and its transpose for arrays (n, k)."""
+        """Take the ``mass``, and what solves with ``S - shift M`` for arrays (n, k): ``solve``, ``solve_transposed``.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where nothing has mass.
+        """
         self.solve, self.solve_transposed, self.shift, self.rows = solve, solve_transposed, shift, mass.shape[0]
         self.heavy, self.lower, self.dual = factors_of_mass(mass)
         self.rank = self.lower.shape[1]

@@ -290,7 +290,10 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             vectors += np.outer(mode.array_r.real, shares)
 
     def eliminated(self, target: float) -> Elimination | None:
-        """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
+        """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where it is singular.
+        """
         if self.system.comm.size > 1 or compat.COMPLEX:
             return None
         own, mass, kept = shared(self.matrix), shared(self.mass), self._shared.inverted
