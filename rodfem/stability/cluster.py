@@ -12,7 +12,6 @@ by their values or by the names of their motions: the vectors of a double eigenv
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +25,8 @@ from rodfem.tolerances import TINY
 
 BESIDE = 1e-3
 """Distance from zero, over their natural size, where those near it are sought: the matrix is singular there."""
+FARTHER = 3.0
+"""Times that distance, or that from the mean, eigenvalues are sought that were not found at first."""
 LEAST = 0.25
 """Share of a vector in an invariant subspace below which the vector does not belong to it."""
 
@@ -69,25 +70,26 @@ def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]
 
 def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
     """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`."""
-    found, chosen, values = members(pencil, real_span(pencil, cluster.basis), cluster, pencil.near)
+    found, chosen, values = members(pencil, real_span(pencil, cluster.basis), cluster)
     here = cluster_of(pencil, found, chosen)
     return Measured(float(((values - here.mean) ** 2).mean().real), values, here)
 
 
 def members(
-    pencil: NonsymmetricPencil, basis: np.ndarray, cluster: Cluster, near: Callable[[int, float], Frequencies]
+    pencil: NonsymmetricPencil, basis: np.ndarray, cluster: Cluster, *, left: bool = False
 ) -> tuple[Frequencies, list[int], np.ndarray]:
-    """Eigenvalues of a ``pencil`` ``near`` the mean of a ``cluster`` that are its own, by shares in its ``basis``.
+    """Eigenvalues of a ``pencil`` near the mean of a ``cluster`` that are its own, by shares in its ``basis``.
 
-    Returns what was found, the places of its own in that, and their values.  Of left vectors, which are orthogonal to
-    the right ones of all other eigenvalues, any share tells.  Right vectors are not orthogonal: those of rigid motions,
-    zero at all loads of a rod that floats, may have a greater share in the subspace than its own.  They are none of a
-    cluster away from zero.  Raises :class:`ConvergenceError`.
+    Their vectors are right ones, or ``left`` ones.  Returns what was found, the places of its own in that, and their
+    values.  Of left vectors, which are orthogonal to the right ones of all other eigenvalues, any share tells.  Right
+    vectors are not orthogonal: those of rigid motions, zero at all loads of a rod that floats, may have a greater share
+    in the subspace than its own.  They are none of a cluster away from zero.  Raises :class:`ConvergenceError`.
     """
     size, beside = cluster.size, BESIDE * pencil.system.scene.units.omega2
-    least = LEAST if near == pencil.near else REAL
-    for number in (size + 2, 3 * size + 10):
-        found = near(number, 0.97 * cluster.mean if abs(cluster.mean) > beside else -beside)
+    least = REAL if left else LEAST
+    shift = 0.97 * cluster.mean if abs(cluster.mean) > beside else -beside
+    for number, times in ((size + 2, 1.0), (3 * size + 10, FARTHER)):  # one beside the shift takes digits from others
+        found = pencil.near(number, cluster.mean + times * (shift - cluster.mean), left=left)
         inside = pencil.product(basis, found.weighed)
         energy = pencil.squares(found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy

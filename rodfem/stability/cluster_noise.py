@@ -64,7 +64,7 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     Raises :class:`ConvergenceError` where the left vectors of its eigenvalues are not found.
     """
     V, size = measured.cluster.basis, measured.cluster.size
-    found, chosen, _ = members(pencil, V, measured.cluster, pencil.left)
+    found, chosen, _ = members(pencil, V, measured.cluster, left=True)
     weighed = pencil.weighed(V)
     W = real_span(pencil, found.vectors[:, chosen])
     product = pencil.product(W, weighed)

@@ -18,7 +18,7 @@ Round-off ``dT`` moves a simple eigenvalue by up to ``|dT| |z|`` for its right a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -78,17 +78,22 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
 
 @dataclass(frozen=True)
 class Eigenpairs:
-    """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, ``right`` vectors (r, k) of norm one, ``left`` ones (k, r).
+    """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, and their ``right`` vectors (r, k), or those of ``T^t``.
 
-    They are biorthonormal.  ``noise`` (k,) is what round-off may make of ``nu``; ``vectors`` (n, k) are those of the
-    pencil, where they are known.
+    ``noise`` (k,) is what round-off may make of ``nu``.  Of all eigenvalues ``left`` vectors (k, r) are known, too:
+    both are biorthonormal, and right ones have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
     """
 
     nu: np.ndarray
     right: np.ndarray
-    left: np.ndarray
     noise: np.ndarray
+    left: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     vectors: np.ndarray | None = None
+
+    def at(self, places: slice | np.ndarray) -> Eigenpairs:
+        """Those at some places, without left vectors."""
+        vectors = None if self.vectors is None else self.vectors[:, places]
+        return Eigenpairs(self.nu[places], self.right[:, places], self.noise[places], vectors=vectors)
 
 
 class Condensed:
@@ -137,12 +142,12 @@ class Condensed:
         noise = np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))
         order = np.argsort(-abs(nu), kind="stable")
         order = order[abs(nu[order]) > noise[order]]
-        return Eigenpairs(nu[order], right[:, order], left[order], noise[order])
+        return Eigenpairs(nu[order], right[:, order], noise[order], left[order])
 
     def _some(self) -> Eigenpairs:
         """The :data:`SOME` greatest eigenvalues; left vectors are those within the span of the right ones."""
-        nu, noise, right = self.greatest(SOME)
-        return Eigenpairs(nu, right, np.linalg.pinv(right), noise, self.vectors(nu, right))
+        found = self.greatest(SOME)
+        return replace(found, left=np.linalg.pinv(found.right), vectors=self.vectors(found))
 
     @cached_property
     def right(self) -> np.ndarray:
@@ -150,31 +155,28 @@ class Condensed:
         pairs = self.pairs
         return times(self.inverse, pairs.right) / pairs.nu if pairs.vectors is None else pairs.vectors[self.heavy]
 
-    def greatest(self, number: int, *, left: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The ``number`` greatest ``nu`` (k,), or all finite ones where these are fewer, their noise, and vectors.
-
-        Vectors ``w`` (r, k) are ``left`` ones of ``T`` where these are asked for.
-        """
+    def greatest(self, number: int, *, left: bool = False) -> Eigenpairs:
+        """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones where these are fewer."""
         if self.rank <= max(DENSE, 3 * number) or (self.rank <= ALL and "pairs" in vars(self)):
-            pairs = self.pairs
-            vectors = pairs.left.T if left else pairs.right
-            return pairs.nu[:number], pairs.noise[:number], vectors[:, :number]
+            return (replace(self.pairs, right=self.pairs.left.T) if left else self.pairs).at(slice(number))
         first, last, solve = self.lower, self.dual, self.solve
         if left:
             first, last, solve = self.dual, self.lower, self.solve_transposed
         nu, w = krylov(lambda w: last.T @ solve(self.spread(w[:, None], first))[self.heavy, 0], self.rank, number)
         order = np.argsort(-abs(nu), kind="stable")[:number]
         noise = np.full(len(nu), TOLERANCE * abs(nu).max())
-        order = order[abs(nu[order]) > noise[order]]
-        return nu[order], noise[order], w[:, order]
+        return Eigenpairs(nu, w, noise).at(order[abs(nu[order]) > noise[order]])
 
-    def values(self, nu: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """Eigenvalues ``mu`` (k,) without imaginary parts that are ``noise`` (k,) of ``nu``."""
-        values = self.shift + 1.0 / nu
-        return np.where(abs(values.imag) * abs(nu) <= noise / abs(nu), values.real, values).astype(complex)
+    def values(self, pairs: Eigenpairs) -> np.ndarray:
+        """Eigenvalues ``mu`` (k,) without imaginary parts that are noise."""
+        values, size = self.shift + 1.0 / pairs.nu, abs(pairs.nu)
+        return np.where(abs(values.imag) * size <= pairs.noise / size, values.real, values).astype(complex)
 
-    def vectors(self, nu: np.ndarray, w: np.ndarray, *, left: bool = False) -> np.ndarray:
+    def vectors(self, pairs: Eigenpairs, *, left: bool = False) -> np.ndarray:
         """Vectors (n, k) of the pencil for those of ``T``, or ``left`` ones: ``z.S = mu z.M`` without conjugation."""
+        nu, w = pairs.nu, pairs.right
+        if pairs.vectors is not None:
+            return pairs.vectors
         if not left and "images" in vars(self):
             return times(self.images, w) / nu
         given = self.spread(w, self.dual if left else self.lower)

@@ -48,7 +48,7 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
 
     Raises :class:`ConvergenceError` if a right eigenvalue has no left partner, or the mesh has fewer of them.
     """
-    right, left = (find(2 * number) for find in (pencil.near_zero, pencil.left_near_zero))
+    right, left = (pencil.near_zero(2 * number, left=left) for left in (False, True))
     chosen = sorted(moving(right, number), key=lambda i: right.values[i].real)
     partners: list[int] = []
     for value in right.values[chosen]:

@@ -29,7 +29,7 @@ from rodfem.linalg.matrices import Shared, gathered, local_rows, places_in, shar
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
-from rodfem.stability.condensed import SHIFT, Condensed
+from rodfem.stability.condensed import SHIFT, Condensed, Eigenpairs
 from rodfem.stability.frequencies import REAL, Frequencies, in_order, named, orthonormal, product, squares
 from rodfem.stability.pencil import (
     FACTORS,
@@ -125,38 +125,23 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         small[np.searchsorted(used, rows), np.searchsorted(used, columns)] = values
         return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(used) else (0, 0.0)
 
-    def near(self, number: int, target: float) -> Frequencies:
+    def near(self, number: int, target: float, *, left: bool = False) -> Frequencies:
         """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
 
-        Fewer are returned only where the discretisation has no more finite ones.
+        Fewer are returned only where the discretisation has no more finite ones.  ``vectors`` are ``left`` ones where
+        these are asked for, ``z.S = mu z.M`` without conjugation.  They have no parts along free motions ``g``: of
+        ``S g = 0`` follows ``z.Mg = 0``.
         """
-        return self._near(number, target)
-
-    def near_zero(self, number: int) -> Frequencies:
-        """Return more than the ``number`` eigenvalues nearest zero, in ascending order of their real parts."""
-        return self.near(number + BEYOND, SHIFT * self.system.scene.units.omega2)
-
-    def left_near_zero(self, number: int) -> Frequencies:
-        """Return the same of the transposed pencil."""
-        return self.left(number + BEYOND, SHIFT * self.system.scene.units.omega2)
-
-    def left(self, number: int, target: float) -> Frequencies:
-        """Return those of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation.
-
-        They have no parts along free motions ``g``: of ``S g = 0`` follows ``z.Mg = 0``.
-        """
-        return self._near(number, target, left=True)
-
-    def _near(self, number: int, target: float, *, left: bool = False) -> Frequencies:
         with self.system.clock("stability"):
             condensed = self.condensed(target)
-            nu, noise, w = condensed.greatest(number + SPARE, left=left)
-            kept = slice(0, len(nu) - _half(nu))
-            nu, noise = nu[kept], noise[kept]
-            found = self._found(
-                condensed, condensed.values(nu, noise), noise / abs(nu).max(initial=0.0), nu, w[:, kept], left=left
-            )
+            pairs = condensed.greatest(number + SPARE, left=left)
+            pairs = pairs.at(slice(len(pairs.nu) - _half(pairs.nu)))
+            found = self._found(condensed, condensed.values(pairs), pairs, left=left)
             return named(self.system, [(in_order(found), self.turned)])[0]
+
+    def near_zero(self, number: int, *, left: bool = False) -> Frequencies:
+        """Return more than the ``number`` eigenvalues nearest zero, in ascending order of their real parts."""
+        return self.near(number + BEYOND, SHIFT * self.system.scene.units.omega2, left=left)
 
     @cached_property
     def spectrum(self) -> Spectrum:
@@ -176,10 +161,8 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def of(self, spectrum: Spectrum, places: np.ndarray) -> Frequencies:
         """Frequencies of some eigenvalues of a ``spectrum`` of this state, in its order and not named yet."""
         pairs, values = spectrum.condensed.pairs, spectrum.values[places] / spectrum.one
-        errors, nu = pairs.noise[places] / abs(pairs.nu).max(initial=0.0), pairs.nu[places]
-        known = None if pairs.vectors is None else pairs.vectors[:, places]
-        found = self._found(spectrum.condensed, values, errors, nu, pairs.right[:, places], known)
-        return replace(found, floor=spectrum.floor)
+        found = self._found(spectrum.condensed, values, pairs.at(places))
+        return replace(found, floor=spectrum.floor, errors=pairs.noise[places] / abs(pairs.nu).max(initial=0.0))
 
     def shares(self, basis: np.ndarray) -> np.ndarray:
         """Share (k,) of the vector of each eigenvalue of the spectrum in the span of a real ``basis`` (n, m)."""
@@ -208,24 +191,11 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             self._condensed = {target: Condensed(mass, solve, transposed, shift)}  # factors are those of one shift
         return self._condensed[target]
 
-    def _found(
-        self,
-        condensed: Condensed,
-        values: np.ndarray,
-        errors: np.ndarray,
-        nu: np.ndarray,
-        w: np.ndarray,
-        known: np.ndarray | None = None,
-        *,
-        left: bool = False,
-    ) -> Frequencies:
-        """Frequencies of ``values`` (k,) in natural units, with their ``errors``, of pairs ``nu``, ``w`` of ``T``.
-
-        Their vectors may be ``known`` (n, k).
-        """
-        units = self.system.scene.units
-        vectors = (condensed.vectors(nu, w, left=left) if known is None else known)[self._own]
-        weighed = condensed.spread(w)[self._own] if units.ordinary and not (self._free or left) else None
+    def _found(self, condensed: Condensed, values: np.ndarray, pairs: Eigenpairs, *, left: bool = False) -> Frequencies:
+        """Frequencies of ``values`` (k,) in natural units, of ``pairs`` of ``T``."""
+        units, errors = self.system.scene.units, pairs.noise / abs(pairs.nu).max(initial=0.0)
+        vectors = condensed.vectors(pairs, left=left)[self._own]
+        weighed = condensed.spread(pairs.right)[self._own] if units.ordinary and not (self._free or left) else None
         if not units.ordinary:
             values, vectors = values * units.omega2, vectors * self.sizes.array_r.real[:, None]
         if self._free and not left:

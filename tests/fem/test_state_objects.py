@@ -156,7 +156,7 @@ def test_a_stale_pencil_refuses() -> None:
     assert second.near(2, 0.0).values != pytest.approx(found.values, rel=1e-3)
     asked = {
         "near": lambda: first.near(2, 0.0),
-        "left": lambda: first.left(2, 0.0),
+        "left": lambda: first.near(2, 0.0, left=True),
         "weighed": lambda: first.weighed(found.vectors),
         "orthonormal": lambda: first.orthonormal(found.vectors),
         "asymmetry": first.asymmetry,
