@@ -1,7 +1,8 @@
 """Work of a computation in counts, which have no noise: what a run costs, whatever else the machine does.
 
 Factorisations, columns solved for, and assembled forms are those of compiled code, on one rank.  Newton's iterations,
-counted states and compiled steps that fell back to Python are those of Python's classes.
+counted states and compiled steps that fell back to Python are those of Python's classes.  Rows and special points are
+recorded with them: a count over its number of rows is what one of them costs.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+import rodfem
 from rodfem.continuation.compiled_step import CompiledStep
 from rodfem.fem.newton import NewtonResult
 from rodfem.linalg.compiled import module
@@ -36,6 +38,14 @@ def compiled() -> dict[str, int]:
         "factorisations": chain.chain_factored(),
         "solves": chain.chain_solved_columns(),
         "assemblies": assembly.assemblies(),
+    }
+
+
+def size(diagram: rodfem.Diagram) -> dict[str, int]:
+    """Numbers of rows and of special points of a diagram, which its counts are for."""
+    return {
+        "rows": sum(len(b.points) for b in diagram.branches),
+        "special points": sum(len(b.special) for b in diagram.branches),
     }
 
 

@@ -18,12 +18,13 @@ from golden_cases import (
     cases,
     distinct,
     numbers,
-    record,
+    recorded,
     single_branches,
+    trace,
 )
 from literature.test_classics import CRITICAL
 from mpi4py import MPI
-from work import counted
+from work import counted, size
 from work import recorded as recorded_work
 
 NUMBERS = numbers()
@@ -60,10 +61,11 @@ def test_nothing_has_changed(name: str) -> None:
     Nor does it cost more: counts of work are compared on one rank, and may only fall.
     """
     with counted() as work:
-        found, recorded = record(cases()[name](), error_bars=name in VARIED), NUMBERS[name]
+        diagram = trace(cases()[name](), error_bars=name in VARIED)
+    found, known = recorded(diagram), NUMBERS[name]
     for key in ("name", "ended", "indices"):
-        assert [b[key] for b in found] == [b[key] for b in recorded]
-    for branch, old in zip(found, recorded, strict=True):
+        assert [b[key] for b in found] == [b[key] for b in known]
+    for branch, old in zip(found, known, strict=True):
         for key in ("kind", "index", "zero"):
             assert [s[key] for s in branch["special"]] == [s[key] for s in old["special"]], branch["name"]
         for s, t in zip(branch["special"], old["special"], strict=True):
@@ -71,6 +73,7 @@ def test_nothing_has_changed(name: str) -> None:
             assert s["load"] == pytest.approx(t["load"], abs=allowed, rel=0), branch["name"]
             assert s.get("omega2") == (pytest.approx(t["omega2"], rel=1e-8) if "omega2" in t else None)
     most = {kind: NOISE * count + 2 for kind, count in recorded_work()[name].items()}
+    work |= size(diagram)
     assert MPI.COMM_WORLD.size > 1 or {kind: count for kind, count in work.items() if count > most[kind]} == {}
 
 

@@ -9,15 +9,16 @@ import json
 import sys
 from pathlib import Path
 
-from golden_cases import VARIED, cases, record
-from work import RECORD, counted
+from golden_cases import VARIED, cases, record, trace
+from work import RECORD, counted, size
 
 if __name__ == "__main__":
     numbers, costs = {}, {}
     for name, scene in cases().items():
         if sys.argv[1:] == ["work"]:
             with counted() as costs[name]:
-                record(scene(), error_bars=name in VARIED)
+                diagram = trace(scene(), error_bars=name in VARIED)
+            costs[name] |= size(diagram)
             print(name, costs[name], flush=True)
         else:
             numbers[name] = record(scene())
