@@ -24,7 +24,7 @@ from rodfem.codim2.curve import Half, Tracer
 from rodfem.codim2.errors import Errors, criterion_of, errors_of, not_integrated
 from rodfem.codim2.locus import Locus, Mark
 from rodfem.codim2.plane import Criterion, Interval, LocusPoint, Plane
-from rodfem.codim2.unstable import NEAREST, UNSTABLE, all_looked_at, unstable
+from rodfem.codim2.unstable import NEAREST, UNSTABLE, unstable
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, KINDS
@@ -238,4 +238,4 @@ class _Followed:
         if self.criterion.others != UNSTABLE:
             return ""
         x = self.plane.at(self.first.p, self.first.x)
-        return "" if all_looked_at(NonsymmetricSolver(self.solver.system).at(x)) else f"{NEAREST}."
+        return "" if NonsymmetricSolver(self.solver.system).at(x).spectrum.complete else f"{NEAREST}."

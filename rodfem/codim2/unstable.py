@@ -30,8 +30,3 @@ def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None
     chosen = np.argsort(own, kind="stable")[: len(own) - size]
     values, noise = spectrum.values[chosen], np.maximum(spectrum.zero, spectrum.noise[chosen])
     return int(((values.real < -noise) | (abs(values.imag) > np.maximum(noise, MET * abs(values)))).sum())
-
-
-def all_looked_at(pencil: NonsymmetricPencil) -> bool:
-    """Whether the mesh is so coarse that all its eigenvalues are."""
-    return pencil.spectrum.complete
