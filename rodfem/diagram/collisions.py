@@ -205,10 +205,10 @@ class Collisions:
         try:
             return self._located(here, there, cluster, just_met=just_met)
         except ConvergenceError:
-            if abs(other.discriminant) < (ALIKE * scale) ** 2:
-                return self._at_once(here, there, other)
             if other.discriminant < 0:
                 return None
+            if abs(other.discriminant) < (ALIKE * scale) ** 2:
+                return self._at_once(here, there, other)
             raise
 
     def _at_once(self, here: Side, there: Side, measured: Measured) -> Critical:
@@ -229,6 +229,8 @@ class Collisions:
         measured, width = Measuring(self.solver, self.eigensolver, here.x), abs(here.load - there.load)
         located = located_flutter(measured, cluster, (there.load + here.load) / 2, width)
         load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
+        if uncertainty > width:
+            raise ConvergenceError("they part so slowly that where they met is not known to a step")
         outside = (load - there.load) * (here.load - there.load) < 0
         if apart <= uncertainty or (outside and just_met and apart < JUST_MET * width):
             load, uncertainty = there.load, uncertainty + apart  # at that row, at which they still count as real

@@ -299,7 +299,10 @@ class Sweep:
             branch.unexplained.append(change)
             self.observer.warn(str(change))
         elif told.entered > 0:
-            self.observer.warn(
+            say = (
+                self.observer.note if a.negative else self.observer.warn
+            )  # of unstable rows only the number is in doubt
+            say(
                 f"{told.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} by "
                 f"no more than round-off: the rows before, which count {a.negative}, may count too few."
             )
