@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 41319,
+    "lines of Python": 41336,
     "files of Python": 290,
     "lines of C": 1702,
     "module constants with a number": 563,
