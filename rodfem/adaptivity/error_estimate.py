@@ -95,6 +95,7 @@ class Enriched:
         self.solver = BranchSolver(self.system)
         self.transfer = Transfer(solver.system, self.system)
         self.origins: list[tuple[SpecialPoint, Origin, float]] = []
+        self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
         self._ordinate = OrdinateBound(solver.shape, self.solver.shape)
         weights = weights_of(self.system.scene)
         self._indicators = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
@@ -132,11 +133,20 @@ class Enriched:
         special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
 
     def again(self, point: Point, *, fixed_load: bool) -> Again:
-        """Solve for a point on the richer discretisation, at its load or across its tangent.
+        """Solve for a point on the richer discretisation, at its load, once, or across its tangent.
 
         One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` where
         there is no such point.
         """
+        key = id(point), self.system.damping
+        if fixed_load and key in self._at_loads:
+            return self._at_loads[key][1]
+        found = self._again(point, fixed_load=fixed_load)
+        if fixed_load:
+            self._at_loads[key] = point, found
+        return found
+
+    def _again(self, point: Point, *, fixed_load: bool) -> Again:
         system, x = self.system, self.transfer(point.x, state=True)
         first = x.copy()
         row = self.solver.axis

@@ -28,7 +28,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import across
-from rodfem.stability.inertia import NULL
+from rodfem.stability.inertia import NULL, ROUGH, Factored
 from rodfem.stability.motion_names import SHARE, MotionNames
 from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
 from rodfem.stability.round_off import SPARE, decide, quotient_error
@@ -37,7 +37,7 @@ from rodfem.stability.soft_mode import Judgement, SoftMode
 REFINEMENTS = 2
 """Meshes that are tried beyond that of a state until the signs of its soft modes are decided."""
 SURE = 0.1
-"""Part of the estimated distance of the nearest eigenvalue from zero within which there is none."""
+"""Part of an eigenvalue by which its quotients on two meshes differ if the mesh decides its sign, at most."""
 
 
 class SoftStates:
@@ -91,15 +91,11 @@ class SoftStates:
     def _doubtful(self, point: Point, fixed_load: bool, *, compare: bool) -> int | None:
         """Number of eigenvalues nearest zero to be judged besides soft ones; None where there is nothing to judge.
 
-        Those of another sign on the richer mesh; if none is soft, the one nearest zero is compared with that of there.
+        Those of another sign on the richer mesh, and the one nearest zero if it has another value there.
         """
         nearest, self.uncompared = self._nearest(point), ""
-        if not (compare and self._richer):
-            return None if nearest else 0
-        differing = self._differing(point, fixed_load)
-        if self.uncompared:
-            return None if nearest else 0
-        return differing or int(nearest > 0)
+        differing = self._differing(point, fixed_load) if compare and self._richer else 0
+        return None if nearest and not differing else differing
 
     def _nearest(self, point: Point) -> float:
         """Estimated distance of the nearest eigenvalue from zero; 0 where one factorisation does not tell the index."""
@@ -118,13 +114,23 @@ class SoftStates:
                 below = found.below(-inertia.tolerance)
                 if below == point.negative:
                     self.uncompared = "" if again.resolved else _other_state(point.load, again)
-                    return 0
+                    return int(again.resolved and self._moved(point, found))
                 index = decide(found).index
             except ConvergenceError as trouble:  # no such state, or arithmetic leaves too many signs open there
                 self.uncompared = str(trouble)
                 return 0
         own = point.zero - self.solver.system.active_drifts(point.x)
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
+
+    def _moved(self, point: Point, there: Factored) -> bool:
+        """Whether the eigenvalue nearest zero has another value at the same point on the richer mesh, by quotients."""
+        here, richer = self.solver.inertia.at(point.x), self._companion(0)
+        here.count()
+        with self.solver.inertia.afresh():
+            v = here.nearest(1, ROUGH)[1][0]
+        w = _unit(richer.system, richer.transfer(v, state=False))
+        value, other = (x.dot(found.matrix * x).real + found.shift for x, found in ((v, here), (w, there)))
+        return bool(abs(other - value) > SURE * abs(value))
 
     def judgement(
         self, point: Point, near: NearZero, *, fixed_load: bool, family: bool, vanishing: Sequence[PETSc.Vec]
@@ -178,10 +184,11 @@ class SoftStates:
         left out, too, by their vectors: on a richer mesh others may be nearer to zero.
         """
         out, values, still = modes, np.array([m.value for m in modes]), list(vanishing)
+        soft = bool((abs(values) < soft_limit(self.solver.inertia)).any())
         for level in range(REFINEMENTS):
             richer = self._companion(level)
             try:
-                point, again = _on(richer, point, fixed_load, soft=True)
+                point, again = _on(richer, point, fixed_load, soft=soft)
                 still = [_unit(richer.system, richer.transfer(v, state=False)) for v in still]
                 finer, rounding = _nearest(richer.solver, point, len(modes), own, still)
             except ConvergenceError:

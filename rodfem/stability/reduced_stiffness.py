@@ -39,8 +39,8 @@ NEAR = 1e-3
 """Eigenvalue of H, over the lowest bending one, below which S is too near singular to be solved with."""
 SOFT = 1e-6
 """Eigenvalue of H, over the lowest bending one, below which it may be round-off."""
-DIFFERENCE = 1e-4
-"""Distance of the states whose matrices are differenced, in the metric."""
+DIFFERENCE, AHEAD = 1e-4, 1e-6
+"""Distances of the states whose matrices are differenced, in the metric: on both sides, and ahead alone."""
 ROTATED = 1.0
 """Size of ``W^t M W - 1`` above which a border has become that of other modes."""
 ROUGH, DEPENDENT = 1e-3, 1e-3
@@ -122,7 +122,7 @@ class Condensation:
         if abs(values[soft]) < SOFT * inertia.scale:
             doubt = max(doubt, quotient_error(inertia.at(x).matrix, self.vector(W @ vectors[:, soft])))
         rotated = float(np.linalg.norm(inertia.sum(W.T @ inertia.weighed(W)) - np.eye(W.shape[1]), 2))
-        return ReducedStiffness(H, self._rate(x, tangent, W), far, W, rotated, doubt)
+        return ReducedStiffness(H, self._rate(x, tangent, H, W), far, W, rotated, doubt)
 
     def _by_the_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
         """``far``, H and W where S is nearly singular, or is."""
@@ -136,19 +136,17 @@ class Condensation:
         H = -np.array([g for _, g in solved])
         return far, _symmetric(H), np.stack([w.array_r for w, _ in solved], axis=1)
 
-    def _rate(self, x: PETSc.Vec, tangent: PETSc.Vec, W: np.ndarray) -> np.ndarray:
-        """``W^t S' W`` along a tangent by a central difference, which the phase conditions of ``x`` are added to."""
-        system, inertia, out = self.system, self.inertia, np.zeros((W.shape[1],) * 2)
+    def _rate(self, x: PETSc.Vec, tangent: PETSc.Vec, H: np.ndarray, W: np.ndarray) -> np.ndarray:
+        """``W^t S' W`` along a tangent by a difference from ``W^t S W = H``, with the phase conditions of ``x``."""
+        system, inertia = self.system, self.inertia
         system.set_phase(x)
-        beside = [x + tangent * (sign * DIFFERENCE) for sign in (1.0, -1.0)]
-        for state, sign in zip(beside, (1.0, -1.0), strict=True):
-            inertia._assemble(state, system.at(state))
-            out += sign / (2 * DIFFERENCE) * inertia.sum(W.T @ self._times(W))
+        ahead = x + tangent * AHEAD
+        inertia._assemble(ahead, system.at(ahead))
+        out = (inertia.sum(W.T @ self._times(W)) - H) / AHEAD
         inertia.filled += 1
         phase = system.phase
         if phase.rows:
-            there = [system.at(state).generators for state in beside]
-            rates = (there[0] - there[1]) / (2 * DIFFERENCE)
+            rates = (system.at(ahead).generators - system.at(x).generators) / AHEAD
             for i, weights in phase.broken.items():
                 rate = system.generators.vector(weights @ rates).array_r
                 term = np.outer(inertia.sum(W.T @ inertia.weighed(rate[:, None])[:, 0]), self._row(W, system.drifts[i]))
