@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 41334,
+    "lines of Python": 41332,
     "files of Python": 290,
     "lines of C": 1702,
     "module constants with a number": 563,
