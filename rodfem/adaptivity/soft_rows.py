@@ -64,11 +64,7 @@ class SoftRows:
             self._change_at_fold(fold, branch.points)
 
     def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
-        """Make rows of the special points at which an eigenvalue is zero that is undecided at the rows after or before.
-
-        That is a zero of the mesh, not of the rod, if two rows next to one another are undecided, or one where the
-        richer mesh has no such point: a single one may be next to a special point by chance.
-        """
+        """Make rows of special points that are zeros of the mesh, not of the rod."""
         rows = [p for p in branch.points if not any(p is s.point for s in branch.special)]
         left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
         for s in compress(branch.special, left_out):
@@ -78,8 +74,8 @@ class SoftRows:
     def _is_family(self, branch: Branch) -> bool:
         """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
         span, singular = self.meshes.solvers[0].system.scene.span, {id(s.point) for s in branch.special}
-        rows = branch.points[1:] if branch.parent else branch.points  # a pitchfork begins without a slope
-        rows = [p for p in rows if id(p) not in singular]
+        begin = 1 if branch.parent else 0  # a pitchfork begins without a slope
+        rows = [p for p in branch.points[begin:] if id(p) not in singular]
         return bool(rows) and all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
 
     @staticmethod
@@ -122,11 +118,13 @@ class SoftRows:
 
 
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
-    """Whether a ``special`` point has as many undecided ones of the ``rows`` next to it, on one side, as say so.
+    """Whether a ``special`` point is the mesh's, by the ``rows``: on one side the next two are undecided.
 
-    What is undecided at all of the rows is none of it.
+    One is enough if the richer mesh has no such point; a single one may be next to a special point by chance.  Not if
+    the decided indices on both sides differ by its own change, and as much is undecided: that is another mode.
     """
-    number, at = 2 if isfinite(special.error_estimate) else 1, special.point.arclength
-    still = min((p.undecided for p in rows), default=0)
-    sides = [p for p in reversed(rows) if p.arclength < at], [p for p in rows if p.arclength > at]
-    return special.kind.singular and any(sum(p.undecided > still for p in side[:number]) == number for side in sides)
+    first = sum(p.arclength < special.point.arclength for p in rows)
+    before, after, number = rows[:first][::-1], rows[first:], 2 if isfinite(special.error_estimate) else 1
+    doubtful = any(sum(p.undecided > 0 for p in side[:number]) == number for side in (before, after))
+    change = [(q.negative - p.negative, q.undecided - p.undecided) for p, q in zip(before[:1], after[:1], strict=False)]
+    return special.kind.singular and doubtful and change != [(special.negative_after - special.negative_before, 0)]

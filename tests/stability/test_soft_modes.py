@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from math import atan2, exp, log, pi, sqrt
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,11 @@ from rodfem import (
     pinned,
     trace,
 )
+from rodfem.adaptivity.soft_rows import _is_of_the_mesh
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Point
+from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_pieces import UNDECIDED, UNSTABLE, pieces_of
@@ -277,3 +280,26 @@ def test_a_sign_that_is_the_error_of_the_mesh(elements: int) -> None:
         assert row.negative <= (row.load > 1) <= row.negative + row.undecided or row is point.point
     assert sum(row.undecided for row in found[0].points if row.load < 1.6) == 0
     assert any("the index is 0 or 1" in sentence for sentence in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "of_the_mesh"),
+    [
+        (((0, 0), (0, 0)), ((1, 0), (1, 0)), False),
+        (((0, 1), (0, 1)), ((1, 1), (1, 1)), False),  # another mode is undecided all along
+        (((0, 1), (0, 1)), ((0, 1), (0, 1)), True),  # nothing changes that is decided
+        (((1, 0), (1, 0)), ((0, 1), (0, 1)), True),  # it may be 1 on both sides
+        (((0, 0), (0, 0)), ((0, 1), (1, 0)), False),  # a load asked for next to the branch point
+    ],
+)
+def test_a_zero_of_the_mesh_by_the_rows_beside_it(
+    before: tuple[tuple[int, int], ...], after: tuple[tuple[int, int], ...], of_the_mesh: bool
+) -> None:
+    """Rows by their decided index and what is undecided, on both sides of a branch point 0 -> 1, or 1 -> 0."""
+    rows = [SimpleNamespace(arclength=float(i), negative=n, undecided=u) for i, (n, u) in enumerate((*before, *after))]
+    change = (1, 0) if before[0][0] else (0, 1)
+    special = SimpleNamespace(
+        point=SimpleNamespace(arclength=1.5), kind=BRANCH_POINT, error_estimate=1e-3,
+        negative_before=change[0], negative_after=change[1],
+    )  # fmt: skip
+    assert _is_of_the_mesh(special, rows) == of_the_mesh  # type: ignore[arg-type]
