@@ -30,6 +30,7 @@ from slepc4py import SLEPc
 
 from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
+from rodfem.tolerances import TINY
 
 SHIFT = -10.0
 """Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
@@ -80,20 +81,24 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
 class Eigenpairs:
     """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, and their ``right`` vectors (r, k), or those of ``T^t``.
 
-    ``noise`` (k,) is what round-off may make of ``nu``.  Of all eigenvalues ``left`` vectors (k, r) are known, too:
-    both are biorthonormal, and right ones have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
+    ``noise`` (k,) is what round-off may make of ``nu``, ``error`` (k,) the residual over the size of ``T``; where two
+    meet the former is its root.  Of all eigenvalues ``left`` vectors (k, r) are known, too: both are biorthonormal, and
+    right ones have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
     """
 
     nu: np.ndarray
     right: np.ndarray
     noise: np.ndarray
+    error: np.ndarray
     left: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     vectors: np.ndarray | None = None
 
     def at(self, places: slice | np.ndarray) -> Eigenpairs:
         """Those at some places, without left vectors."""
         vectors = None if self.vectors is None else self.vectors[:, places]
-        return Eigenpairs(self.nu[places], self.right[:, places], self.noise[places], vectors=vectors)
+        return Eigenpairs(
+            self.nu[places], self.right[:, places], self.noise[places], self.error[places], vectors=vectors
+        )
 
 
 class Condensed:
@@ -140,9 +145,10 @@ class Condensed:
             left = np.linalg.pinv(right)
         rounded = ROUNDED * size * max(np.linalg.norm(self.inverse), size)
         noise = np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))
+        error = np.linalg.norm(matrix @ right - right * nu, axis=0) / max(abs(nu).max(), TINY)
         order = np.argsort(-abs(nu), kind="stable")
         order = order[abs(nu[order]) > noise[order]]
-        return Eigenpairs(nu[order], right[:, order], noise[order], left[order])
+        return Eigenpairs(nu[order], right[:, order], noise[order], error[order], left[order])
 
     def _some(self) -> Eigenpairs:
         """The :data:`SOME` greatest eigenvalues; left vectors are those within the span of the right ones."""
@@ -175,8 +181,8 @@ class Condensed:
             first, last, solve = self.dual, self.lower, self.solve_transposed
         nu, w = krylov(lambda w: last.T @ solve(self.spread(w[:, None], first))[self.heavy, 0], self.rank, number)
         order = np.argsort(-abs(nu), kind="stable")[:number]
-        noise = np.full(len(nu), TOLERANCE * abs(nu).max())
-        return Eigenpairs(nu, w, noise).at(order[abs(nu[order]) > noise[order]])
+        error, noise = np.full(len(nu), TOLERANCE), np.full(len(nu), TOLERANCE * abs(nu).max())
+        return Eigenpairs(nu, w, noise, error).at(order[abs(nu[order]) > noise[order]])
 
     def values(self, pairs: Eigenpairs) -> np.ndarray:
         """Eigenvalues ``mu`` (k,) without imaginary parts that are noise."""

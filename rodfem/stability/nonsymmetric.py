@@ -161,8 +161,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def of(self, spectrum: Spectrum, places: np.ndarray) -> Frequencies:
         """Frequencies of some eigenvalues of a ``spectrum`` of this state, in its order and not named yet."""
         pairs, values = spectrum.condensed.pairs, spectrum.values[places] / spectrum.one
-        found = self._found(spectrum.condensed, values, pairs.at(places))
-        return replace(found, floor=spectrum.floor, errors=pairs.noise[places] / abs(pairs.nu).max(initial=0.0))
+        return replace(self._found(spectrum.condensed, values, pairs.at(places)), floor=spectrum.floor)
 
     def shares(self, basis: np.ndarray) -> np.ndarray:
         """Share (k,) of the vector of each eigenvalue of the spectrum in the span of a real ``basis`` (n, m)."""
@@ -193,7 +192,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def _found(self, condensed: Condensed, values: np.ndarray, pairs: Eigenpairs, *, left: bool = False) -> Frequencies:
         """Frequencies of ``values`` (k,) in natural units, of ``pairs`` of ``T``."""
-        units, errors = self.system.scene.units, pairs.noise / abs(pairs.nu).max(initial=0.0)
+        units = self.system.scene.units
         vectors = condensed.vectors(pairs, left=left)[self._own]
         weighed = condensed.spread(pairs.right)[self._own] if units.ordinary and not (self._free or left) else None
         if not units.ordinary:
@@ -202,7 +201,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             vectors = vectors.astype(complex)
             self._complete(values, vectors)
         weighed = self.weighed(vectors) if weighed is None else weighed
-        return Frequencies(values, errors, (), vectors, weighed, units.omega2, self.floating)
+        return Frequencies(values, pairs.error, (), vectors, weighed, units.omega2, self.floating)
 
     def motion(self, basis: np.ndarray) -> str:
         """Type of the motion spanned by a ``basis`` (n, k)."""
