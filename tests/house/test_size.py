@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 39944,
+    "lines of Python": 39942,
     "files of Python": 283,
     "lines of C": 1452,
     "module constants with a number": 518,
