@@ -26,7 +26,7 @@ from petsc4py import PETSc
 import rodfem.fem.system
 from benchmarks.common import ROOT, exponent, machine, measured, milliseconds, table, versions
 from benchmarks.store import Store
-from rodfem.continuation.corrector import Corrector
+from rodfem.continuation.regular_point import RegularPoints
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.linalg.matrices import gathered
@@ -90,18 +90,15 @@ def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
         found = assessor.inertia.at(x)
         return lambda: found.below(found.shift + 1e-3)
     if method == "index":
-        corrector = Corrector(assessor.inertia)
-        return lambda: corrector.factor(x)
+        regular = RegularPoints(assessor.inertia)
+        return lambda: regular.at(x)
     if method == "assembly":
         return lambda: assessor.inertia.at(x)
     if method == "solves":
         found = assessor.inertia.at(x)
         found.below(0.0)
-        right = PETSc.Mat().createDense(((len(x.array_r), None), (None, 2)), comm=PETSc.COMM_WORLD)
-        right.setUp()
-        right.assemble()
-        solved = right.duplicate()
-        return lambda: found.factors.solve_all(right, solved)
+        right = np.zeros((x.local_size, 2))
+        return lambda: found.factors.solve_all(right)
     spectrum = assessor.spectrum if method in ("eigenvalues", "proof", "scipy", "dense QZ") else None
     if spectrum is not None and method in ("eigenvalues", "proof"):
         assessor.system.set_phase(x)
@@ -346,8 +343,8 @@ load of the machine between {low:.1f} and {high:.1f}.
 The state is the straight telephone cord at lam = {LOAD:g}; {NUMBER} left-most eigenvalues are asked for. A time is the
 median of repeated judgements after a first one, which makes the symbolic factorisation (as along a branch), and
 contains the assembly. `factorisation` is one numeric LDL^t of the saddle matrix with its inertia, without assembly;
-`index` is what the index costs along a branch: the one factorisation that serves Newton's method and the tangent as
-well, and two columns more in its solves, to know how far from zero the nearest eigenvalue is; its ratio to a
+`index` is what the index costs along a branch: the one factorisation that gives the tangent,
+too, and two columns more in its solves, to know how far from zero the nearest eigenvalue is; its ratio to a
 factorisation is that of medians taken in turn in one process.
 `count` is the index of a state by itself, from two factorisations; `eigenvalues` are the left-most ones alone, all
 methods below it have the index too. `scipy` is `eigs` with shift-invert (SuperLU) on the same matrices and shift,

@@ -1,8 +1,8 @@
 """Work of a computation in counts, which have no noise: what a run costs, whatever else the machine does.
 
-Factorisations, columns solved for, and assembled forms are those of compiled code, on one rank.  Newton's iterations,
-counted states and compiled steps that fell back to Python are those of Python's classes.  Rows and special points are
-recorded with them: a count over its number of rows is what one of them costs.
+Factorisations, columns solved for, and assembled forms are those of compiled code, on one rank.  Newton's iterations
+and counted states are those of Python's classes.  Rows and special points are recorded with them: a count over its
+number of rows is what one of them costs.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import Any
 from unittest import mock
 
 import rodfem
-from rodfem.continuation.compiled_step import CompiledStep
 from rodfem.fem.newton import NewtonResult
 from rodfem.linalg.compiled import module
 from rodfem.stability.inertia import Factored
@@ -52,7 +51,7 @@ def size(diagram: rodfem.Diagram) -> dict[str, int]:
 @contextmanager
 def counted() -> Iterator[dict[str, int]]:
     """Counts of the block of a ``with`` statement, complete at its end."""
-    counts = {"iterations": 0, "counted states": 0, "steps in Python": 0}
+    counts = {"iterations": 0, "counted states": 0}
 
     def wrapped(function: Callable[..., Any], name: str, of: Callable[[Any, Any], int]) -> Callable[..., Any]:
         def wrapper(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -66,7 +65,6 @@ def counted() -> Iterator[dict[str, int]]:
     patches = (
         (NewtonResult, "__init__", "iterations", lambda made, _: made.iterations),
         (Factored, "count", "counted states", lambda *_: 1),
-        (CompiledStep, "__call__", "steps in Python", lambda _, made: int(made is None)),
     )
     started = [mock.patch.object(c, m, wrapped(getattr(c, m), name, of)) for c, m, name, of in patches]
     for patch in started:

@@ -101,7 +101,7 @@ class SoftStates:
         """Estimated distance of the nearest eigenvalue from zero; 0 where one factorisation does not tell the index."""
         if point.nearest:
             return point.nearest
-        regular = self.solver.corrector.factor(point.x)
+        regular = self.solver.regular.at(point.x)
         return 0.0 if regular is None or regular.index is None else regular.index.nearest
 
     def _differing(self, point: Point, fixed_load: bool) -> int:

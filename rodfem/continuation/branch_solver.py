@@ -10,12 +10,11 @@ from math import inf
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.compiled_step import Checked, CompiledStep
-from rodfem.continuation.corrector import STEPS, Corrector
 from rodfem.continuation.prediction import across_orbit, predict
+from rodfem.continuation.regular_point import RegularPoints
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, limits
+from rodfem.fem.newton import NewtonResult, correct
 from rodfem.fem.state import Energies
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
@@ -24,7 +23,6 @@ from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.round_off import decide
 from rodfem.stability.symmetric import SymmetricSolver
-from rodfem.tolerances import NEGLIGIBLE
 
 ASIDE = 0.1
 """How far beside a saddle the way down goes on, in the metric."""
@@ -46,8 +44,6 @@ class Step:
         Cosine between the direction of the prediction and the tangent.
     length
         Distance from the last row, in the metric.
-    energies
-        Its energies, where they are known.
     """
 
     x: PETSc.Vec
@@ -57,7 +53,6 @@ class Step:
     index: Index | None = None
     aligned: float = -1.0
     length: float = 0.0
-    energies: Energies | None = None
 
 
 class BranchSolver(StaticSolver):
@@ -70,9 +65,7 @@ class BranchSolver(StaticSolver):
         """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
         super().__init__(system)
         self.inertia = Inertia(system)
-        self.corrector = Corrector(self.inertia)
-        compiled = self.corrector.compiled if system.scene.conservative else None
-        self._whole = None if compiled is None else CompiledStep(compiled)
+        self.regular = RegularPoints(self.inertia)
         self.modes = spectrum
         self.spectrum = SymmetricSolver(self.inertia) if spectrum else None
 
@@ -112,15 +105,6 @@ class BranchSolver(StaticSolver):
         """Whether an equilibrium has more zero eigenvalues than symmetries that it breaks."""
         found = self.inertia.at(x)
         return found.count().zero > found.drifts
-
-    def at_load(
-        self, guess: PETSc.Vec, load: float, reach: float = 1e3, *, nearby: bool = False
-    ) -> tuple[PETSc.Vec, NewtonResult]:
-        """As for any equilibrium, with the symmetric factors unless they are too near singular."""
-        x = guess.copy()
-        self.system.set_load(x, load)
-        outcome = self.corrector.correct(x, self.axis, reach=reach)
-        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach, nearby=nearby)
 
     def point(
         self,
@@ -176,16 +160,10 @@ class BranchSolver(StaticSolver):
     def step(self, known: Sequence[Point], s: float, bounds: tuple[float, float], reach: float) -> Step:
         """Predict from the ``known`` rows the equilibrium at arclength ``s``, and correct the prediction.
 
-        In one call of compiled code where that serves.  A prediction whose load is not within the ``bounds`` is not
+        A prediction whose load is not within the ``bounds`` is not
         corrected, nor one that turns back; ``reach`` bounds a correction, in the metric.
         """
         last, system = known[-1], self.system
-        if self._whole is not None:
-            made = self._whole(known, s, bounds, limits(system, STEPS, reach, TOLERANCE), NEGLIGIBLE)
-            if made is not None:
-                index = self.corrector.index(made.found, made.below, made.nearest)
-                numbers = made.aligned, made.length, made.energies
-                return Step(made.x, system.scalar(made.x), made.outcome, made.tangent, index, *numbers)
         x, direction = predict(known, s)
         if system.symmetries:
             across_orbit(system, last.x, x, direction)
@@ -207,19 +185,11 @@ class BranchSolver(StaticSolver):
         the normal of the plane on which the equilibrium lies, and ``reach`` bounds how far ``x`` may move, in the
         metric.
         """
-        outcome = self.corrector.correct(x, row, most=STEPS, reach=reach, tolerance=TOLERANCE)
-        regular = outcome is not None
-        if outcome is None:
-            outcome = correct(self.system, x, row, most=STEPS, reach=reach)
+        outcome = correct(self.system, x, row, reach, along=True)
         if not outcome.converged:
             return outcome, None, None
-        at = self.corrector.corrected(x, outcome) if regular else self.corrector.factor(x)
+        at = self.regular.at(x)
         return outcome, at.along(row) if at else self._tangent(row, x), at.index if at else None
-
-    def checked(self, x: PETSc.Vec) -> Checked | None:
-        """What was checked at the state ``x`` by the step that led to it; None where that was no compiled one."""
-        found = self._whole and self._whole.checked
-        return found if found and found.x is x else None
 
     def damp(self, freedoms: int) -> None:
         """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
@@ -237,7 +207,7 @@ class BranchSolver(StaticSolver):
         From the LU factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that
         very state, symmetric where they serve.
         """
-        regular = None if at is None else self.corrector.factor(at)
+        regular = None if at is None else self.regular.at(at)
         return regular.along(row) if regular else self._tangent(row, at)
 
     def _tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:

@@ -48,7 +48,7 @@ def follow(
     system, step = solver.system, steps.begin()
     span = abs(system.scene.span[1] - system.scene.span[0])
     ends, stops = bounds, system.scene.stops
-    solver.corrector.restart()
+    solver.regular.restart()
     missed, failures = "", 0
     while len(points) < steps.most:
         last = points[-1]
@@ -82,7 +82,7 @@ def follow(
             missed = f"; no state is found at {bound:.6g}: let the range end elsewhere if that is a bifurcation"
         elif made.outcome is not None and made.tangent is not None and made.aligned > ALIGNED:
             place = last.arclength + made.length
-            point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energies)
+            point = solver.point(made.x, place, made.tangent, made.outcome, made.index)
             if steps.accepts(last, point):
                 yield point
                 order = 2 if len(known) == 1 else min(len(known), 3) + 1

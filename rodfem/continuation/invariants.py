@@ -59,14 +59,6 @@ class Invariants:
 
     def __call__(self, point: Point) -> None:
         """Check a point; raises :class:`ConvergenceError` that names the equation, or the norm, that is violated."""
-        found = self.solver.checked(point.x)
-        if (
-            found is not None
-            and found.residual <= UNBALANCED
-            and found.norm <= UNIT
-            and self._small(point, found.total)
-        ):
-            return
         self._unit_quaternions(point)
         system, residual = self.system, self._equations
         system.set_phase(point.x)

@@ -14,7 +14,7 @@ from rodfem.continuation.crossings import Node
 from rodfem.continuation.prediction import ALIGNED, between, cubic
 from rodfem.continuation.prediction import Knot as Row
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
-from rodfem.fem.newton import NewtonResult, correct
+from rodfem.fem.newton import NewtonResult, correct, linear_step
 from rodfem.roots import zero_between
 from rodfem.tolerances import INSIDE
 
@@ -129,11 +129,9 @@ def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
             return settled
     finally:
         system.damping = given
-    equations, step, state = system.new_vector(), system.new_vector(), system.at(x)
     system.set_phase(x)
-    state.residual(equations)
-    state.factor(row, damping=given or solver.inertia.tolerance)
-    return x - step if system.solve(equations, step) else x
+    step = linear_step(system, x, row, given or solver.inertia.tolerance)
+    return x if step is None else x - step
 
 
 @dataclass(frozen=True, eq=False)

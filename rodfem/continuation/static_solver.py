@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from math import inf
-from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
@@ -16,7 +15,7 @@ from rodfem.continuation.kinds import Kind
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.fields import LOAD
-from rodfem.fem.newton import NewtonResult, correct, relax
+from rodfem.fem.newton import FAR, NewtonResult, correct, linear_step, relax
 from rodfem.fem.resultants import Resultants
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import Energies
@@ -25,9 +24,6 @@ from rodfem.fem.values import NodalValues
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors
 from rodfem.problem.units import Units
-
-if TYPE_CHECKING:
-    from rodfem.continuation.compiled_step import Checked
 
 STILL = 1e-6
 """Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
@@ -95,24 +91,15 @@ class StaticSolver:
         """Natural sizes of the rod's numbers."""
         return self.system.scene.units
 
-    def checked(self, x: PETSc.Vec) -> Checked | None:
-        """What was checked at the state ``x`` by the computation that led to it; None where nothing was."""
-        return None
-
     def given(self, kind: Kind, point: Point) -> SpecialPoint:
         """Special point at a load that is given."""
         return SpecialPoint.given(kind, point, self.units.load)
 
-    def at_load(
-        self, guess: PETSc.Vec, load: float, reach: float = 1e3, *, nearby: bool = False
-    ) -> tuple[PETSc.Vec, NewtonResult]:
-        """Equilibrium at exactly ``load`` by Newton's method from ``guess``, with corrections of ``reach`` at most.
-
-        Where the one computed last was ``nearby``, its factors serve first.
-        """
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = FAR) -> tuple[PETSc.Vec, NewtonResult]:
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``, at a distance of ``reach`` at most."""
         x = guess.copy()
         self.system.set_load(x, load)
-        outcome = correct(self.system, x, self.axis, reach=reach, nearby=nearby)
+        outcome = correct(self.system, x, self.axis, reach)
         self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
         return x, outcome
 
@@ -152,15 +139,10 @@ class StaticSolver:
         One step of Newton's method with so much damping that nothing else moves.  Without the forces in it, rotations
         of a free rod under dead loads cost nothing: Newton's method leaves even an equilibrium, in any direction.
         """
-        system, out = self.system, x.copy()
-        equations, step = system.new_vector(), system.new_vector()
+        system = self.system
         system.set_phase(x)
-        state = system.at(x)
-        state.residual(equations)
-        state.factor(self.axis, damping=HOLDS * system.stiffness_scale)
-        if system.solve(equations, step):
-            out.axpy(-1.0, step)
-        return out
+        step = linear_step(system, x, self.axis, HOLDS * system.stiffness_scale)
+        return x.copy() if step is None else x - step
 
     def _turned(self, guess: PETSc.Vec, x: PETSc.Vec) -> float:
         """Distance of two states without that of their strains, in the metric: a straight rod may stretch far."""

@@ -110,7 +110,7 @@ class LoadSteps:
         if len(self.known) > 1 and (x := self._predicted(self.known, load)) is not None:
             return x
         beside = last.load + BESIDE * (load - last.load)
-        y, outcome = solver.at_load(last.x, beside, nearby=True)
+        y, outcome = solver.at_load(last.x, beside)
         return self._predicted([replace(last, x=y, load=beside), last], load) if outcome.converged else None
 
     def _predicted(self, known: Sequence[Point], load: float) -> PETSc.Vec | None:
@@ -119,7 +119,7 @@ class LoadSteps:
         predicted = predict_at_load(system, known, load)
         if system.drifts:  # where a state is on its orbit is arbitrary: it stays there
             across_orbit(system, last, predicted, system.new_vector())
-        x, outcome = self.solver.at_load(predicted, load, nearby=True)
+        x, outcome = self.solver.at_load(predicted, load)
         if not outcome.converged:
             return None
         off, step = (self._sizes(x - other) for other in (predicted, last))

@@ -1,14 +1,13 @@
-"""Newton's method in one call of compiled code (``newton.c``), on one rank, with factors along the rod.
+"""One iteration of Newton's method in one call of compiled code (``newton.c``): one rank, factors along the rod.
 
 Of a point of seventy unknowns the arithmetic takes a tenth of a millisecond, and the way through Python and PETSc's
-vectors several times as long.  The iteration is that of :mod:`rodfem.fem.newton`; a test compares both at every row of
-every scene (``tests/continuation/test_compiled_newton.py``).
+vectors several times as long.  A test compares the rows of every scene with those by PETSc's matrices and factors
+(``tests/continuation/test_compiled_newton.py``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -21,48 +20,20 @@ if TYPE_CHECKING:
     from rodfem.fem.system import System
     from rodfem.linalg.factorization import Factors
 
-CONVERGED, FAILED, SINGULAR, BROKEN = range(4)
-"""How an iteration ended: it converged, or not; ``S`` was too near singular; there were no factors at all."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Constants of Newton's method, for one call.
-
-    At most ``most`` iterations are made, the first one with the factors of the last call where ``held`` says that its
-    state was nearby; ``reach`` bounds a correction, ``tolerance`` is an error that is small enough,
-    ``still`` the size below which a correction that no longer shrinks is round-off.  ``converged``, ``kept`` and
-    ``shrunk`` are TOLERANCE, KEPT and SHRUNK of :mod:`rodfem.fem.newton`.
-    """
-
-    most: int
-    held: bool
-    reach: float
-    tolerance: float
-    still: float
-    converged: float
-    kept: float
-    shrunk: float
-
-
-class Ended(NamedTuple):
-    """How an iteration ended: ``status``, number of ``iterations``, error, and by how much the state ``moved``."""
-
-    status: int
-    iterations: int
-    error: float
-    moved: float
+MOVED, UNDEFINED, SINGULAR, BROKEN = range(4)
+"""What an iteration did: it moved the state; the equations have no value there; the Jacobian is singular, exactly;
+there were no factors at all."""
 
 
 class CompiledNewton:
-    """The compiled iteration for one matrix of a system, which it fills, and its factors.
+    """Compiled assembly, and iteration, for one matrix of a system, which it fills, and its factors.
 
     Attributes
     ----------
-    factored, equations
-        The iterate that was factored last, and the equations there, (n,).
     border
-        Derivative of the equations in the load at that state, (n,), where the factors are symmetric.
+        Derivative of the equations in the load at the state last assembled, (n,).
+    origin
+        The state that an iteration began with, (n,).
     active, conditions, offsets, forces
         Of each drift scalar: whether it has a phase condition, that condition (drifts, n), its offset, and what a drift
         of one adds to the equations (drifts, n).
@@ -91,11 +62,10 @@ class CompiledNewton:
         starts, load, every = own.pattern.indptr, system.load_index, np.arange(n)
         # scalars are the last columns of each row, and their own rows are dense
         column = {i: starts[1:] - (n - i) for i in (load, *system.drifts)}
-        self.rod, self.newton, self.block = self.ffi.new("Rod *"), self.ffi.new("Newton *"), self.ffi.NULL
+        self.rod, self.newton = self.ffi.new("Rod *"), self.ffi.new("Newton *")
         rod = self.rod
         rod.n, rod.locals, rod.entries = n, len(system.fields.clamps), len(own.values)
         rod.load, rod.load_diagonal, rod.drifts = load, int(column[load][load]), len(drifts)
-        self.load_equation, self.factored, self.equations = np.zeros(1), np.zeros(n), np.zeros(n)
         integers = {
             "number": system.maps(load=True)[1],
             "load_column": np.where(every == load, -1, column[load]),
@@ -110,11 +80,12 @@ class CompiledNewton:
         self.memory.point(rod, **{name: np.ascontiguousarray(x, dtype=np.int32) for name, x in integers.items()})
         self.memory.point(rod, u=system.fields.clamps.copy(), values=own.values, metric=metric.values)
         self.memory.point(rod, conditions=self.conditions, offsets=self.offsets, forces=self.forces, border=self.border)
-        self.memory.point(rod, sizes=system.sizes.array.copy(), load_equation=self.load_equation)
-        self.memory.point(self.newton, factored=self.factored, factored_equations=self.equations)
-        self.memory.point(self.newton, **{name: np.zeros(n) for name in ("step", "origin", "equations")})
+        self.memory.point(rod, sizes=system.sizes.array.copy())
+        self.origin = np.zeros(n)
+        room = {name: np.zeros(n) for name in ("step", "equations", "away")}
+        self.memory.point(self.newton, origin=self.origin, **room)
 
-    def _take(self) -> None:
+    def take(self) -> None:
         """Use the parameters, the phase conditions and the factors that the system has now."""
         system, equations = self.system, self.system.equations
         equations.take(system.line)
@@ -127,17 +98,6 @@ class CompiledNewton:
         for i, row in system.phase.rows.items():
             self.active[i], self.conditions[i, : len(row)] = 1, row
             self.forces[i, : len(row)] = system.phase.forces[i]
-
-    def prepare(self, limits: Limits) -> None:
-        """Use what the system has now, and these ``limits`` of Newton's method."""
-        self._take()
-        for name, value in vars(limits).items():
-            setattr(self.newton, name, value)
-
-    def adopt(self, *, regular: bool) -> None:
-        """The matrix holds another state, whose factors are ``regular``, as compiled code has left them."""
-        self.factors.adopt(regular=regular)
-        self.matrix.stateIncrease()
 
     def _use(self, elimination: Elimination) -> None:
         """Let the rod point to the forms with their constants, and to the factors."""
@@ -154,27 +114,27 @@ class CompiledNewton:
         for name, owner in owners.items():
             setattr(rod, name, keep((rod, name), owner).pointer)
         rod.assemble = residual.function
-        rod.factor, rod.solve, rod.negative, rod.zero = elimination.functions
+        rod.factor, rod.solve = elimination.functions
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Fill the matrix with ``S`` at ``x`` and a one for the load, and :attr:`border`; phase conditions stay."""
-        self._take()
+        self.take()
         failed = self.lib.assemble_at(self.rod, buffer(self.ffi, x.array_r))
         assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."
         self.matrix.stateIncrease()
 
-    def correct(self, x: PETSc.Vec, row: PETSc.Vec, limits: Limits) -> Ended:
-        """Solve the equations on the plane through ``x`` across ``row``, in place.
+    def iterate(self, x: PETSc.Vec, row: PETSc.Vec, fresh: bool) -> tuple[int, float, float]:
+        """Move ``x`` by one correction on the plane across ``row``, with factors of the Jacobian there if ``fresh``.
 
-        ``x`` is as it was where there were no factors.
+        Returns what it did, the distance of ``x`` from :attr:`origin` in the metric, and the size of the correction in
+        it, or relative to ``x``, the larger.
         """
-        self.prepare(limits)
-        newton, along = self.newton, row.array_r
-        with x as state:
-            begin = state.copy()
-            status = self.lib.correct(self.rod, self.block, newton, *(buffer(self.ffi, a) for a in (state, along)))
-            if status >= SINGULAR:
-                state[:] = begin
-        if newton.factorisations:
-            self.adopt(regular=status < SINGULAR and not newton.singular)
-        return Ended(status, newton.iterations, newton.error, newton.moved)
+        newton = self.newton
+        with self.system.clock("solve"):
+            along = buffer(self.ffi, row.array_r)
+            with x as state:
+                status = self.lib.iterate(self.rod, newton, buffer(self.ffi, state), along, fresh)
+        if newton.factored:
+            self.factors.adopt(regular=status == MOVED)
+            self.matrix.stateIncrease()
+        return status, newton.distance, newton.size

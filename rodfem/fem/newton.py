@@ -1,16 +1,21 @@
-"""Newton's method for the residual of the bordered system, with chord steps where they converge fast enough."""
+"""Newton's method: the one loop, and when it has converged or failed.
+
+Whatever is solved for hands the loop an *iteration*: what moves the unknowns by one correction.  That of a state on a
+plane is here, by LU factors of the bordered matrix; states held by forces, singular states and states away from known
+ones have theirs (:mod:`rodfem.continuation.singular`, :mod:`rodfem.deflation.deflated_newton`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, isfinite
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.compiled_newton import BROKEN, CONVERGED, Ended, Limits
-from rodfem.fem.state import State
+from rodfem.fem.compiled_newton import BROKEN, MOVED
 from rodfem.fem.system import System
 
 TOLERANCE = 1e-10
@@ -20,10 +25,44 @@ STALLED = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
 KEPT, SHRUNK = 0.02, 0.1
 """The Jacobian serves once more where a correction is below the former, and below the latter part of the one before."""
+ITERATIONS, STEPS = 12, 8
+"""Iterations, at most, and in a step along a branch: a shorter step is cheaper than more of them."""
+FAR = 1e3
+"""Distance, in the metric, beyond which no equilibrium is meant."""
 LARGEST = 0.4
 """Bound of a damped step, in the metric."""
 CLOSE = 1e-3
 """Step of a damped motion, in the metric, below which Newton's method takes over."""
+
+
+class Correction(NamedTuple):
+    """What an iteration has changed, by a ``size`` that is to vanish, and the ``distance`` from where it all began.
+
+    It is by ``fresh`` factors, those of the state itself, or by older ones: a chord step.
+    """
+
+    distance: float
+    size: float
+    fresh: bool = True
+
+
+Iteration = Callable[[bool], Correction | None]
+"""Moves the unknowns by a correction, with fresh factors if that is asked for; None where there is no correction."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """At most ``most`` iterations, over a distance of ``reach`` in the metric.
+
+    An error below ``tolerance``, by the observed rate of convergence, is small enough; a correction that no longer
+    shrinks is round-off below ``still``, and where the unknowns are ``lost`` in the round-off of the equations.
+    """
+
+    most: int = ITERATIONS
+    reach: float = FAR
+    tolerance: float = 0.0
+    still: float = STALLED
+    lost: Callable[[], bool] = lambda: False
 
 
 @dataclass(frozen=True)
@@ -31,7 +70,7 @@ class NewtonResult:
     """How a Newton iteration ended: whether ``converged``, after how many ``iterations``.
 
     ``error`` is what the observed rate of convergence leaves after the last correction (that one's size, if the factors
-    were new), ``moved`` the size of all corrections together.
+    were new), ``moved`` the distance of the solution from the guess.
     """
 
     converged: bool
@@ -40,101 +79,107 @@ class NewtonResult:
     moved: float
 
 
-def correct(
-    system: System,
-    x: PETSc.Vec,
-    row: PETSc.Vec,
-    most: int = 12,
-    reach: float = 1e3,
-    *,
-    nearby: bool = False,
-) -> NewtonResult:
+def newton(iteration: Iteration, limits: Limits) -> NewtonResult:
+    """Newton's method with chord steps.
+
+    A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next: near a
+    solution the old factors cost one solve where new ones cost five.  It has converged if a correction, or what the
+    observed rate of convergence leaves after it, is small enough.  It has failed, and leaves the unknowns where they
+    got to, after too many iterations, where there is no correction, or no number, and too far away.
+    """
+    previous, size, fresh, number = inf, inf, True, 0
+    for number in range(1, limits.most + 1):
+        made = iteration(fresh)
+        if made is None:
+            break
+        distance, size, fresh = made
+        if not (isfinite(size) and distance <= limits.reach):
+            break
+        # chord steps converge linearly: their rate, doubled for safety, says what the next correction would be
+        left = size if fresh else min(2.0 * size / previous, 1.0) * size
+        stalled = fresh and size > 0.5 * previous and (size < limits.still or limits.lost())
+        if size < TOLERANCE or left < limits.tolerance or stalled:
+            return NewtonResult(True, number, left, distance)
+        # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
+        fresh = size > KEPT or size > SHRUNK * previous
+        previous = size
+    return NewtonResult(False, number, size, inf)
+
+
+def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, *, along: bool = False) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
-    As :func:`iterate`, with the phase conditions of the guess ``x``; fails at a singular matrix, too.  ``system`` has
-    the equations, ``row`` (n,) is the last row of the bordered matrix; ``most`` and ``reach`` are those of
-    :func:`iterate`.  Where the last call ended ``nearby``, with the same ``row``, its factors serve first.
-    """
-    system.set_phase(x)
-    if system.compiled is not None and not system.damping:
-        with system.clock("solve"):
-            held = nearby and system.lu.regular and not system.compiled.factors.resorted
-            ended = system.compiled.correct(x, row, replace(limits(system, most, reach), held=held))
-        if ended.status != BROKEN:
-            return result(ended)
-    step = system.new_vector()
-
-    def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
-        if fresh:
-            state.factor(row)
-        return step if system.solve(equations, step) else None
-
-    return iterate(system, x, solve, most, reach)
-
-
-def limits(system: System, most: int, reach: float, tolerance: float = 0.0) -> Limits:
-    """Constants of the iteration for compiled code.
-
-    ``most``, ``reach`` and ``tolerance`` are those of :func:`iterate`; with damping the ``system`` may stand still
-    earlier.
-    """
-    still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
-    return Limits(most, False, reach, tolerance, still, TOLERANCE, KEPT, SHRUNK)
-
-
-def result(ended: Ended) -> NewtonResult:
-    """The same of an iteration in compiled code."""
-    return NewtonResult(ended.status == CONVERGED, ended.iterations, ended.error, ended.moved)
-
-
-def iterate(
-    system: System,
-    x: PETSc.Vec,
-    solve: Callable[[State, PETSc.Vec, bool], PETSc.Vec | None],
-    most: int,
-    reach: float,
-    tolerance: float = 0.0,
-) -> NewtonResult:
-    """Newton's method with chord steps, in place; ``solve(state, equations, fresh)`` returns what x is reduced by.
-
-    A Jacobian is factored first (``fresh``), and again only while corrections do not shrink tenfold from one to the
-    next: near a solution the old factors cost one solve where new ones cost five.  Done when a correction, or what the
-    observed rate of convergence leaves after it, is small enough.  Fails, leaving ``x`` where it got to, after ``most``
-    iterations, where there is nothing to subtract (None), or when ``x`` moves further than ``reach`` in the metric.
+    The phase conditions are those of the guess ``x``.  A singular matrix is a failure.
 
     With damping ``d`` a correction of size c along a family of equilibria is that by a force ``d c``, which no mesh
     makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
 
-    ``system`` has the equations; an error below ``tolerance``, of the size of a correction, is small enough.
+    Parameters
+    ----------
+    system
+        The equations.
+    row
+        Last row of the bordered matrix, (n,).
+    reach
+        Largest distance, in the metric.
+    along
+        Whether this is a step along a branch, which may fail, and needs no more than the tolerance.
     """
-    equations, origin = system.new_vector(), x.copy()
-    still = limits(system, most, reach).still
-    previous, size, refactor = float("inf"), float("inf"), True
-    iteration = 0
-    for iteration in range(1, most + 1):
-        state = system.at(x)
-        state.residual(equations)
-        if not isfinite(equations.norm()):  # outside of where the stored energy is defined
-            break
-        fresh = refactor
-        step = solve(state, equations, fresh)
+    system.set_phase(x)
+    still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
+    limits = Limits(STEPS, reach, TOLERANCE, still) if along else Limits(ITERATIONS, reach, 0.0, still)
+    return newton(OnPlane(system, x, row), limits)
+
+
+class OnPlane:
+    """Iterations for the equations on the plane through ``x`` orthogonal to ``row``.
+
+    On one rank each is one call of compiled code, without damping and where its factors serve.
+    """
+
+    def __init__(self, system: System, x: PETSc.Vec, row: PETSc.Vec) -> None:
+        """Use the parameters and phase conditions that the ``system`` has now; ``x`` is moved."""
+        self.system, self.x, self.row, self.origin = system, x, row, x.copy()
+        self.compiled = None if system.damping else system.compiled
+        if self.compiled is not None:
+            self.compiled.take()
+            self.compiled.origin[:] = x.array_r.real
+
+    def __call__(self, fresh: bool) -> Correction | None:
+        """Move the state by one correction."""
+        system, x = self.system, self.x
+        if self.compiled is not None and (fresh or not self.compiled.factors.resorted):
+            status, distance, size = self.compiled.iterate(x, self.row, fresh)
+            if status != BROKEN:
+                return Correction(distance, size, fresh) if status == MOVED else None
+        step = linear_step(system, x, self.row, fresh=fresh)
         if step is None:
-            break
+            return None
         x.axpy(-1.0, step)
-        distance = system.norm(step)
-        size = max(distance, system.in_units(step, -1).norm() / (1.0 + system.in_units(x, -1).norm()))
-        if not isfinite(size) or distance > reach:
-            break
-        # chord steps converge linearly: their rate, doubled for safety, says what the next correction would be
-        left = size if fresh else min(2.0 * size / previous, 1.0) * size
-        if size < TOLERANCE or left < tolerance or (fresh and still > size > 0.5 * previous):
-            origin.aypx(-1.0, x)
-            return NewtonResult(True, iteration, left, system.norm(origin))
-        # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
-        refactor = size > KEPT or size > SHRUNK * previous
-        previous = size
-    origin.aypx(-1.0, x)
-    return NewtonResult(False, iteration, size, float("inf"))
+        size = max(system.norm(step), relative_size(system, x, step))
+        return Correction(system.distance(x, self.origin), size, fresh)
+
+
+def linear_step(
+    system: System, x: PETSc.Vec, row: PETSc.Vec, damping: float = 0.0, *, fresh: bool = True
+) -> PETSc.Vec | None:
+    """What one step of Newton's method subtracts from ``x`` on the plane across ``row``, with the phase as it is.
+
+    ``damping`` times the metric is added to the second variation; without ``fresh`` factors the last ones serve.  None
+    where the equations have no value, or the matrix is singular.  ``system`` has the equations.
+    """
+    equations, step, state = system.new_vector(), system.new_vector(), system.at(x)
+    state.residual(equations)
+    if not isfinite(equations.norm()):  # outside of where the stored energy is defined
+        return None
+    if fresh:
+        state.factor(row, damping)
+    return step if system.solve(equations, step) else None
+
+
+def relative_size(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:
+    """Size of a ``step`` to or from the state ``x`` relative to that, in natural sizes of the ``system``."""
+    return float(system.in_units(step, -1).norm() / (1.0 + system.in_units(x, -1).norm()))
 
 
 def relax(
@@ -160,18 +205,13 @@ def relax(
     taken.
     """
     system.set_phase(x)
-    equations, step = system.new_vector(), system.new_vector()
     tau, trial = 1e-2 / system.stiffness_scale, x.copy()
     for iteration in range(most):
-        state = system.at(x)
-        state.residual(equations)
-        state.factor(row, damping=1.0 / tau)
-        if not isfinite(equations.norm()) or not system.solve(equations, step):
+        step = linear_step(system, x, row, 1.0 / tau)
+        size = inf if step is None else system.norm(step)
+        if step is None or not isfinite(size):
             break
-        size = system.norm(step)
-        if not isfinite(size):
-            break
-        if isfinite(longest) and along(system, equations, step) < 0:
+        if isfinite(longest) and along(system, x, step) < 0:
             tau *= 0.5
             continue
         x.axpy(-(1.0 if size < LARGEST else LARGEST / size), step)  # constraints are mended in one step, however long
@@ -183,14 +223,16 @@ def relax(
             if outcome.converged and accepts(trial):
                 trial.copy(x)
                 return outcome
-    return NewtonResult(False, most, float("inf"), float("inf"))
+    return NewtonResult(False, most, inf, inf)
 
 
-def along(system: System, equations: PETSc.Vec, step: PETSc.Vec) -> float:
+def along(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:
     """``dx.(K + M/tau) dx`` of a damped step (dx, dy) that solves ``(K + M/tau, C; C^t, 0) (dx, dy) = (F, c)``.
 
-    It is ``dx.F - dy.c``, of the ``equations`` (F, c) and the ``step`` of the ``system``.
+    It is ``dx.F - dy.c``, of the equations (F, c) of the ``system`` at ``x``.
     """
+    equations = system.new_vector()
+    system.at(x).residual(equations)
     fields, sign = system.fields, np.ones(step.local_size)
     dual = [fields.number[fields.dofs[b.name]].ravel() for b in fields.blocks if b.multiplier]
     moving = {x.name for x in fields.unknown_scalars if not x.multiplier}

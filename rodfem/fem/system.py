@@ -355,13 +355,13 @@ class System:
                 phases[dropped] = phase_at(self, reference, self.verification.dropped)
             self.phase = phases[dropped]
 
-    def verify(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None = None) -> bool:
-        """Verify the symmetries at a state, where ``S`` is ``matrix`` and the equations are given (None: zero).
+    def verify(self, matrix: PETSc.Mat, state: State) -> bool:
+        """Verify the symmetries at an equilibrium, where ``S`` is ``matrix``.
 
         Where one is none the phase conditions are taken anew without it, and False is returned: the borders of the
         matrix are to be assembled again.
         """
-        if not self.symmetries or self.verification(matrix, state, equations):
+        if not self.symmetries or self.verification(matrix, state):
             return True
         reference = self.phase.reference
         self.phase = no_phase(self)
@@ -400,13 +400,3 @@ class System:
             metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
         metric.assemble()
         return metric
-
-
-def dense_columns(system: System, count: int) -> PETSc.Mat:
-    """Zero matrix of as many columns, each a vector of the system: right-hand sides or solutions."""
-    columns = PETSc.Mat().createDense(
-        ((system.fields.local_unknowns, system.fields.unknowns), (None, count)), comm=system.comm
-    )
-    columns.setUp()
-    columns.assemble()
-    return columns

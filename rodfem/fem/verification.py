@@ -70,13 +70,10 @@ class Verification:
         self._closing: list[PETSc.Vec] | None = None
         self._left, self._generator, self._none = system.new_vector(), system.new_vector(), np.zeros(len(system.drifts))
 
-    def __call__(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None = None) -> bool:
-        """Try the symmetries at a state, whose ``S`` is given; False where one of them was dropped.
-
-        ``equations`` are those at the state, zero at an equilibrium (None).
-        """
-        failed = self._failing(matrix, state, equations)
-        if failed and equations is None:  # the state may be no equilibrium: one that was carried over from another mesh
+    def __call__(self, matrix: PETSc.Mat, state: State) -> bool:
+        """Try the symmetries at an equilibrium, whose ``S`` is given; False where one of them was dropped."""
+        failed = self._failing(matrix, state, None)
+        if failed:  # the state may be no equilibrium: one that was carried over from another mesh
             equations = self.system.new_vector()
             state.residual(equations)
             failed = self._failing(matrix, state, equations)
@@ -120,8 +117,8 @@ class Verification:
     ) -> bool:
         """Whether a generic combination of the ``chosen`` generators is a null vector of ``S`` at the ``state``.
 
-        ``matrix`` is ``S``, ``generators`` (count, own rows) are all of them there, ``equations`` as in
-        :meth:`__call__`.
+        ``matrix`` is ``S``, ``generators`` (count, own rows) are all of them there, ``equations`` those there, zero at
+        an equilibrium (None).
         """
         system, left = self.system, self._left
         weights = generic_weights(len(chosen))

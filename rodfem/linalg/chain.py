@@ -109,12 +109,9 @@ class Elimination:
 
     @property
     def functions(self) -> list[int]:
-        """Addresses of the functions that factor, solve, and count negative pivots and those that are zero."""
-        return [self.address(name) for name in ("factor", "solve", "negative", "zero")]
-
-    def address(self, name: str) -> int:
-        """Address of the function ``chain_name``."""
-        return int(self.ffi.cast("uintptr_t", self.ffi.addressof(self.lib, f"chain_{name}")))
+        """Addresses of the functions that factor and solve."""
+        found = (self.ffi.addressof(self.lib, name) for name in ("chain_factor", "chain_solve"))
+        return [int(self.ffi.cast("uintptr_t", address)) for address in found]
 
     def factor(self, values: np.ndarray) -> None:
         """Eliminate; raises :class:`GaveUpError` where the matrix is no chain.
@@ -233,12 +230,9 @@ class Chain:
         else:
             out.array[:] = self.elimination.solve(right.array_r.real[:, None])[:, 0]
 
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once."""
-        if self.resort and self.resorted:
-            self.resort.solve_all(right, out)
-        else:
-            out.getDenseArray()[:] = self.elimination.solve(right.getDenseArray().real)
+    def solve_all(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for all columns, (n, k), at once."""
+        return self.resort.solve_all(right) if self.resort and self.resorted else self.elimination.solve(right)
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""

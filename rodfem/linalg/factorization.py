@@ -66,8 +66,8 @@ class Factors(Protocol):
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
         """Solve with the last factors."""
 
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once: the cost is that of the call, hardly of a column."""
+    def solve_all(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for all columns, (own rows, k), at once: the cost is that of the call, hardly of a column."""
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
@@ -145,14 +145,20 @@ class Mumps:
             self.ksp.solve(right * sizes, out)
             out.pointwiseMult(out, sizes)
 
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once: the cost is that of the call, hardly of a column."""
-        if self.sizes is not None:
-            right = right.copy()
-            right.diagonalScale(L=self.sizes())
-        self.ksp.getPC().getFactorMatrix().matSolve(right, out)
-        if self.sizes is not None:
-            out.diagonalScale(L=self.sizes())
+    def solve_all(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for all columns, (own rows, k), at once: the cost is that of the call, hardly of a column."""
+        factor = self.ksp.getPC().getFactorMatrix()
+        sizes = 1.0 if self.sizes is None else self.sizes().array_r.real[:, None]
+        given = PETSc.Mat().createDense((factor.getSizes()[0], (None, right.shape[1])), comm=factor.comm)
+        given.setUp()
+        given.assemble()
+        out = given.duplicate()
+        given.getDenseArray()[:] = right * sizes
+        factor.matSolve(given, out)
+        solved = sizes * np.array(out.getDenseArray().real)
+        given.destroy()
+        out.destroy()
+        return solved
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""

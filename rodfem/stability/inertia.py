@@ -22,6 +22,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.compiled_newton import CompiledNewton
+from rodfem.fem.phase import Phase
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
@@ -110,40 +111,33 @@ class Inertia:
         self.resolution = 0.0
         self.vectors: list[PETSc.Vec] = []
         self.shift, self.filled, self.factored = 0.0, 0, 0
+        self._held: tuple[State, Phase, int] | None = None
         self.compiled: CompiledNewton | None = None
         if isinstance(self.factors, Chain) and CompiledNewton.serves(self.matrix, self.factors):
             self.compiled = CompiledNewton(system, self.matrix, self.factors)
 
-    def at(self, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> Factored:
-        """Assemble ``S`` at ``x``, with the phase conditions of that state.
+    def at(self, x: PETSc.Vec) -> Factored:
+        """Assemble ``S`` at an equilibrium ``x``, with its phase conditions, unless the matrix is that one.
 
-        The symmetries are verified there.  ``equations`` are those at ``x``, an iterate of Newton's method, whose phase
-        conditions stay; None at an equilibrium.
+        The symmetries are verified there.
         """
-        if equations is None:
-            self.system.set_phase(x)
+        self.system.set_phase(x)
         state = self.system.at(x)
-        self._assemble(x, state)
-        # a generator that is no null vector of S is no symmetry: verify drops its phase condition, S is assembled anew
-        with self.system.clock("stability"):
-            sound = self.system.verify(self.matrix, state, equations)
-        if not sound:
+        if not self._holds(state):
             self._assemble(x, state)
-        self.filled += 1
+            # a generator that is no null vector of S is no symmetry: verify drops its phase condition
+            with self.system.clock("stability"):
+                sound = self.system.verify(self.matrix, state)
+            if not sound:
+                self._assemble(x, state)
+            self.filled += 1
+            self._held = state, self.system.phase, self.matrix.stateGet()
         return Factored(self)
 
-    def hold(self) -> Factored:
-        """The state that compiled code has just filled and factored the matrix for, with the border."""
-        self.filled += 1
-        self.factored, self.shift = self.filled, 0.0
-        self.matrix.stateIncrease()
-        self._settle_band()
-        return Factored(self)
-
-    @property
-    def held(self) -> Factored:
-        """The state that the matrix holds now."""
-        return Factored(self)
+    def _holds(self, state: State) -> bool:
+        """Whether the matrix is ``S`` at a state, with its phase conditions."""
+        held, phase, changes = self._held or (None, None, 0)
+        return held is state and phase is self.system.phase and changes == self.matrix.stateGet()
 
     def _assemble(self, x: PETSc.Vec, state: State) -> None:
         system = self.system
@@ -176,7 +170,8 @@ class Inertia:
             self._shared.values[self._on_metric] += by * self._weights.data
         elif by:
             self.matrix.axpy(by, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
+        if by:
+            self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
 
     def _settle_band(self) -> None:
         system = self.system
@@ -190,7 +185,7 @@ class Inertia:
 
     def forget_band(self) -> None:
         """Settle the band of round-off, and that of symmetries, at the next state."""
-        self.resolution, self.tolerance = 0.0, ZERO_BAND * self.scale
+        self.resolution, self.tolerance, self._held = 0.0, ZERO_BAND * self.scale, None
         self.system.verification.norm = 0.0
 
     @contextmanager
@@ -278,9 +273,10 @@ class Factored:
         """
         own = self._own()
         with own.system.clock("stability"):
-            own.move(sigma)
-            own.factors(own.matrix)
-            own.factored = self._filled
+            if own.factored != self._filled or own.shift != sigma:
+                own.move(sigma)
+                own.factors(own.matrix)
+                own.factored = self._filled
         return self.counted()
 
     def counted(self) -> int:

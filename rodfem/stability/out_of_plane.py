@@ -83,7 +83,7 @@ class InSpace:
                 "leave planar out of the scene."
             )
         settled = state.copy()
-        if correct(self.system, settled, self.system.load_axis(), most=6, reach=NEAR).converged:
+        if correct(self.system, settled, self.system.load_axis(), NEAR).converged:
             state = settled  # else the state is so near a singular one that its own error decides as well
         return self.inertia.at(state)
 

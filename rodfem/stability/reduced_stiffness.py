@@ -28,8 +28,6 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.fem.system import dense_columns
-from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import shared
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Inertia
@@ -87,7 +85,6 @@ class Condensation:
         """Begin without a border; the ``inertia`` has the saddle matrix."""
         self.system, self.inertia = inertia.system, inertia
         self._bordered: dict[int, Bordered] = {}
-        self._columns: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
 
     def border(self, x: PETSc.Vec, count: int = MODES) -> np.ndarray:
         """Modes nearest zero at a state ``x``, (own rows, ``count``), fewer if there are no more."""
@@ -106,7 +103,7 @@ class Condensation:
         found = inertia.at(x)
         try:
             below = found.below(0.0)
-            Z = self._solved(found.factors, B)
+            Z = found.factors.solve_all(B)
             H = np.linalg.inv(_symmetric(inertia.sum(B.T @ Z)))
             near = not abs(np.linalg.eigvalsh(_symmetric(H))).min() > NEAR * inertia.scale
         except (ConvergenceError, np.linalg.LinAlgError):
@@ -159,16 +156,6 @@ class Condensation:
         if known is not None:
             return np.asarray(known.matrix @ columns)
         return np.stack([(self.inertia.matrix * self.vector(c)).array_r for c in columns.T], axis=1)
-
-    def _solved(self, factors: Factors, B: np.ndarray) -> np.ndarray:
-        """``S^-1 B``."""
-        k = B.shape[1]
-        if k not in self._columns:
-            self._columns[k] = dense_columns(self.system, k), dense_columns(self.system, k)
-        right, out = self._columns[k]
-        right.getDenseArray()[:] = B
-        factors.solve_all(right, out)
-        return np.array(out.getDenseArray())
 
     def _row(self, columns: np.ndarray, number: int) -> np.ndarray:
         """Row of a global number of columns, on all ranks."""

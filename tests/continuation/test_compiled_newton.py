@@ -1,4 +1,4 @@
-"""The compiled iteration and factors along the rod beside PETSc's matrices, Python's iteration and MUMPS."""
+"""The compiled iteration and factors along the rod beside PETSc's matrices and MUMPS."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from golden_cases import cases, single_branches
 
 import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.fields import PETSC
+from rodfem.fem.newton import OnPlane
 from rodfem.linalg.chain import Chain
 
 pytestmark = pytest.mark.alone
@@ -42,23 +42,6 @@ def test_every_row_of_every_scene(name: str) -> None:
             assert np.median(off) < SAME, (branch.name, key)
 
 
-@pytest.mark.few(1)
-@pytest.mark.parametrize(("load", "nearby"), [(3.601, True), (8.0, False)])
-def test_factors_of_a_state_nearby_serve_first(load: float, nearby: bool) -> None:
-    """The same equilibrium as by new factors; where the state is not nearby after all there are new ones at once."""
-    solver = StaticSolver(Solver(cases()["demo ruler"](), Discretization("auto", 4, 6)).equilibria.system)
-    compiled = solver.system.compiled
-    assert compiled is not None
-    x, _ = solver.first(3.6)
-    expected, by_new = solver.at_load(x, load)
-    made = compiled.newton.factorisations
-    solver.at_load(x, 3.6)
-    found, outcome = solver.at_load(x, load, nearby=True)
-    assert by_new.converged and outcome.converged
-    assert solver.system.norm(found - expected) < 1e-9
-    assert (compiled.newton.factorisations < made) == nearby
-
-
 @pytest.mark.long
 def test_the_reference_uses_nothing_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """With PETSc's factors neither the chain nor the compiled assembly of matrices is used."""
@@ -78,20 +61,25 @@ def test_unknown_factors_are_refused() -> None:
         Discretization(factors="superglue")
 
 
-@pytest.mark.long
-def test_a_guess_without_equations_drops_no_symmetry() -> None:
-    """Where nothing was factored the matrix holds another state, and verifies nothing."""
-    solver = Solver(cases()["demo hemitropic"](), Discretization("auto", 8, 6)).equilibria
-    system = solver.system
-    x, _ = solver.first(0.05)
-    assert solver.corrector.correct(x, solver.axis) is not None
-    held = solver.inertia.at(solver.start(0.3, 0.4))
-    held.below(-5.0)
-    guess = x.copy()
-    guess.setValue(0, float("nan"))
-    guess.assemble()
-    outcome = solver.corrector.correct(guess, solver.axis)
-    assert outcome is not None
-    assert not outcome.converged
-    assert not system.verification.dropped
-    held.nearest(1)  # the factors are still those of that state
+@pytest.mark.few(1)
+@pytest.mark.parametrize("fresh", [True, False])
+@pytest.mark.parametrize("name", ["demo ruler", "demo hemitropic", "classic foundation"])
+def test_an_iteration_is_that_of_petsc(name: str, fresh: bool) -> None:
+    """The same correction, distance and size from a guess, by new factors and by those of another state."""
+    solver = Solver(cases()[name](), Discretization("auto", 4, 6)).equilibria
+    system, scene = solver.system, solver.system.scene
+    low, high = scene.span
+    x = solver.first(low + 0.1 * (high - low))[0]
+    guess = solver.start(low + 0.12 * (high - low), 0.1)
+    moved, made = [], []
+    for compiled in (system.compiled, None):
+        other, y = x.copy(), guess.copy()
+        system.set_phase(guess)
+        OnPlane(system, other, solver.axis)(True)
+        iteration = OnPlane(system, y, solver.axis)
+        iteration.compiled = compiled
+        made.append(iteration(fresh))
+        moved.append(y)
+    assert made[0] is not None
+    assert made[0] == pytest.approx(made[1], rel=1e-9)
+    assert system.distance(*moved) < 1e-9 * made[0].distance

@@ -7,13 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 import small_states
-from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation import branch_solver, corrector
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.compiled_step import CompiledStep
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
@@ -87,40 +84,6 @@ def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
         np.testing.assert_array_equal(system.phase.offsets, anew.offsets)
         assert system.phase.reference is not None
         assert system.phase.reference.equal(point.x)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("compiled", [True, False])
-@pytest.mark.parametrize("name", ["hemitropic", "cord"])
-def test_factors_of_an_exact_prediction_are_those_of_the_row(
-    name: str, compiled: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Straight rods: with factors made anew at each row there are the same rows, indices and tangents.
-
-    Of a side branch the tangents depend on where on their orbit its states are, which is up to round-off.
-    """
-    made, factor = [0], corrector.Corrector.factor
-
-    def counted(self: corrector.Corrector, x: PETSc.Vec, right: PETSc.Vec | None = None) -> corrector.Regular | None:
-        made[0] += 1
-        return factor(self, x, right)
-
-    monkeypatch.setattr(corrector.Corrector, "factor", counted)
-    if not compiled:
-        monkeypatch.setattr(CompiledStep, "__call__", lambda *arguments: None)
-    ours, few = traced(name, "reduced"), made[0]
-    monkeypatch.setattr(corrector, "SAME", -1.0)
-    monkeypatch.setattr(branch_solver, "SAME", -1.0)
-    theirs = traced(name, "reduced")
-    assert compiled or made[0] - few > few + 15
-    for a, b in zip(ours.branches, theirs.branches, strict=True):
-        assert len(a.points) == len(b.points)
-        for p, q in zip(a.points, b.points, strict=True):
-            assert (p.negative, p.zero, p.undecided) == (q.negative, q.zero, q.undecided)
-            assert p.load == pytest.approx(q.load, rel=1e-11, abs=1e-11)
-            assert p.ordinate == pytest.approx(q.ordinate, abs=1e-10)
-            if p.tangent is not None and q.tangent is not None and not a.parent:
-                assert (p.tangent - q.tangent).norm() < 1e-8 * q.tangent.norm()
 
 
 @pytest.mark.parametrize(("name", "formulation"), BOTH)

@@ -11,6 +11,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from hemitropic_cases import DEFAULT, explored, follower, user_points
 from petsc4py import PETSc
+from work import compiled
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
@@ -142,6 +143,23 @@ def test_spectrum_is_that_of_dense_matrices(formulation: str, branch: int, load:
     np.testing.assert_allclose(modes.values, mu[:6], rtol=1e-7, atol=1e-9)
     assert modes.certified
     assert modes.negative(f.inertia.tolerance) == p.negative
+
+
+@pytest.mark.alone
+@pytest.mark.few(1)
+def test_the_matrix_is_kept_for_the_state_that_it_holds() -> None:
+    """Asked for the same state again it is not assembled or factored; it is after a shift, and for another state."""
+    f, p, q = follower("reduced", *SMALL), state("reduced", 1, 0.25), state("reduced", 2, 0.5)
+    anew = [dense(f.inertia.at(point.x).matrix) for point in (q, p)][-1]
+    index = f.inertia.at(p.x).below(0.0)
+    before = compiled()
+    assert f.inertia.at(p.x).below(0.0) == index
+    assert compiled() == before
+    for disturb in (lambda: f.inertia.at(p.x).count(), lambda: f.inertia.at(q.x), f.inertia.forget_band):
+        disturb()
+        assert dense(f.inertia.at(p.x).matrix) == pytest.approx(anew, abs=1e-13 * abs(anew).max())
+        assert f.inertia.at(p.x).below(0.0) == index
+    assert compiled()["factorisations"] == before["factorisations"] + 5
 
 
 @pytest.mark.alone

@@ -9,9 +9,8 @@ import pytest
 
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.fem.newton import TOLERANCE, correct
+from rodfem.continuation.regular_point import NEAR
 
 BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}
 
@@ -39,25 +38,15 @@ def test_index_is_that_of_two_shifts_at_every_point(name: str, formulation: str)
 
 @pytest.mark.alone
 @pytest.mark.parametrize("name", BENT)
-def test_state_and_tangent_are_those_of_lu_factors(name: str) -> None:
+def test_tangent_is_that_of_lu_factors(name: str) -> None:
     follower, branches = demo(name, "reduced")
     system, wanted = follower.system, BENT[name]
     branch = next(b for b in branches if b.name == wanted[0])
     point = min(branch.points[2:-2], key=lambda p: abs(p.load - wanted[1]))
     row = follower.row(point.tangent)
-    guess = point.x.copy()
-    guess.axpy(0.01, point.tangent)
-    guess.axpy(1e-3, system.metric * follower.inertia.seed(0))
-    system.set_phase(guess)
-    ours, theirs = guess.copy(), guess.copy()
-    corrected = follower.corrector.correct(ours, row)
-    assert corrected is not None and corrected.converged and correct(system, theirs, row).converged
-    ours.axpy(-1.0, theirs)
-    assert system.norm(ours) < TOLERANCE
-    tangent = follower.tangent(row, at=theirs)
-    regular = follower.corrector.factor(theirs)
+    tangent, regular = follower._tangent(row, point.x), follower.regular.at(point.x)
     assert regular is not None and system.norm(regular.along(row) - tangent) < 1e-12
-    image = system.at(theirs).jacobian(row) * tangent  # J t = (0, row . t)
+    image = system.at(point.x).jacobian(row) * tangent  # J t = (0, row . t)
     system.set_load(image, 0.0)
     assert image.norm() < 1e-9 * system.matrix.norm()
 
@@ -70,8 +59,8 @@ def test_near_singular_states_are_left_to_others(name: str) -> None:
     assert len(special) > 2
     for s in special:
         follower.system.set_phase(s.point.x)
-        follower.corrector.restart()
-        assert follower.corrector.factor(s.point.x) is None
+        follower.regular.restart()
+        assert follower.regular.at(s.point.x) is None
         found = follower.inertia.at(s.point.x)
         found.count()
         assert abs(found.nearest(1)[0][0]) < NEAR * follower.inertia.scale
@@ -82,11 +71,11 @@ def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
     follower, branches = demo("cord", "reduced")
     straight = branches[0].points
     seen = []
-    follower.corrector.restart()
+    follower.regular.restart()
     for point in straight[1:20]:
         follower.system.set_phase(point.x)
         special = any(s.point is point for s in branches[0].special)
-        if not special and (regular := follower.corrector.factor(point.x)):
+        if not special and (regular := follower.regular.at(point.x)):
             factored = follower.inertia.at(point.x)
             factored.count()
             exact = abs(factored.nearest(1, accuracy=1e-6)[0][0])
