@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.fem.newton import correct
+from rodfem.fem.newton import Correction, Limits, correct, linear_step, newton
 from rodfem.linalg.orthogonal import combine
 from rodfem.roots import zero_between
 
@@ -35,8 +35,6 @@ ANGLE = 1e-4
 """Uncertainty of the angle of a zero."""
 FELT = 1e-6
 """Force on one side of a zero over the largest one, below which it is round-off: a symmetry turns the direction."""
-MOST, STILL = 12, 1e-10
-"""Steps of Newton's method for a state that is held, and the size of the last one, in the metric."""
 
 
 def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
@@ -84,32 +82,27 @@ class Held:
 
     def __call__(self, angle: float) -> float:
         """Return the force at an ``angle`` from the first null vector; nan where Newton's method finds no state."""
-        system = self.solver.system
+        system, force = self.solver.system, 0.0
         along = combine(self.ways, np.array([np.cos(angle), np.sin(angle)]))
         across = combine(self.ways, np.array([-np.sin(angle), np.cos(angle)]))
-        row, held = self.solver.row(along), system.metric * across
-        x, force = self.origin + along * AWAY, 0.0
-        equations, step, answer = (system.new_vector() for _ in range(3))
-        for _ in range(MOST):
+        row, held, answer = self.solver.row(along), system.metric * across, system.new_vector()
+        begin = self.origin + along * AWAY
+        x = begin.copy()
+
+        def iteration(fresh: bool) -> Correction | None:
+            nonlocal force
             system.set_phase(x)
-            state = system.at(x)
-            state.residual(equations)
-            equations.axpy(force, held)
-            state.factor(row)
-            if not (system.solve(equations, step) and system.solve(held, answer)):
-                return float("nan")
+            step = linear_step(system, x, row)
+            if step is None or not system.solve(held, answer):
+                return None
             # (J  M d'; d'^t M  0) by its Schur complement, of one row
-            away = held.dot(x - self.origin) - held.dot(step)
-            more = away / held.dot(answer)
-            step.axpy(more, answer)
+            force = held.dot(x - self.origin - step) / held.dot(answer)
+            step.axpy(force, answer)
             x.axpy(-1.0, step)
-            force -= more
-            size = system.norm(step)
-            if not size < REACH * AWAY:
-                return float("nan")
-            if size < STILL:
-                return float(force)
-        return float("nan")
+            return Correction(system.distance(x, begin), system.norm(step))
+
+        outcome = newton(iteration, Limits(reach=REACH * AWAY))
+        return force if outcome.converged else float("nan")
 
 
 def _zeros(force: Held) -> list[float]:

@@ -55,7 +55,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import KEPT, SHRUNK, STALLED, TOLERANCE
+from rodfem.fem.newton import TOLERANCE, Correction, Limits, newton
 from rodfem.fem.parameters import Line
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
@@ -64,8 +64,6 @@ from rodfem.stability.inertia import Factored, Inertia
 from rodfem.stability.reduced_stiffness import DIFFERENCE
 from rodfem.tolerances import TINY
 
-ITERATIONS = 12
-"""Newton steps."""
 FARTHEST = 0.5
 """A point farther than this from where it is expected, in the metric, is another one."""
 NOISE = 100.0
@@ -236,31 +234,33 @@ class SingularSystem:
     def _newton(self, x: PETSc.Vec, section: Section | None) -> tuple[PETSc.Vec, float, _Linear, _Step] | None:
         """The solution, its second parameter, and the last step, as it was linearised."""
         self._section = section
-        start, x, t = x, x.copy(), 0.0
-        moved, before, reach, at = 0.0, np.inf, section.reach if section else FARTHEST, None
-        for _ in range(ITERATIONS):
-            try:
-                at = self._linear(x, t, at)
+        start, x, t, moved = x, x.copy(), 0.0, 0.0
+        at: _Linear | None = None
+        step: _Step | None = None
+
+        def iteration(fresh: bool) -> Correction | None:
+            nonlocal at, step, t, moved
+            try:  # on a curve third derivatives, which cost most, serve again where corrections shrink tenfold
+                at = self._linear(x, t, at if section and not fresh else None)
                 step = self._step(at, self._equations(x, at), x - start, t)
             except (ConvergenceError, np.linalg.LinAlgError):
                 return None
             size = self._length(step)
-            moved += size
-            if not moved <= reach:  # nor a number
-                return None
             x.axpy(1.0, step.dx)
             t += step.dt
-            if size < TOLERANCE or (size > 0.5 * before and (size < STALLED or self._lost(x, at, step))):
-                step.dx.scale(size if size < TOLERANCE else 1.0)  # what quadratic convergence leaves, or round-off
-                return x, t, at, step
-            # on a curve third derivatives, which cost most, serve again where corrections shrink tenfold
-            at = at if section and size < min(KEPT, SHRUNK * before) else None
-            before = size
-        return None
+            moved += size
+            return Correction(moved, size)
 
-    def _lost(self, x: PETSc.Vec, at: _Linear, step: _Step) -> bool:
+        reach = section.reach if section else FARTHEST
+        outcome = newton(iteration, Limits(reach=reach, lost=lambda: self._lost(x, at, step)))
+        if not outcome.converged or at is None or step is None:
+            return None
+        step.dx.scale(outcome.error if outcome.error < TOLERANCE else 1.0)  # what convergence leaves, or round-off
+        return x, t, at, step
+
+    def _lost(self, x: PETSc.Vec, at: _Linear | None, step: _Step | None) -> bool:
         """Whether round-off of the eigenvalue at ``x`` moves the load by as much as a step to a branch point."""
-        if self.fold or self._section is not None:
+        if self.fold or self._section is not None or at is None or step is None:
             return False
         found = self.inertia.at(x)
         noise = max(found.noise(combine(at.V, z)) for z in at.Z.T)

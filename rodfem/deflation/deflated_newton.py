@@ -23,13 +23,13 @@ turned by 0.8 from a straight hemitropic rod 4 of 20 led to a buckled state with
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
+from math import inf, isfinite, nan
 
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.deflation.group_orbit import Orbits
-from rodfem.fem.newton import LARGEST
+from rodfem.fem.newton import LARGEST, Correction, Limits, NewtonResult, linear_step, newton, relative_size
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
 MOST = 60
@@ -52,47 +52,38 @@ class DeflatedNewton:
     def flow(self, x: PETSc.Vec, alphas: Sequence[float] = FLOW) -> None:
         """Steps of gradient flow from ``x``, in place: towards constraints, lower energy, and multipliers that fit."""
         system = self.system
-        equations, step = system.new_vector(), system.new_vector()
         for alpha in alphas:
             system.set_phase(None)
-            state = system.at(x)
-            state.residual(equations)
             # backward Euler for M x' = -F(x), linearised: (S + alpha M) dx = -F
-            matrix = state.jacobian(self.solver.axis)
-            shift = alpha * self.solver.inertia.scale
-            matrix.axpy(shift, system.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
-            system.lu(matrix)
-            size = system.norm(step) if system.solve(equations, step) else float("nan")
-            if not isfinite(size) or not self._advance(x, step, -min(1.0, LARGEST / max(size, TINY))):
+            step = linear_step(system, x, self.solver.axis, alpha * self.solver.inertia.scale)
+            size = nan if step is None else system.norm(step)
+            if step is None or not isfinite(size) or not self._advance(x, step, -min(1.0, LARGEST / max(size, TINY))):
                 return
 
-    def approach(self, x: PETSc.Vec) -> int:
-        """Deflated Newton steps from ``x``, in place, until a plain step is small; their number, ``MOST`` at failure.
+    def approach(self, x: PETSc.Vec) -> NewtonResult:
+        """Deflated Newton steps from ``x``, in place, until a plain step is small.
 
         A step is never longer than ``LARGEST``, and is halved while it leads to where the stored energy has no value.
         """
         system = self.system
-        equations, step = system.new_vector(), system.new_vector()
-        for number in range(MOST):
+
+        def iteration(fresh: bool) -> Correction | None:
             system.set_phase(x)
-            state = system.at(x)
-            state.residual(equations)
-            state.factor(self.solver.axis)
-            if not system.solve(equations, step):
-                return MOST
+            step = linear_step(system, x, self.solver.axis)
+            if step is None:
+                return None
             step.scale(-1.0)
-            size = system.norm(step)
-            if not isfinite(size):
-                return MOST
+            distance = system.norm(step)
             # the plain step measures the distance from a solution of F = 0: plain Newton converges from here
-            if max(size, system.in_units(step, -1).norm() / (1.0 + system.in_units(x, -1).norm())) < NEAR:
-                return number
-            factor = self.rescaling(x, step)
-            factor *= min(1.0, LARGEST / max(abs(factor) * size, TINY))
-            if not self._advance(x, step, factor):
-                return MOST
-        return MOST
+            size = max(distance, relative_size(system, x, step))
+            if isfinite(size) and size >= NEAR:
+                factor = self.rescaling(x, step)
+                factor *= min(1.0, LARGEST / max(abs(factor) * distance, TINY))
+                if not self._advance(x, step, factor):
+                    return None
+            return Correction(distance, size)
+
+        return newton(iteration, Limits(MOST, inf, NEAR))
 
     def rescaling(self, x: PETSc.Vec, step: PETSc.Vec) -> float:
         """Factor that makes a plain Newton step at ``x`` the step of the deflated equations."""

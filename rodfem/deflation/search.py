@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
+from rodfem.deflation.deflated_newton import FLOW, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
@@ -120,8 +120,7 @@ class Deflation(DeflatedNewton):
                 base = self.bases[number % len(self.bases)] if self.bases else self.start
                 x = turned_state(self.system, base, amplitude, [self.seed, number])
                 self.flow(x, FLOW * (1 + number // 2 % 2))
-            steps = self.approach(x)
-            point, outcome = self._judge(x) if steps < MOST else (None, FAILED)
+            point, outcome = self._judge(x) if self.approach(x).converged else (None, FAILED)
             self.tally.tries.append(outcome)
             if point is not None:
                 self.found.append(point)

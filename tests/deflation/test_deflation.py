@@ -228,7 +228,7 @@ def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
             x = turned_state(solver.system, solver.start(25.0), 0.1 + 0.12 * number, [1, number])
             newton = DeflatedNewton(solver)
             newton.flow(x)
-            counts[-1].append(newton.approach(x))
+            counts[-1].append(newton.approach(x).iterations)
     assert counts[0] == counts[1] == counts[2]
 
 
