@@ -113,7 +113,7 @@ class Solver:
         if scene.conservative:
             compat.require_real_petsc()
         if form_compiler.ALONE:
-            compile_ahead("linalg/chain", "fem/assembly", "fem/newton", "fem/shape")
+            compile_ahead("linalg/chain", "fem/assembly", "fem/newton")
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -15,10 +15,7 @@ from rodfem.fem.fields import LOAD
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
 from rodfem.forms.kinematics import UNDEFORMED
-from rodfem.linalg.compiled import Memory, buffer, module
-
-if TYPE_CHECKING:
-    from rodfem.fem.fields import Fields
+from rodfem.problem.quaternions import directors
 
 INWARDS = 1e-9
 """Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
@@ -64,53 +61,6 @@ class Gauss:
         return legendre.legval(2 * np.asarray(x, dtype=float) - 1, antiderivative).T
 
 
-class CompiledShape:
-    """Slopes and least stretch by compiled code (``shape.c``) for the owned cells of one mesh.
-
-    Each row of a branch asks for both; by arrays they cost as much as a factorisation.
-    """
-
-    def __init__(self, fields: Fields, points: np.ndarray) -> None:
-        """Hand over the degrees of freedom of the ``fields`` and the Gauss ``points`` in [0, 1]."""
-        code = module("fem/shape")
-        self._lib, self._ffi, self._memory = code.lib, code.ffi, Memory(code.ffi)
-        scene, k, owned = fields.scene, fields.discretization.degree, slice(0, fields.owned_cells)
-        self._shape = (fields.owned_cells, len(points), 3)
-        self.spacing = 0.5 / k
-        """Distance of the samples in a cell, [-1, 1]."""
-        shape = self._pointer = self._ffi.new("Shape *")
-        shape.cells, shape.points, shape.nodes, shape.strain_nodes = fields.owned_cells, len(points), k + 1, k
-        shape.normal = -1 if scene.normal is None else scene.normal
-        shape.strains, shape.samples = len(scene.free_strains), 4 * k + 1
-        strains = fields.dofs["v"][owned] if "v" in fields.dofs else np.zeros(0)
-        integers = {
-            "component": np.array(scene.free_strains),
-            "rotation": fields.dofs[fields.turning.name][owned],
-            "strain": strains,
-        }
-        doubles = {
-            "held": [0.0 if i in scene.free_strains else x for i, x in enumerate(UNDEFORMED)],
-            "basis": compat.lagrange_basis(k, points),
-            "strain_basis": compat.lagrange_basis(k - 1, points),
-            "sample_basis": compat.lagrange_basis(k - 1, np.linspace(0, 1, shape.samples)),
-        }
-        for kind, arrays in ((np.int32, integers), (float, doubles)):
-            given = {name: np.ascontiguousarray(values, dtype=kind) for name, values in arrays.items()}
-            self._memory.point(shape, **given)
-
-    def slopes(self, local: np.ndarray) -> np.ndarray:
-        """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3), of ``local`` values."""
-        out = np.empty(self._shape)
-        self._lib.slopes(self._pointer, buffer(self._ffi, local), buffer(self._ffi, out))
-        return out
-
-    def least_stretch(self, local: np.ndarray) -> tuple[float, int, int]:
-        """Least stretch ``v3``, an unknown, at equally spaced samples of all cells; its cell, and the sample there."""
-        place = self._ffi.new("int[2]")
-        value = self._lib.least(self._pointer, buffer(self._ffi, local), place)
-        return value, place[0], place[1]
-
-
 class Shape:
     """Evaluates shapes of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks.
 
@@ -137,7 +87,10 @@ class Shape:
         self.order = np.argsort(compat.nodes(k))
         self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
-        self._compiled = CompiledShape(f, self.gauss.points)
+        self._v_at_samples = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
+        free = system.scene.free_strains
+        self._held_strains = np.array([0.0 if i in free else x for i, x in enumerate(UNDEFORMED)])
+        self._strains = np.eye(len(UNDEFORMED))[list(free)]
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         self._probe_weights = [self.weights(s) for s in system.scene.ordinate.places]
         self.cells = cells
@@ -163,10 +116,12 @@ class Shape:
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
-        local, comm, spacing = self.system.at(x).local, self.system.comm, self._compiled.spacing
-        least, cell, place = self._compiled.least_stretch(local)
-        powers = self._v_to_powers @ local[self.system.fields.dofs["v"][cell, :, -1]]
-        mine = min(least, minimum(powers.tolist(), -1.0 + spacing * place, spacing))
+        nodal = self.system.at(x).values("v")[self.cells, :, -1]
+        samples = nodal @ self._v_at_samples.T
+        cell, place = divmod(int(samples.argmin()), samples.shape[1])
+        spacing = 2.0 / (samples.shape[1] - 1)
+        turn = minimum((self._v_to_powers @ nodal[cell]).tolist(), -1.0 + spacing * place, spacing)
+        mine, comm = min(float(samples[cell, place]), turn), self.system.comm
         return mine if comm.size == 1 else float(comm.allreduce(mine, op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
@@ -298,7 +253,11 @@ class Shape:
 
     def slopes(self, state: NodalValues) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
-        return self._compiled.slopes(state.local)
+        R = directors(state.fields.turning.quaternion(self._q_at_gauss @ state.turned[self.cells]))
+        if not self.system.scene.free_strains:
+            return np.asarray(R @ self._held_strains)
+        strains = self._v_at_gauss @ state.values("v")[self.cells] @ self._strains + self._held_strains
+        return np.asarray((R @ strains[..., None])[..., 0])
 
 
 def unique(values: np.ndarray) -> np.ndarray:
