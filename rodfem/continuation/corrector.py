@@ -32,7 +32,6 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.compiled_newton import SINGULAR
 from rodfem.fem.newton import NewtonResult, iterate, limits, result
 from rodfem.fem.state import State
-from rodfem.fem.system import dense_columns
 from rodfem.stability.inertia import FRESH, Factored, Index, Inertia
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
@@ -81,7 +80,6 @@ class Corrector:
         """Allocate right-hand sides, solutions and the block of vectors."""
         self.inertia, self.system = inertia, inertia.system
         system = self.system
-        self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._step = system.new_vector()
         near_zero = NEAR * inertia.scale
         serves = CompiledCorrector.serves(inertia.matrix, inertia.factors)
@@ -166,19 +164,17 @@ class Corrector:
         """
         system, inertia = self.system, self.inertia
         with system.clock("solve"):
-            columns = self._right.getDenseArray()
-            columns[:, 0] = 0.0 if right is None else right.array_r
-            columns[:, 1], columns[:, 2:] = found.border.array_r, self._images
+            first = np.zeros(len(self._images)) if right is None else right.array_r.real
+            columns = np.column_stack([first, found.border.array_r.real, self._images])
             sizes = np.sqrt(inertia.sum((self._images * self._block).sum(axis=0)))
-            found.factors.solve_all(self._right, self._solved)
-            solved = self._solved.getDenseArray()
+            solved = found.factors.solve_all(columns)
             self._step.array[:] = solved[:, 0]
             tangent = system.new_vector()  # z = (-S^-1 F_lam, 1)
             tangent.array[:] = -solved[:, 1]
             system.set_load(tangent, 1.0)
             tangent.scale(1.0 / system.norm(tangent))
             # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
-            block = np.array(solved[:, 2:].real)
+            block = solved[:, 2:]
             images = inertia.weighed(block)
             grown = np.sqrt(np.maximum(inertia.sum((images * block).sum(axis=0)), TINY))
             growth = float((grown / sizes).max()) if np.isfinite(grown).all() else inf

@@ -144,7 +144,7 @@ def _unit(solver: BranchSolver, direction: PETSc.Vec) -> PETSc.Vec:
 
 def _modes(condensation: Condensation, reduced: ReducedStiffness, vectors: np.ndarray) -> list[PETSc.Vec]:
     """Modes of vectors of H, orthonormal in the metric."""
-    modes = [condensation.vector(reduced.W @ v) for v in vectors.T]
+    modes = [condensation.inertia.vector(reduced.W @ v) for v in vectors.T]
     orthonormalize(modes, condensation.inertia.metric)
     return modes
 

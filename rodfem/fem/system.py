@@ -400,13 +400,3 @@ class System:
             metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
         metric.assemble()
         return metric
-
-
-def dense_columns(system: System, count: int) -> PETSc.Mat:
-    """Zero matrix of as many columns, each a vector of the system: right-hand sides or solutions."""
-    columns = PETSc.Mat().createDense(
-        ((system.fields.local_unknowns, system.fields.unknowns), (None, count)), comm=system.comm
-    )
-    columns.setUp()
-    columns.assemble()
-    return columns

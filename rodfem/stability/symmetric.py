@@ -23,7 +23,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.fem.system import dense_columns
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import places_in, shared
 from rodfem.stability.inertia import Inertia, inertia_factors
@@ -319,12 +318,9 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         All at once: the cost is that of the call, hardly of a column.
         """
         held = self._held()
-        right, solved = dense_columns(self.system, len(vectors)), dense_columns(self.system, len(vectors))
-        for i, vector in enumerate(vectors):
-            right.getDenseArray()[:, i] = (held.scaled[1] * vector).array_r
-        held.shifted.factors.solve_all(right, solved)
-        for i, (value, vector) in enumerate(zip(values, vectors, strict=True)):
-            vector.array[:] = (value - held.shift) * solved.getDenseArray()[:, i]
+        right = np.stack([(held.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
+        for value, vector, column in zip(values, vectors, held.shifted.factors.solve_all(right).T, strict=True):
+            vector.array[:] = (value - held.shift) * column
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
