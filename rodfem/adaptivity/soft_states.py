@@ -105,7 +105,10 @@ class SoftStates:
         return 0.0 if regular is None or regular.index is None else regular.index.nearest
 
     def _differing(self, point: Point, fixed_load: bool) -> int:
-        """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one."""
+        """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one.
+
+        A row of a branch in doubt that the richer mesh does not have is in doubt, too.
+        """
         with self.solver.system.clock.scope("error bars"):
             richer = self._companion(0)
             try:
@@ -114,11 +117,11 @@ class SoftStates:
                 below = found.below(-inertia.tolerance)
                 if below == point.negative:
                     self.uncompared = "" if again.resolved else _other_state(point.load, again)
-                    return int(again.resolved and self._moved(point, found))
+                    return int(self._moved(point, found) if again.resolved else not fixed_load)
                 index = decide(found).index
             except ConvergenceError as trouble:  # no such state, or arithmetic leaves too many signs open there
                 self.uncompared = str(trouble)
-                return 0
+                return int(not fixed_load)
         own = point.zero - self.solver.system.active_drifts(point.x)
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 

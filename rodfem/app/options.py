@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rodfem.diagram.plan import Plan
     from rodfem.fem.fields import Discretization
 
-STEP = 0.05
+STEP = 0.1
 """Largest step along a branch, in radian, by default."""
 
 

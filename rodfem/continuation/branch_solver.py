@@ -15,7 +15,7 @@ from rodfem.continuation.corrector import STEPS, Corrector
 from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, limits
+from rodfem.fem.newton import NewtonResult, correct, limits
 from rodfem.fem.state import Energies
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
@@ -181,7 +181,7 @@ class BranchSolver(StaticSolver):
         """
         last, system = known[-1], self.system
         if self._whole is not None:
-            made = self._whole(known, s, bounds, limits(system, STEPS, reach, TOLERANCE), NEGLIGIBLE)
+            made = self._whole(known, s, bounds, limits(system, STEPS, reach), NEGLIGIBLE)
             if made is not None:
                 index = self.corrector.index(made.found, made.below, made.nearest)
                 numbers = made.aligned, made.length, made.energies
@@ -207,7 +207,7 @@ class BranchSolver(StaticSolver):
         the normal of the plane on which the equilibrium lies, and ``reach`` bounds how far ``x`` may move, in the
         metric.
         """
-        outcome = self.corrector.correct(x, row, most=STEPS, reach=reach, tolerance=TOLERANCE)
+        outcome = self.corrector.correct(x, row, most=STEPS, reach=reach)
         regular = outcome is not None
         if outcome is None:
             outcome = correct(self.system, x, row, most=STEPS, reach=reach)

@@ -101,7 +101,7 @@ class EventPiece(Chord):
         where an equilibrium is not found.
         """
         first, last = self.first, self.last
-        known, out = [first, *([] if clear(first, last) else self.turns()), last], list[Node]()
+        known, out = [first, *([] if clear(first, last, np.zeros((1, 1))) else self.turns()), last], list[Node]()
         for zero, group in groupby(known, self.is_zero):
             if zero:
                 out.append(min(group, key=lambda node: min(node.s - first.s, last.s - node.s)))

@@ -97,8 +97,8 @@ def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("width", [pytest.param(1e-2, marks=pytest.mark.alone), 1e-3])
-def test_convexity_lost_between_the_places_of_the_quadrature(width: float) -> None:
+@pytest.mark.alone
+def test_convexity_lost_between_the_places_of_the_quadrature(width: float = 1e-2) -> None:
     """Twisting stiffness ``(s - 0.37)^2 + (P - 1)^2 - width^2``: negative within a width of 0.37, where P is near 1."""
 
     def notch(v: Any, k: Any, c: Any) -> Any:

@@ -176,13 +176,13 @@ def test_sliding_costs_what_the_tails_of_a_buckle_tell() -> None:
     """Its tails decay like exp(-delta s), and meet the clamps half a length away: mu ~ delta^2 exp(-delta)."""
     diagram = buckle(40)
     soft = [(decay(diagram, p), m) for p in diagram[1].points for m in p.soft]
-    assert len(soft) > 12 and {m.name for _, m in soft} == {SLIDING}
+    assert len(soft) > 8 and {m.name for _, m in soft} == {SLIDING}
     assert min(m.value for _, m in soft) < 2e-8
     # one below 1e-8 is within what Newton's method leaves open of a state that is as good as singular
     assert all(m.decided for _, m in soft if m.value > 1e-8)
     assert {p.undecided for p in diagram[1].points if all(m.value > 1e-8 for m in p.soft)} == {0}
     constant = [log(m.value) + delta - 2 * log(delta) for delta, m in soft[:8]]
-    assert np.ptp(constant) < 5e-3  # over a factor of 300 in the eigenvalue
+    assert np.ptp(constant) < 6e-3  # over a factor of 300 in the eigenvalue
     for delta, m in soft:
         assert abs(m.value - exp(np.mean(constant) - delta) * delta**2) < m.uncertainty + 0.01 * m.value
     (asked,) = diagram.special("user", "branch 1")
@@ -195,7 +195,7 @@ def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
     diagram = buckle(27)
     branch = diagram[1]
     undecided = [p for p in branch.points if p.undecided]
-    assert len(undecided) > 10 and {p.negative for p in branch.points[1:]} == {1}  # as the rod has
+    assert len(undecided) > 8 and {p.negative for p in branch.points[1:]} == {1}  # as the rod has
     assert all(m.name == SLIDING and m.uncertainty > 1e-5 for p in undecided for m in p.soft)
     assert any("the index is 1 or 2 (sliding along the rod" in sentence for sentence in diagram.warnings)
     (asked,) = diagram.special("user", "branch 1")
