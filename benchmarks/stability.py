@@ -29,11 +29,11 @@ from benchmarks.store import Store
 from rodfem.continuation.corrector import Corrector
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
+from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.assessment import Assessor
-from rodfem.stability.blocks import Blocks
+from rodfem.stability.dependence import rank_of
 from rodfem.stability.inertia import Inertia
-from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import decide, quotient_error
 
 sys.path.append(str(ROOT / "tests"))
@@ -312,7 +312,7 @@ def ranks() -> str:
         row = [str(elements)]
         for name, coordinates in (("cord", "tangent"), ("hemitropic", "tangent"), ("hemitropic", "compatible")):
             solver = Solver(small_states.scene(name), Discretization("pointwise", elements, 1)).equilibria
-            pencil = Blocks(solver.system, coordinates).assemble(solver.start(20.0 if name == "cord" else 0.1))
+            pencil = Coordinates(solver.system, coordinates).assemble(solver.start(20.0 if name == "cord" else 0.1))
             h = solver.system.scene.length / elements
             sigma = rank_of(pencil)
             row += [f"{sigma:.4e}", f"{sigma / h:.5f}"]

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from rodfem.fem.system import System
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
-from rodfem.stability.condensed import REAL
+from rodfem.stability.spectrum import REAL
 
 MULTIPLE = 1e-8
 """Eigenvalues that differ by less than this, relative, are one that is multiple."""

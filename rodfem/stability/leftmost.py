@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rodfem.stability.condensed import SHIFT
 from rodfem.stability.frequencies import Frequencies, groups, in_order
 from rodfem.stability.nonsymmetric import BEYOND, SPARE, NonsymmetricPencil
+from rodfem.stability.spectrum import SHIFT
 
 FREQUENCIES = 6
 """Number of frequencies recorded at each load where nobody asks for another."""

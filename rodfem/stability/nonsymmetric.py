@@ -4,7 +4,7 @@ A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low
 couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
 axis: flutter.
 
-The finite eigenvalues are those of the pencil on its unknowns with mass: :mod:`~rodfem.stability.condensed`.
+The finite eigenvalues are those of the pencil on its unknowns with mass: :mod:`~rodfem.stability.spectrum`.
 
 A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
 ``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
@@ -29,7 +29,6 @@ from rodfem.linalg.matrices import Shared, gathered, local_rows, places_in, shar
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
-from rodfem.stability.condensed import SHIFT, Condensed, Eigenpairs
 from rodfem.stability.frequencies import REAL, Frequencies, in_order, named, orthonormal, product, squares
 from rodfem.stability.pencil import (
     FACTORS,
@@ -41,7 +40,7 @@ from rodfem.stability.pencil import (
     weighed_modes,
 )
 from rodfem.stability.slow_motions import floor_of_slow
-from rodfem.stability.spectrum import Spectrum, inside
+from rodfem.stability.spectrum import SHIFT, Condensed, Eigenpairs, Spectrum, inside
 from rodfem.tolerances import NEGLIGIBLE
 
 BEYOND = 6

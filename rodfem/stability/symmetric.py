@@ -200,12 +200,16 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             )
         spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
         held.shift = modes.values[0] - 0.1 * spread
-        units = self.system.scene.units
-        if units.ordinary:
-            return modes
-        for vector in modes.vectors:
-            vector.pointwiseMult(vector, self.sizes)
-        return replace(modes, values=units.omega2 * modes.values)
+        return replace(
+            modes, values=self.system.scene.units.omega2 * modes.values, vectors=self.unscaled(modes.vectors)
+        )
+
+    def unscaled(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        """The same vectors, in units of natural sizes before and in those of the rod now."""
+        if not self.system.scene.units.ordinary:
+            for vector in vectors:
+                vector.pointwiseMult(vector, self.sizes)
+        return vectors
 
     def go_below(self) -> None:
         """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""

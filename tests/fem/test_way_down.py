@@ -34,7 +34,7 @@ def test_a_step_is_uphill_where_it_is_too_long(
     state.residual(equations)
     state.factor(e.axis, damping=1.0 / (times * half))
     assert e.system.solve(equations, step)
-    blocks = Blocks(e.system, "full")
+    blocks = Blocks(e.system)
     K = blocks.assemble(x).K
     own = blocks.rows - step.getOwnershipRange()[0]
     moved, pulled = K.createVecs()

@@ -22,6 +22,7 @@ from rodfem.forms import paper
 from rodfem.forms.kinematics import RODS, UNDEFORMED, curvature, strain
 from rodfem.forms.lagrangian import pointwise, reduced
 from rodfem.forms.rotation import product, rotation
+from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Blocks
 
@@ -197,7 +198,7 @@ def hamilton(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 # --- on a finite element space ---------------------------------------------------------------------------------
 
 
-def rotated(system: System, blocks: Blocks, x: PETSc.Vec, dq: PETSc.Vec, eps: float) -> PETSc.Vec:
+def rotated(system: System, blocks: Coordinates, x: PETSc.Vec, dq: PETSc.Vec, eps: float) -> PETSc.Vec:
     """``exp(eps theta_i / 2) q_i`` at all nodes, ``dq`` its derivative at eps = 0; all else linear in eps."""
     y = x.copy()
     y.axpy(eps, dq)
@@ -215,7 +216,7 @@ def rotated(system: System, blocks: Blocks, x: PETSc.Vec, dq: PETSc.Vec, eps: fl
 def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, formulation: str, load: float) -> None:
     """At a discrete equilibrium, to round-off: fourth order differences of the first derivative along the curve."""
     system, x = buckled(name, formulation, 3, 2, load)
-    blocks = Blocks(system)
+    blocks = Coordinates(system)
     pencil = blocks.assemble(x)
     T, K = gathered(pencil.T), gathered(pencil.K)
     unit_norm = hessian_of_unit_norm(system, blocks, x, T)
@@ -235,7 +236,7 @@ def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, 
 
     def full(z: np.ndarray) -> PETSc.Vec:
         out = system.new_vector()
-        out.array[blocks.rows - system.fields.offset] = (T @ z)[first:last]
+        out.array[blocks.blocks.rows - system.fields.offset] = (T @ z)[first:last]
         return out
 
     for _ in range(2):
@@ -247,7 +248,7 @@ def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, 
             assert abs(z @ (unit_norm @ z)) > 1e-5 * scale  # it would be missed
 
 
-def hessian_of_unit_norm(system: System, blocks: Blocks, x: PETSc.Vec, T: Any) -> Any:
+def hessian_of_unit_norm(system: System, blocks: Coordinates, x: PETSc.Vec, T: Any) -> Any:
     """What the unit norm term contributes: ``T^t K T`` with eta less that without."""
     pencil = blocks.assemble(x)
     without = x.copy()
@@ -271,7 +272,7 @@ def smooth(s: np.ndarray, length: float, phase: float, components: int) -> np.nd
 def quadratic_forms(name: str, formulation: str, load: float, elements: int, degree: int) -> np.ndarray:
     """The Hessian of smooth perturbations of all fields, by UFL and by hand, (perturbations, 2)."""
     system, x = buckled(name, formulation, elements, degree, load)
-    blocks, f = Blocks(system, "full"), system.fields
+    blocks, f = Blocks(system), system.fields
     blocks.assemble(x)
     w = fem.Function(f.space, dtype=np.float64)
     form, z, state = by_hand(system, w), system.new_vector(), system.at(x)
