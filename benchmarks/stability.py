@@ -34,7 +34,7 @@ from rodfem.linalg.matrices import gathered
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.dependence import rank_of
 from rodfem.stability.inertia import Inertia
-from rodfem.stability.round_off import decide, quotient_error
+from rodfem.stability.near_zero import decide, quotient_error
 
 sys.path.append(str(ROOT / "tests"))
 
@@ -408,7 +408,7 @@ def resolution(band: str, rank: str) -> str:
 
 The band is the half width of the interval about zero in which inertia alone decides nothing, relative to the system's
 metric: 10 eps |S| over the smallest mass. Inside it the Rayleigh quotient of the pair nearest zero decides, which
-round-off blurs by no more than the number in the next column (`rodfem/stability/round_off.py`). The band grows like n
+round-off blurs by no more than the number in the next column (`rodfem/stability/near_zero.py`). The band grows like n
 as long as the largest entries of S are those of the constraints, then like n^2; the other number like n^1.5. Few
 elements of high degree reach more digits with a narrower band.
 

@@ -170,12 +170,11 @@ class Coordinates:
         """Keep of the equations that close a ring's rotation the combinations across the quaternion at its start."""
         f, comm, count = self.system.fields, self.system.comm, len(self.blocks.columns)
         start = np.isclose(f.coordinates(f.discretization.degree), self.system.scene.interval[0])
-        here = state.values("q")[start]
-        q = next(part[0] for part in comm.allgather(here) if len(part))
-        closing = [x for x in f.unknown_scalars if x.group == CLOSING_MOMENT]
-        scalars = np.array([f.scalars[x.name] for x in closing] if self.system.has_scalars else [], dtype=int)
-        columns = np.searchsorted(self.blocks.columns, scalars)
-        across = np.linalg.svd(q[[x.component for x in closing]][None])[2][1:].T if len(columns) else np.zeros((0, 0))
+        q = np.concatenate(comm.allgather(state.values("q")[start]))[0]
+        closing = {f.scalars[x.name]: x.component for x in f.unknown_scalars if x.group == CLOSING_MOMENT}
+        mine = list(closing) if self.system.has_scalars else []
+        columns = np.searchsorted(self.blocks.columns, np.array(mine, dtype=int))
+        across = np.linalg.svd(q[list(closing.values())][None])[2][1:].T
         kept = np.delete(np.arange(count), columns[-1:])
         chosen = sp.identity(count, format="lil")[:, kept]
         if len(columns):

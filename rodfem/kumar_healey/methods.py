@@ -49,7 +49,10 @@ class Reduction(Method):
         return ReducedPencil(self.coordinates.without_modes(x, self.work.sizes))
 
     def lifted(self, found: Reduced, certified: bool, factorisations: int, note: str = "") -> Found:
-        """What was found, as vectors of the system and in its units."""
+        """What was ``found``, as vectors of the system and in its units, with ``factorisations`` and a ``note``.
+
+        It is ``certified`` where a count finds no more.
+        """
         vectors = self.coordinates.lift(found.vectors, self.work.sizes)
         return Found(self.work.one * found.values, vectors, found.errors, certified, factorisations, note)
 

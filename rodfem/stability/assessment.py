@@ -1,7 +1,7 @@
 """A state in, a report on its stability out: one interface to all methods of :mod:`rodfem.stability.registry`.
 
 Every verdict on a conservative state has its index by the count, decided within the count's band by Rayleigh quotients
-(:mod:`rodfem.stability.round_off`); methods differ in how they find eigenvalues and vectors.
+(:mod:`rodfem.stability.near_zero`); methods differ in how they find eigenvalues and vectors.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from rodfem.faults import as_failure
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.dependence import rank_of
 from rodfem.stability.methods import Found, Method, Workspace
+from rodfem.stability.near_zero import Decision, decide
 from rodfem.stability.registry import AUTO, METHODS, find
-from rodfem.stability.round_off import Decision, decide
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 
 COUNT, DENSE = "count", "dense"

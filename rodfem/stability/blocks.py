@@ -52,19 +52,26 @@ class Blocks:
         """Number rows and columns, with the multipliers of the norms of quaternions or without."""
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
-        fields = system.fields
-        primal = {b.name: self.owned(b.name) for b in fields.blocks if not b.multiplier}
-        dual = {b.name: self.owned(b.name) for b in fields.blocks if b.multiplier and (norms or b.name != "eta")}
-        for numbers, multiplier in ((primal, False), (dual, True)):
-            scalars = [fields.scalars[x.name] for x in fields.unknown_scalars if x.multiplier == multiplier]
-            numbers["scalars" if multiplier else "ends"] = np.array(scalars if system.has_scalars else [], dtype=int)
-        self.rows, self.columns = (np.sort(np.concatenate(list(d.values()))) for d in (primal, dual))
-        self.where = {
-            name: np.searchsorted(every, n) + first_of(system.comm, len(every))
-            for every, numbers in ((self.rows, primal), (self.columns, dual))
-            for name, n in numbers.items()
-        }
+        self.where: dict[str, np.ndarray] = {}
+        self.rows = self._numbered("ends", multiplier=False)
+        self.columns = self._numbered("scalars", multiplier=True, left_out="" if norms else "eta")
         self.place = self._places()
+
+    def _numbered(self, last: str, *, multiplier: bool, left_out: str = "") -> np.ndarray:
+        """Global numbers of this rank's unknowns, or multipliers, ascending; scalars are those of the name ``last``.
+
+        The field of the name ``left_out`` is none of them.
+        """
+        f = self.system.fields
+        names = [b.name for b in f.blocks if b.multiplier == multiplier and b.name != left_out]
+        numbers, scalars = {name: self.owned(name) for name in names}, np.zeros(0, dtype=int)
+        if self.system.has_scalars:
+            scalars = np.array([f.scalars[x.name] for x in f.unknown_scalars if x.multiplier == multiplier], dtype=int)
+        numbers[last] = scalars
+        out = np.sort(np.concatenate(list(numbers.values())))
+        first = first_of(self.system.comm, len(out))
+        self.where |= {name: np.searchsorted(out, n) + first for name, n in numbers.items()}
+        return out
 
     def owned(self, name: str) -> np.ndarray:
         """Global numbers of this rank's free unknowns of a field, ascending."""

@@ -71,8 +71,7 @@ def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec
     system = shape.system
     if start is not None and system.norm(start - x) < ROUND:
         x = start
-    scalars = [u for u in system.fields.unknown_scalars if u.multiplier]
-    words = [u.group.equation.format(u.component + 1) for u in scalars]
+    words = [u.group.equation.format(u.component + 1) for u in system.fields.unknown_scalars if u.multiplier]
     remedy = SLACKEN if taut(shape, x) else REMEDY
     blocks = Blocks(system)
     pencil = blocks.assemble(x)

@@ -21,13 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 from scipy.linalg.lapack import dpstrf
+from scipy.sparse.linalg import splu
 from slepc4py import SLEPc
 
 from rodfem.compat import slepc_errors
@@ -289,6 +290,17 @@ def times(matrix: Matrix, w: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(matrix @ parts).view(complex)
 
 
+def condensed(stiffness: sp.csr_matrix, mass: sp.csr_matrix, shift: float) -> Condensed:
+    """A pencil on its unknowns with mass, by LU factors; raises :class:`ConvergenceError` if it is singular there."""
+    try:
+        lu = splu((stiffness - shift * mass).tocsc())
+    except RuntimeError as trouble:
+        raise ConvergenceError(
+            f"The pencil is singular at the shift {shift:.6g}: choose another load, or another discretisation."
+        ) from trouble
+    return Condensed(mass, lu.solve, partial(lu.solve, trans="T"), shift)
+
+
 class Operator:
     """A real matrix that is known by its products, as PETSc's python matrices ask for it."""
 
@@ -304,7 +316,7 @@ class Operator:
 
 
 def krylov(apply: Solve, size: int, number: int, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The ``number`` greatest eigenvalues of a real matrix (size, size) that is known by its products, and vectors.
+    """The ``number`` greatest eigenvalues, and vectors, of a real matrix (size, size) that ``apply`` multiplies with.
 
     The Krylov space begins with the vector ``start`` (size,), or with any.
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import dense_columns
 from rodfem.linalg.factorization import Factors
@@ -41,9 +42,8 @@ from rodfem.stability.pencil import (
 from rodfem.tolerances import SAME_EIGENVALUE
 
 HIT = 1e-8
-"""A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
-
-
+"""A shift nearer to an eigenvalue than this, relative to the farthest one found, or to itself, is one: but for
+round-off, which spoils the others, and the count there."""
 EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
@@ -53,8 +53,6 @@ LEAST_SPREAD = 1e-3
 """Part of the greatest eigenvalue that is added to the distance of the others: equal ones have none."""
 NOISE = 1e-6
 """Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
-COINCIDENT = 1e-8
-"""Distance of an eigenvalue from the shift, relative to that, below which the count beside it is round-off."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +229,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         mode.scale(1.0 / self.system.norm(mode))
         grown = mode.duplicate()
         held.shifted.factors.solve(held.scaled[1] * mode, grown)
-        return not self.system.norm(grown) * COINCIDENT * abs(held.shift) < 1.0
+        return not self.system.norm(grown) * HIT * abs(held.shift) < 1.0
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``, symmetry modes not included.
@@ -293,7 +291,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             start.array[:] += held.last
         inverse = Inverse(held.shifted.factors)
         solver = with_factors(*held.scaled, number, held.shift, inverse, start, held.deflated)
-        solver.solve()
+        with slepc_errors():
+            solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
         order = np.argsort(values)[:number]

@@ -29,9 +29,9 @@ from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.dependence import rank_of, smallest_singular
 from rodfem.stability.inertia import Inertia as Count
 from rodfem.stability.methods import Method
+from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import Inverse, assemble_pencil, symmetry_modes, weighed_modes, with_factors
 from rodfem.stability.registry import METHODS, find
-from rodfem.stability.round_off import decide
 
 pytestmark = pytest.mark.alone
 

@@ -11,7 +11,7 @@ import pytest
 from hard.fuzz import scenes as fuzz
 
 from rodfem import Discretization, Solver
-from rodfem.stability.mode_type import STRAIGHT
+from rodfem.stability.motion_names import STRAIGHT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.spectrum import SHIFT
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from rodfem import Attachment, Solver, clamped, free
 from rodfem.linalg.matrices import petsc_matrix, rounding
 from rodfem.stability.inertia import Index
-from rodfem.stability.round_off import decide, quotient_error, resolve
+from rodfem.stability.near_zero import decide, quotient_error, resolve
 
 pytestmark = pytest.mark.alone
 
