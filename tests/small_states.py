@@ -16,7 +16,6 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import Reduction
-from rodfem.linalg.matrices import first_of, gathered
 from rodfem.problem.scene import Scene
 
 
@@ -63,12 +62,10 @@ def unit_mode(system: System, x: PETSc.Vec) -> PETSc.Vec:
     pencil, rows = coordinates.assemble(x), coordinates.blocks.rows
     found = Reduction(pencil).near(2, -100.0)
     lowest = found.vectors[:, abs(found.values - found.values[0]) < 1e-6 * abs(found.values[0])]
-    every: Any = gathered(pencil.T) @ lowest
+    every: Any = pencil.T @ lowest
     # of a line or a plane of modes the one that a fixed functional likes best: the same on fine and on coarse meshes
     full = every @ np.linalg.solve(every.T @ every, every.T @ np.linspace(1.0, 1.4, len(every)))
-    first = first_of(system.comm, len(rows))
-    mode = system.new_vector()
-    mode.array[rows - system.fields.offset] = full[first : first + len(rows)]
-    mode.assemble()
+    mode, (mine, places) = system.new_vector(), coordinates.blocks.own(rows)
+    mode.array[places] = full[mine]
     mode.scale(1.0 / system.norm(mode))
     return mode

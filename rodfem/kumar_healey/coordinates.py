@@ -43,7 +43,7 @@ from petsc4py import PETSc
 from rodfem.errors import POINTWISE, InputError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
-from rodfem.linalg.matrices import block_matrix, first_of, gathered, local_rows, petsc_matrix
+from rodfem.linalg.matrices import block_matrix
 from rodfem.problem.ring import CLOSING_MOMENT
 from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
@@ -53,19 +53,24 @@ COORDINATES = ("full", "tangent", "compatible")
 
 @dataclass(frozen=True)
 class MappedPencil(Pencil):
-    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones; None if they are these.
+    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones.
 
     It is ``symmetric`` but under a follower load.  The rows of spins are ``where["theta"]``.
     """
 
-    T: PETSc.Mat | None
+    T: sp.csr_matrix
     symmetric: bool
+
+    def mapped(self, T: sp.csr_matrix, where: dict[str, np.ndarray]) -> MappedPencil:
+        """The same in coordinates that ``T`` maps to these, with the fields at other rows."""
+        K, M = ((T.T @ A @ T).tocsr() for A in (self.K, self.M))
+        return replace(self, K=K, C=(T.T @ self.C).tocsr(), M=M, where=where, T=self.T @ T)
 
 
 class Coordinates:
     """Makes the :class:`MappedPencil` of states of one system in one set of coordinates, and vectors of the system.
 
-    ``quaternions`` (nodes, 4) are the global numbers of the components of ``q`` at each of this rank's free nodes.
+    ``quaternions`` (nodes, 4) are the global numbers of the components of ``q`` at each free node.
     """
 
     def __init__(self, system: System, coordinates: str = "tangent") -> None:
@@ -77,27 +82,29 @@ class Coordinates:
         self.system, self.coordinates = system, coordinates
         self.blocks = Blocks(system, norms=coordinates == "full")
         f = system.fields
-        dofs = f.dofs["q"].reshape(-1, 4) if "q" in f.dofs else np.zeros((0, 4), dtype=int)
-        first = f.number[dofs[:, 0]]
-        mine = np.flatnonzero((first >= f.offset) & (first < f.offset + len(f.free_owned)))
-        self._dofs = dofs[mine[np.unique(first[mine], return_index=True)[1]]]
-        self.quaternions = f.number[self._dofs]
+        self._dofs = f.dofs["q"].reshape(-1, 4) if "q" in f.dofs else np.zeros((0, 4), dtype=int)
+        every = self.blocks.gathered(f.number[self._dofs])
+        first, chosen = np.unique(every[:, 0], return_index=True)
+        self._nodes = chosen[first >= 0]
+        self.quaternions = every[self._nodes]
         self._quads = np.searchsorted(self.blocks.rows, self.quaternions)
-        self._map: sp.csr_matrix | None = None
+        self._map = sp.csr_matrix((0, 0))
 
     def assemble(self, x: PETSc.Vec, sizes: PETSc.Vec | None = None) -> MappedPencil:
         """Blocks at the state ``x``, in units of natural ``sizes`` of the unknowns if these are given."""
         p, state = self.blocks.assemble(x, sizes), self.system.at(x)
-        full = MappedPencil(p.K, p.C, p.M, p.where, p.place, None, self.system.scene.conservative)
-        out = full if self.coordinates == "full" else self._tangent(full, state)
+        one = sp.identity(len(self.blocks.rows), format="csr")
+        out = MappedPencil(p.K, p.C, p.M, p.where, p.place, one, self.system.scene.conservative)
+        if self.coordinates != "full":
+            out = self._tangent(out, state)
         if self.coordinates == "compatible" and "v" in out.where:
             out = self._compatible(out)
-        self._map = gathered(out.T) if out.T is not None else None
+        self._map = out.T
         return out
 
     def without_modes(self, x: PETSc.Vec, sizes: PETSc.Vec) -> MappedPencil:
         """The same with a constraint ``g.Mx = 0`` more for each symmetry mode ``g``, in units of natural ``sizes``."""
-        modes, comm = symmetry_modes(self.system, x), self.system.comm
+        modes = symmetry_modes(self.system, x)
         units = None if self.system.scene.units.ordinary else sizes
         pencil, images = self.assemble(x, units), []
         if not modes:
@@ -106,29 +113,17 @@ class Coordinates:
             if units is not None:
                 weighed.pointwiseMult(weighed, units)
                 weighed.scale(1.0 / weighed.norm())
-            full = weighed.array_r[self.blocks.rows - self.system.fields.offset].copy()
-            image = PETSc.Vec().createWithArray(full, comm=comm)
-            if pencil.T is not None:
-                image, product = pencil.T.createVecRight(), image
-                pencil.T.multTranspose(product, image)
-            images.append(image.array_r.copy())
-        last = comm.rank == comm.size - 1
-        local = sp.hstack([local_rows(pencil.C), np.stack(images, axis=1)]).tocsr()
-        local.sort_indices()
-        rows, columns = pencil.C.getLocalSize()
-        size = ((rows, PETSc.DETERMINE), (columns + len(modes) * last, PETSc.DETERMINE))
-        csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
-        C = PETSc.Mat().createAIJ(size, csr=csr, comm=comm)
+            images.append(pencil.T.T @ self.blocks.gathered(weighed.array_r.real)[self.blocks.rows])
+        C = sp.hstack([pencil.C, np.stack(images, axis=1)]).tocsr()
         return replace(pencil, C=C, place=np.append(pencil.place, np.full(len(modes), np.nan)))
 
     def lift(self, vectors: np.ndarray, sizes: PETSc.Vec) -> list[PETSc.Vec]:
         """Vectors of the system from columns in the coordinates of the last pencil, in units of natural ``sizes``."""
-        full: np.ndarray = vectors if self._map is None else self._map @ vectors
-        rows, first, out = self.blocks.rows, first_of(self.system.comm, len(self.blocks.rows)), []
-        for column in full.T:
+        mine, places = self.blocks.own(self.blocks.rows)
+        out = []
+        for column in (self._map @ vectors)[mine].T:
             vector = self.system.new_vector()
-            vector.array[rows - self.system.fields.offset] = column[first : first + len(rows)]
-            vector.assemble()
+            vector.array[places] = column
             if not self.system.scene.units.ordinary:
                 vector.pointwiseMult(vector, sizes)
             out.append(vector)
@@ -138,82 +133,62 @@ class Coordinates:
 
     def _tangent(self, full: MappedPencil, state: State) -> MappedPencil:
         """A spin at each node in the place of its quaternion; that of a planar rod is one already."""
-        where = dict(full.where)
+        where, count = dict(full.where), len(self.blocks.rows)
         if "angle" in where:
             where["theta"] = where.pop("angle")
             return replace(full, where=where)
-        T, count = self._spins(state), len(self.blocks.rows)
         kept = np.delete(np.arange(count), self._quads[:, 0])
-        before, after = (first_of(self.system.comm, n) for n in (count, len(kept)))
-        spins = np.zeros(count, dtype=bool)
-        spins[self._quads[:, 1:].ravel()] = True
-        for name in {"v", "r", "ends"} & set(where):
-            where[name] = np.searchsorted(kept, where[name] - before) + after
-        where["theta"] = np.flatnonzero(spins[kept]) + after
+        where |= {name: np.searchsorted(kept, where[name]) for name in {"v", "r", "ends"} & set(where)}
+        where["theta"] = np.searchsorted(kept, np.sort(self._quads[:, 1:].ravel()))
         del where["q"]
-        K, C, M = full.K.ptap(T), T.transposeMatMult(full.C), full.M.ptap(T)
-        pencil = MappedPencil(K, C, M, where, full.place, T, full.symmetric)
+        pencil = full.mapped(self._spins(state)[:, kept], where)
         return self._closed(pencil, state) if self.system.scene.closed else pencil
 
-    def _spins(self, state: State) -> PETSc.Mat:
-        """``T``: columns of a spin in the places of q1, q2, q3, and one for each strain and centreline unknown."""
+    def _spins(self, state: State) -> sp.csr_matrix:
+        """Square matrix with columns of a spin in the places of q1, q2, q3, and one for each other unknown."""
         quads, count = self._quads, len(self.blocks.rows)
-        a, b, c, d = state.local[self._dofs].T / 2
+        a, b, c, d = self.blocks.gathered(state.local[self._dofs])[self._nodes].T / 2
         values = np.array([[-b, -c, -d], [a, d, -c], [-d, a, b], [c, -b, a]])  # of 1/2 (0, theta) q
         same = np.ones(count)
         same[quads.ravel()] = 0.0
         spins = block_matrix(np.moveaxis(values, 2, 0), quads, quads[:, 1:], (count, count))
-        full = (sp.diags(same) + spins).tocsr()
-        return petsc_matrix(self.system.comm, full[:, np.delete(np.arange(count), quads[:, 0])])
+        return (sp.diags(same) + spins).tocsr()
 
     def _closed(self, pencil: MappedPencil, state: State) -> MappedPencil:
         """Keep of the equations that close a ring's rotation the combinations across the quaternion at its start."""
-        f, comm, count = self.system.fields, self.system.comm, len(self.blocks.columns)
+        f, count = self.system.fields, len(self.blocks.columns)
         start = np.isclose(f.coordinates(f.discretization.degree), self.system.scene.interval[0])
-        q = np.concatenate(comm.allgather(state.values("q")[start]))[0]
+        q = self.blocks.gathered(state.values("q")[start])[0]
         closing = {f.scalars[x.name]: x.component for x in f.unknown_scalars if x.group == CLOSING_MOMENT}
-        mine = list(closing) if self.system.has_scalars else []
-        columns = np.searchsorted(self.blocks.columns, np.array(mine, dtype=int))
+        columns = np.searchsorted(self.blocks.columns, np.array(list(closing), dtype=int))
         across = np.linalg.svd(q[list(closing.values())][None])[2][1:].T
         kept = np.delete(np.arange(count), columns[-1:])
         chosen = sp.identity(count, format="lil")[:, kept]
         if len(columns):
             chosen[np.ix_(columns, np.searchsorted(kept, columns[:-1]))] = across
-        first, begin = pencil.C.getOwnershipRangeColumn()[0], first_of(comm, len(kept))
         where = dict(pencil.where)
         for name in {"scalars", *(b.name for b in f.blocks if b.multiplier)} & set(where):
-            own = where[name] - first
-            where[name] = np.searchsorted(kept, own[np.isin(own, kept)]) + begin
-        place = np.delete(pencil.place, np.concatenate(comm.allgather(columns[-1:] + first)))
-        return replace(pencil, C=pencil.C.matMult(petsc_matrix(comm, chosen)), where=where, place=place)
+            where[name] = np.searchsorted(kept, where[name][np.isin(where[name], kept)])
+        return replace(pencil, C=(pencil.C @ chosen).tocsr(), where=where, place=pencil.place[kept])
 
     def _compatible(self, pencil: MappedPencil) -> MappedPencil:
         """Let the strains of ``pencil`` (tangent coordinates) follow from the motion."""
-        f, comm = self.system.fields, self.system.comm
-        first_row, first_column = pencil.C.getOwnershipRange()[0], pencil.C.getOwnershipRangeColumn()[0]
+        f, blocks = self.system.fields, self.blocks
+        cells = [f.number[f.dofs[name][: f.owned_cells]].reshape(f.owned_cells, -1) for name in ("v", "n")]
         rows, columns = (
-            pencil.where[name][np.searchsorted(self.blocks.owned(name), f.number[f.dofs[name][: f.owned_cells]])]
-            .reshape(f.owned_cells, -1) - first
-            for name, first in (("v", first_row), ("n", first_column))
-        )  # fmt: skip
-        C_v = local_rows(pencil.C)[rows.ravel()][:, columns.ravel() + first_column]
+            pencil.where[name][np.searchsorted(blocks.numbers[name], blocks.gathered(own))]
+            for name, own in zip(("v", "n"), cells, strict=True)
+        )
+        middle = blocks.gathered(f.vertices[: f.owned_cells].mean(axis=1))
+        (n, a), b, (m, p) = rows.shape, columns.shape[1], pencil.C.shape
+        C_v = pencil.C[rows.ravel()][:, columns.ravel()]  # block diagonal
         C_v.eliminate_zeros()
-        (cells, a), b = rows.shape, columns.shape[1]
-        blocks = C_v.tobsr((a, b)).data  # in the order of the cells: other blocks are zero
-        Q, R = np.linalg.qr(np.swapaxes(blocks, 1, 2), mode="complete")
+        Q, R = np.linalg.qr(np.swapaxes(C_v.tobsr((a, b)).data, 1, 2), mode="complete")
         E = -np.linalg.solve(R[:, :a, :], np.swapaxes(Q[:, :, :a], 1, 2))
-        m, p = pencil.C.getLocalSize()
         kept = np.delete(np.arange(m), rows.ravel())
-        rest = np.arange(cells * (b - a)).reshape(cells, b - a)
-        follow = petsc_matrix(comm, block_matrix(E, rows, columns, (m, p)))
-        select = petsc_matrix(comm, sp.identity(m, format="csr")[:, kept])
-        N = petsc_matrix(comm, block_matrix(Q[:, :, a:], columns, rest, (p, rest.size)))
-        T = follow.matMult(pencil.C.transposeMatMult(select))
-        T.axpy(1.0, select, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        begin = first_of(comm, len(kept))
-        where = {name: np.searchsorted(kept, pencil.where[name] - first_row) + begin for name in ("theta", "r", "ends")}
-        where["n"] = rest.ravel() + first_of(comm, rest.size)
-        place = np.concatenate(comm.allgather(np.repeat(f.vertices[:cells].mean(axis=1), b - a)))
-        K, C, M = pencil.K.ptap(T), T.transposeMatMult(pencil.C).matMult(N), pencil.M.ptap(T)
-        whole = pencil.T.matMult(T) if pencil.T is not None else T
-        return MappedPencil(K, C, M, where, place, whole, pencil.symmetric)
+        rest = np.arange(n * (b - a)).reshape(n, b - a)
+        select, N = sp.identity(m, format="csr")[:, kept], block_matrix(Q[:, :, a:], columns, rest, (p, rest.size))
+        T = block_matrix(E, rows, columns, (m, p)) @ (pencil.C.T @ select) + select
+        where = {name: np.searchsorted(kept, pencil.where[name]) for name in ("theta", "r", "ends")}
+        out = pencil.mapped(T.tocsr(), where | {"n": rest.ravel()})
+        return replace(out, C=(out.C @ N).tocsr(), place=np.repeat(middle, b - a))

@@ -25,7 +25,7 @@ factors A alone and needs p solves and a dense p x p matrix more: for a few inte
 singular although the reduced matrix is not.  So it is in the pointwise formulation without mass (``rho_A = 0``) or with
 sigma = 0, where A has no entry for the centreline at all, and where sigma is an eigenvalue of the unconstrained pencil.
 
-Every rank gathers the whole matrices and computes the same.
+Every rank has the whole matrices and computes the same.
 """
 
 from __future__ import annotations
@@ -41,7 +41,6 @@ from scipy.sparse.linalg import splu
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.kumar_healey.coordinates import MappedPencil
 from rodfem.kumar_healey.null_space import kernel
-from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.spectrum import FINITE, krylov
 
@@ -69,14 +68,14 @@ class Reduced:
 
 
 class Reduction:
-    """The reduced eigenproblem of a pencil: blocks ``K``, ``C``, ``M`` of all ranks and the ``kernel`` of ``C^t``."""
+    """The reduced eigenproblem of a pencil: blocks ``K``, ``C``, ``M`` and the ``kernel`` of ``C^t``."""
 
     def __init__(self, pencil: MappedPencil, inverse: str = "saddle") -> None:
-        """Gather the blocks and factor ``C``; raises :class:`InputError` for dependent constraints."""
+        """Factor ``C``; raises :class:`InputError` for dependent constraints."""
         if inverse not in INVERSES:
             raise InputError(f"Unknown inverse {inverse!r}: choose one of {', '.join(INVERSES)}.")
         self.inverse, self.symmetric = inverse, pencil.symmetric
-        self.K, self.C, self.M = gathered(pencil.K), gathered(pencil.C), gathered(pencil.M)
+        self.K, self.C, self.M = pencil.K, pencil.C, pencil.M
         self.kernel = kernel(self.C, pencil.place)
 
     def near(self, number: int, target: float) -> Reduced:

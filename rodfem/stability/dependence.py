@@ -38,7 +38,6 @@ from petsc4py import PETSc
 from rodfem.errors import SceneError
 from rodfem.fem.newton import STALLED
 from rodfem.fem.shape import Shape
-from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.tolerances import NEGLIGIBLE
@@ -76,7 +75,7 @@ def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec
     blocks = Blocks(system)
     pencil = blocks.assemble(x)
     sigma = rank_of(pencil, words, system.scene.length, remedy)
-    if np.isinf(sigma) or sigma > DOUBTFUL * greatest(gathered(pencil.C), 0):
+    if np.isinf(sigma) or sigma > DOUBTFUL * greatest(pencil.C, 0):
         return
     for w in _doubtful(pencil, system.scene.length):
         if _distance(blocks, x, pencil, w) < STALLED:
@@ -116,7 +115,7 @@ def _doubtful(pencil: Pencil, length: float) -> Iterator[np.ndarray]:
     length
         Of the rod: positions are measured by it.
     """
-    C = sp.diags(units(pencil, length)) @ gathered(pencil.C)
+    C = sp.diags(units(pencil, length)) @ pencil.C
     for scale in (np.ones(C.shape[1]), 1.0 / norms(C, 0)):
         scaled = C @ sp.diags(scale)
         sigma, vector = smallest_singular(scaled)
@@ -130,25 +129,15 @@ def _distance(blocks: Blocks, x: PETSc.Vec, pencil: Pencil, w: np.ndarray) -> fl
     It is the root mean square over the unknowns, positions over the rod's length; ``pencil`` is that of the state, made
     by ``blocks``.
     """
-    length = blocks.system.scene.length
-    multipliers, change = pencil.C.createVecs()
-    first, last = multipliers.getOwnershipRange()
-    multipliers.array[:] = w[first:last]
-    pencil.C.mult(multipliers, change)
-    unit = units(pencil, length)[slice(*change.getOwnershipRange())]
-    change.array[:] *= unit
-    sigma = change.norm()
-    change.array[:] *= unit / (sigma or 1.0)
+    change, unit = pencil.C @ w, units(pencil, blocks.system.scene.length)
+    sigma = float(np.linalg.norm(unit * change))
+    change *= unit**2 / (sigma or 1.0)
     # the blocks are linear in the multipliers: of this many both parts have entries of one size
-    many = pencil.K.norm() / (pencil.C.norm() * multipliers.norm()) or 1.0
-    other = x.copy()
-    other.array[blocks.columns - x.getOwnershipRange()[0]] += many * w[first:last]
-    slope, before = change.duplicate(), change.duplicate()
-    blocks.assemble(other).K.mult(change, slope)
-    pencil.K.mult(change, before)
-    slope.axpy(-1.0, before)
-    slope.array[:] *= unit / many
-    steepness = float(slope.norm() * np.sqrt(change.size))
+    many = spl.norm(pencil.K) / (spl.norm(pencil.C) * np.linalg.norm(w)) or 1.0
+    other, (mine, places) = x.copy(), blocks.own(blocks.columns)
+    other.array[places] += many * w[mine]
+    slope = unit * ((blocks.assemble(other).K - pencil.K) @ change) / many
+    steepness = float(np.linalg.norm(slope) * np.sqrt(len(change)))
     if not steepness:
         return np.inf if sigma else 0.0
     return sigma / steepness
@@ -202,9 +191,9 @@ def _equilibrated(C: sp.spmatrix) -> sp.spmatrix:
 
 def units(pencil: Pencil, length: float) -> np.ndarray:
     """Natural size of each row (m,) of a pencil: that of a position is the ``length`` of the rod."""
-    comm, found = pencil.K.comm.tompi4py(), np.ones(pencil.C.size[0])
-    for name in ("r", "ends"):
-        found[np.concatenate(comm.allgather(pencil.where.get(name, np.zeros(0, dtype=int)))).astype(int)] = length
+    found = np.ones(pencil.C.shape[0])
+    for name in {"r", "ends"} & set(pencil.where):
+        found[pencil.where[name]] = length
     return found
 
 
@@ -237,7 +226,7 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0, re
 
     Raises :class:`SceneError` that names the constraints which depend on one another.
     """
-    C = gathered(pencil.C)
+    C = pencil.C
     if not C.shape[1]:
         return np.inf
     sigma, vector = smallest_singular(C)
@@ -267,10 +256,9 @@ def dependent(pencil: Pencil, scalars: Sequence[str], vector: np.ndarray, sigma:
     remedy
         What to do about them.
     """
-    comm, vector = pencil.K.comm.tompi4py(), vector / np.linalg.norm(vector)
-    shares = {}
+    vector, shares = vector / np.linalg.norm(vector), {}
     for name in NAMES:
-        columns = np.concatenate(comm.allgather(pencil.where.get(name, np.zeros(0, dtype=int)))).astype(int)
+        columns = pencil.where.get(name, np.zeros(0, dtype=int))
         shares[name] = (float((vector[columns] ** 2).sum()), columns)
     blocks = [name for name, (share, _) in shares.items() if share > 0.01]
     words = []

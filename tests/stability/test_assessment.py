@@ -21,7 +21,6 @@ from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import INVERSES, Reduction
-from rodfem.linalg.matrices import gathered, petsc_matrix
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Inertia
 from rodfem.stability.assessment import Assessor, assess
@@ -334,7 +333,7 @@ def test_more_constraints_than_half_the_unknowns() -> None:
     """In full coordinates the pointwise formulation has p > m/2 with free strains none: the reduction still holds."""
     system, x = plain("cord", "pointwise", *SMALL, 20.0)
     pencil = Coordinates(system, "full").assemble(x)
-    m, p = pencil.C.getSize()
+    m, p = pencil.C.shape
     assert p > m / 2
     expected = assess(system, x, number=3)
     assert expected.certified
@@ -424,7 +423,7 @@ def test_smallest_singular_value(formulation: str) -> None:
     system, x = buckled("hemitropic", formulation, *SMALL, 0.2)
     for coordinates in ("full", "tangent"):
         pencil = Coordinates(system, coordinates).assemble(x)
-        C = gathered(pencil.C).toarray()
+        C = pencil.C.toarray()
         assert rank_of(pencil) == pytest.approx(np.linalg.svd(C, compute_uv=False)[-1], rel=1e-9)
 
 
@@ -439,11 +438,10 @@ def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
 
 def test_round_off_is_no_independence() -> None:
     """Two constraints on one unknown differ by round-off of another one; in a tiny rod by what is none."""
-    comm = MPI.COMM_SELF
-    unit, where = petsc_matrix(comm, sp.identity(3, format="csr")), {"q": np.array([0, 1]), "r": np.array([2])}
+    unit, where = sp.identity(3, format="csr"), {"q": np.array([0, 1]), "r": np.array([2])}
 
     def pencil(C: list[list[float]]) -> Pencil:
-        return Pencil(unit, petsc_matrix(comm, sp.csr_matrix(np.array(C))), unit, where, np.zeros(2))
+        return Pencil(unit, sp.csr_matrix(np.array(C)), unit, where, np.zeros(2))
 
     with pytest.raises(SceneError, match="depend on one another"):
         rank_of(pencil([[1.0, 1.0], [0.0, 1e-16], [0.0, 0.0]]))
@@ -454,17 +452,11 @@ def test_round_off_is_no_independence() -> None:
 def test_dependent_constraints_are_named() -> None:
     system, x = plain("hemitropic", "reduced", *SMALL, 0.2)
     pencil = Blocks(system).assemble(x)
-    comm = MPI.COMM_SELF
-    C = gathered(pencil.C).tolil()
-    last = np.concatenate(system.comm.allgather(pencil.where["scalars"]))
+    C, last = pencil.C.tolil(), pencil.where["scalars"]
     C[:, last[0]] = C[:, last[1]]
     sigma, vector = smallest_singular(C)
     assert sigma < 1e-13
     np.testing.assert_allclose(abs(vector[last[:2]]), 2**-0.5, rtol=1e-6)
-    where = pencil.where | {"scalars": last, "eta": np.zeros(0, dtype=int)}
-    if system.comm.size == 1:
-        twin = replace(
-            pencil, K=petsc_matrix(comm, gathered(pencil.K)), C=petsc_matrix(comm, sp.csr_matrix(C)), where=where
-        )
-        with pytest.raises(SceneError, match=r"component 1 and position of the ends, component 2.*remove those"):
-            rank_of(twin)
+    twin = replace(pencil, C=C.tocsr(), where=pencil.where | {"eta": np.zeros(0, dtype=int)})
+    with pytest.raises(SceneError, match=r"component 1 and position of the ends, component 2.*remove those"):
+        rank_of(twin)
