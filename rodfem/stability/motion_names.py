@@ -61,8 +61,8 @@ class MotionNames:
         if not vectors:
             return []
         state = self.system.at(x)
-        turning, rigid, along = self.generators(x, state)
-        return [self._name(state, v, turning, rigid, along) for v in vectors]
+        groups = self.generators(x, state)
+        return [self._name(state, v, groups) for v in vectors]
 
     def generators(self, x: PETSc.Vec, state: State) -> tuple[Group, Group, Group]:
         """Turning of the cross-sections, rigid motions, and the motion along the rod at a ``state``, which is ``x``.
@@ -103,7 +103,8 @@ class MotionNames:
         """Changes of state by all the motions, made when one is first asked for."""
         return Generators(self.system, [*self._turning.values(), *self._rigid.values(), self._along])
 
-    def _name(self, state: State, v: PETSc.Vec, turning: Group, rigid: Group, along: Group) -> str:
+    def _name(self, state: State, v: PETSc.Vec, groups: tuple[Group, Group, Group]) -> str:
+        turning, rigid, along = groups
         share, weights = self.share(v, rigid)
         if share > SHARE:
             named = abs(weights) > LARGEST_PART * abs(weights).max()
