@@ -268,15 +268,15 @@ FAULTS = {
         "tests/diagram/test_flutter_at_a_row.py",
     ),
     "slow-frequencies-are-round-off": Fault(
-        "rodfem/stability/slow_motions.py",
+        "rodfem/stability/nonsymmetric.py",
         "slow = np.flatnonzero(abs(values) < SLOW * one)",
-        "slow = np.flatnonzero(abs(found.values) < 0.0)",
+        "slow = np.flatnonzero(abs(values) < 0.0)",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "rods-that-soften-are-not-slow": Fault(
-        "rodfem/stability/slow_motions.py",
-        "not (pencil.slow or _several(values[slow]))",
-        "not pencil.slow",
+        "rodfem/stability/nonsymmetric.py",
+        "not (self.slow or several)",
+        "not self.slow",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "differences-along-a-locus-by-the-bounds-alone": Fault(
@@ -728,7 +728,7 @@ FAULTS = {
         "rodfem/problem/arguments.py", "with ONE_THREAD:", "with RLock():", "tests/app/test_threads.py"
     ),
     "free-rod-drifts-without-a-moment": Fault(
-        "rodfem/fem/phase.py", "SHARE = 0.3", "SHARE = 0.0", "tests/literature/test_free_rods.py"
+        "rodfem/fem/symmetries.py", "SHARE = 0.3", "SHARE = 0.0", "tests/literature/test_free_rods.py"
     ),
     "modes-without-their-parts-along-free-motions": Fault(
         f"{STABILITY}nonsymmetric.py",
@@ -743,7 +743,7 @@ FAULTS = {
         "tests/stability/test_near_zero.py",
     ),
     "a-ring-nearly-breaks-its-motion-along-itself": Fault(
-        "rodfem/fem/phase.py", "ALONG = 1e-5", "ALONG = 1e-3", "tests/fem/test_ring_along_itself.py"
+        "rodfem/fem/symmetries.py", "ALONG = 1e-5", "ALONG = 1e-3", "tests/fem/test_ring_along_itself.py"
     ),
     "a-bent-rod-breaks-a-symmetry": Fault(
         "rodfem/fem/symmetries.py",
@@ -845,9 +845,9 @@ FAULTS = {
         f"{STABILITY}inertia.py", "ZERO_BAND = 1e-7", "ZERO_BAND = 1e-2", f"{INERTIA} {CORD} {CHAIN}"
     ),
     "quotients-of-the-wrong-sign": Fault(
-        f"{STABILITY}round_off.py",
-        "negative = int((theta < -doubt).sum())",
-        "negative = int((theta > doubt).sum())",
+        f"{STABILITY}near_zero.py",
+        "(self.values < -self.uncertainty).sum()",
+        "(self.values > self.uncertainty).sum()",
         INERTIA,
     ),
     "pivots-of-two-rows": Fault(
@@ -914,7 +914,7 @@ FAULTS = {
         "tests/diagram/test_all_frequencies.py",
     ),
     "round-off-of-two-that-meet-has-no-bound": Fault(
-        f"{STABILITY}condensed.py",
+        f"{STABILITY}spectrum.py",
         "np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))",
         "rounded * np.linalg.norm(left, axis=1)",
         "tests/codim2/test_locus.py",
@@ -923,13 +923,13 @@ FAULTS = {
         f"{STABILITY}cluster.py", "FARTHER = 3.0", "FARTHER = 1.0", "tests/codim2/test_places.py"
     ),
     "slepc-sorts-all-eigenvalues": Fault(
-        f"{STABILITY}condensed.py",
+        f"{STABILITY}spectrum.py",
         "                if self.rank > ALL:",
         "                if True:",
         "tests/literature/test_joss_paper.py",
     ),
     "mass-of-a-quaternions-own-length": Fault(
-        f"{STABILITY}condensed.py", "RANK = 1e-13", "RANK = 1e-3", "tests/diagram/test_all_frequencies.py"
+        f"{STABILITY}spectrum.py", "RANK = 1e-13", "RANK = 1e-3", "tests/diagram/test_all_frequencies.py"
     ),
     "divergence-numbered-across-collisions": Fault(
         "rodfem/diagram/critical_loads.py",
@@ -990,12 +990,6 @@ FAULTS = {
         "noise.of_discriminant + clear.split) /",
         "noise.of_discriminant) /",
         CLOSE,
-    ),
-    "transposed-factors-are-not": Fault(
-        "rodfem/linalg/chain.c",
-        "down(c, WIDTH, 1, y, z);",
-        "down(c, WIDTH, 0, y, z);",
-        "tests/linalg/test_chain.py",
     ),
     "the-cubic-is-the-branch": Fault(
         "rodfem/continuation/crossings.py",
@@ -1078,7 +1072,7 @@ FAULTS = {
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
     ),
     "decided-zeros-without-symmetries": Fault(
-        f"{STABILITY}round_off.py", "zero=zero + known", "zero=zero", "tests/stability/test_round_off.py"
+        f"{STABILITY}near_zero.py", "zero=q.zero + found.drifts", "zero=q.zero", "tests/stability/test_round_off.py"
     ),
     "what-newton-leaves-is-nothing": Fault(
         "rodfem/adaptivity/error_estimate.py", "left = STEADY * moved + ROUND_OFF", "left = ROUND_OFF", ERRORS
@@ -1102,7 +1096,7 @@ FAULTS = {
         "tests/stability/test_missing_frequencies.py",
     ),
     "eigensolvers-leave-nothing-open": Fault(
-        "rodfem/stability/cluster_noise.py", "DRAWN = 3.0", "DRAWN = 0.0", "tests/stability/test_cluster_noise.py"
+        "rodfem/stability/cluster.py", "DRAWN = 3.0", "DRAWN = 0.0", "tests/stability/test_cluster_noise.py"
     ),
     "clusters-are-not-closed": Fault(
         "rodfem/stability/cluster.py",
@@ -1126,7 +1120,7 @@ FAULTS = {
         CLOSE,
     ),
     "round-off-is-a-rotation": Fault(
-        "rodfem/stability/mode_type.py", "LEAST = 1e-5", "LEAST = 0.0", "tests/stability/test_mode_type.py"
+        "rodfem/stability/motion_names.py", "LEAST = 1e-5", "LEAST = 0.0", "tests/stability/test_mode_type.py"
     ),
     "straight-rods-have-no-stiffness": Fault(
         "rodfem/fem/quadrature_check.py",
@@ -1225,7 +1219,7 @@ FAULTS = {
         "tests/diagram/test_light_rods.py",
     ),
     "round-off-makes-constraints-independent": Fault(
-        f"{STABILITY}rank.py",
+        f"{STABILITY}dependence.py",
         "_equilibrated(_without_noise(pencil, C, length))",
         "_equilibrated(C)",
         "tests/stability/test_assessment.py",
@@ -1250,8 +1244,8 @@ FAULTS = {
     ),
     "distances-of-the-mesh": Fault(
         f"{STABILITY}dependence.py",
-        "steepness = float(slope.norm() * np.sqrt(change.size))",
-        "steepness = float(np.sqrt(change.size))",
+        "steepness = float(np.linalg.norm(slope) * np.sqrt(len(change)))",
+        "steepness = float(np.sqrt(len(change)))",
         "tests/stability/test_dependence.py",
     ),
     "taut-rods-are-begun-with": Fault(
@@ -1261,7 +1255,7 @@ FAULTS = {
         "tests/stability/test_dependence.py",
     ),
     "flutter-without-the-matrix-s-round-off": Fault(
-        f"{STABILITY}cluster_noise.py",
+        f"{STABILITY}cluster.py",
         "of(2 * W @ B.T), *left",
         "0.0, *left",
         "tests/stability/test_cluster_noise.py",

@@ -30,8 +30,7 @@ from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL, ROUGH, Factored
 from rodfem.stability.motion_names import SHARE, MotionNames
-from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
-from rodfem.stability.round_off import SPARE, decide, quotient_error
+from rodfem.stability.near_zero import SPARE, NearZero, decide, judge, near_zero, quotients, soft_limit
 from rodfem.stability.soft_mode import Judgement, SoftMode
 
 REFINEMENTS = 2
@@ -175,7 +174,7 @@ class SoftStates:
         vectors = [near.vectors[i] for i in kept]
         return replace(
             near, values=near.values[kept], vectors=vectors, uncertainty=near.uncertainty[kept],
-            zero=near.zero + len(own),
+            rest=near.rest + len(own),
         )  # fmt: skip
 
     def _refined(
@@ -284,11 +283,9 @@ def _nearest(
     with solver.inertia.afresh():
         nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
     vectors = [v for v in nearest if across(solver.system.metric, [v], still)][:number]
-    values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
-    floor = TOLERANCE * solver.inertia.scale
-    rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])
+    q = quotients(found, vectors, TOLERANCE * solver.inertia.scale)
     row = solver.axis if point.tangent is None else solver.row(point.tangent)
     settled = solver.inertia.at(stepped(solver, point.x, row))
-    moved = abs(np.array([v.dot(settled.matrix * v).real for v in vectors]) - values)
-    order = np.argsort(values)
-    return values[order], (rounding + STEADY * moved)[order]
+    moved = abs(np.array([v.dot(settled.matrix * v).real for v in vectors]) - q.values)
+    order = np.argsort(q.values)
+    return q.values[order], (q.uncertainty + STEADY * moved)[order]

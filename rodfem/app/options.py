@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rodfem.app.cli import Parser, folder
 from rodfem.errors import InputError
-from rodfem.stability.methods import AUTO, METHODS
+from rodfem.stability.registry import AUTO, METHODS
 
 if TYPE_CHECKING:
     from rodfem.diagram.plan import Plan

@@ -20,9 +20,9 @@ from rodfem.fem.state import Energies
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
 from rodfem.stability.inertia import Index, Inertia
+from rodfem.stability.near_zero import decide
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.pencil import least_eigenvalue
-from rodfem.stability.round_off import decide
 from rodfem.stability.symmetric import SymmetricSolver
 from rodfem.tolerances import NEGLIGIBLE
 

@@ -21,9 +21,8 @@ from rodfem.continuation.prediction import ROWS, weights
 from rodfem.errors import ConvergenceError
 from rodfem.fem import verification
 from rodfem.fem.newton import NewtonResult
-from rodfem.fem.phase import Phase
 from rodfem.fem.state import Energies
-from rodfem.fem.symmetries import SYMMETRIC_STATE
+from rodfem.fem.symmetries import SYMMETRIC_STATE, Phase
 from rodfem.linalg.compiled import Memory, buffer, module
 from rodfem.linalg.matrices import EPS, shared
 

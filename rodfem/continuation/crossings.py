@@ -32,8 +32,8 @@ import scipy.linalg
 from numpy.polynomial import Polynomial
 
 from rodfem.continuation.interpolant import REAL
-from rodfem.stability.dense import FINITE
 from rodfem.stability.reduced_stiffness import negative
+from rodfem.stability.spectrum import FINITE
 from rodfem.tolerances import TINY
 
 AXIS = 0.4

@@ -28,8 +28,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.generators import Generators
-from rodfem.fem.symmetries import capable
+from rodfem.fem.symmetries import Generators, capable
 
 UNBALANCED = 1e-8
 """Residual of an equilibrium, in units of the rod's own energy."""

@@ -116,7 +116,7 @@ static void diagonalise(int m, double *a, double *v)
     }
 }
 
-/* Phase conditions at x, as rodfem.fem.phase.phase_at, with the generators there.  */
+/* Phase conditions at x, as rodfem.fem.symmetries.phase_at, with the generators there.  */
 static void set_phase(Step *step, const double *x)
 {
     int m = step->symmetries, own = step->drifts, n = step->n;

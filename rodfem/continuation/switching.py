@@ -17,7 +17,7 @@ from rodfem.continuation.static_solver import STILL
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import across, project_out
-from rodfem.stability.round_off import decide
+from rodfem.stability.near_zero import decide
 from rodfem.tolerances import TINY
 
 NEAREST = 1e-3

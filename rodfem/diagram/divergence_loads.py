@@ -13,7 +13,7 @@ from rodfem.continuation.flutter import ENOUGH
 from rodfem.continuation.interpolant import in_doubt, real_root, zero_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster
-from rodfem.stability.condensed import SHIFT
+from rodfem.stability.spectrum import SHIFT
 from rodfem.tolerances import round_off, unit
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
-from rodfem.stability import methods
+from rodfem.stability import registry
 
 MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"), Argument("Plan", "spectrum")
 FEWER = "give less in {}, or use more elements"
@@ -93,8 +93,8 @@ class Plan:
             raise InputError(f"steps is {self.steps!r}: give StepControl, as in steps=StepControl(largest=0.02).")
         if not isinstance(self.method, str):
             raise InputError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
-        if self.method not in ("", methods.AUTO):
-            methods.find(self.method)
+        if self.method not in ("", registry.AUTO):
+            registry.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, ACCURACY)
         flag("error_bars", self.error_bars)
@@ -163,7 +163,7 @@ class Plan:
             raise InputError("A search needs loads to search at", GIVE_LOADS)
         if (self.modes or self.method) and not self.at:
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
-        if self.modes and self.method in methods.METHODS and not methods.find(self.method).finds_modes:
+        if self.modes and self.method in registry.METHODS and not registry.find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
 
     @staticmethod

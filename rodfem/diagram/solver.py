@@ -230,7 +230,7 @@ class Solver:
         point
             The equilibrium.
         method
-            ``auto``, or a name of ``rodfem.stability.methods.METHODS``.
+            ``auto``, or a name of ``rodfem.stability.registry.METHODS``.
         number
             How many eigenvalues are computed.
 

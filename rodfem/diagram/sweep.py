@@ -37,9 +37,7 @@ from rodfem.faults import as_failure, without
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.frequencies import REAL, Frequencies, named
-from rodfem.stability.leftmost import FREQUENCIES, differ, leftmost
-from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
-from rodfem.stability.slow_motions import begins_slowly
+from rodfem.stability.nonsymmetric import FREQUENCIES, NonsymmetricPencil, NonsymmetricSolver, begins_slowly
 from rodfem.tolerances import unit
 
 LOADS = 101
@@ -129,12 +127,7 @@ class Sweep:
         self.solver.require_convexity(x)
         if not (first := self.eigensolver.at(x).spectrum).complete:
             self.observer.note("  the mesh has too many unknowns to find all frequencies: those nearest zero are found")
-        self.eigensolver.slow = begins_slowly(first.values, first.one)
-        if words := differ(self.eigensolver.at(x), self.number):
-            self.observer.warn(
-                f"The eigenvalues omega^2 of the first state are not well defined ({words}): do not trust any of this "
-                "sweep. Constraints may follow from others, or sizes of the rod's numbers may be too far apart."
-            )
+        self.eigensolver.slow = begins_slowly(first)
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
@@ -204,13 +197,13 @@ class Sweep:
 
     def _named(self, pencil: NonsymmetricPencil) -> Frequencies:
         """The left-most frequencies of a state with the names of those that are recorded."""
-        return named(pencil.system, [(leftmost(pencil, self.number), pencil.turned)], self.number)[0]
+        return named(pencil.system, pencil.leftmost(self.number), pencil.turned, self.number)
 
     def _family(self, last: Point) -> None:
         """Say where frequencies are zero at all loads, without a symmetry, to which the ``last`` one belongs, too."""
         if self._still:
             pencil = self.eigensolver.at(last.x)
-            if words := family_of(pencil, leftmost(pencil, self.number), self._still):
+            if words := family_of(pencil, pencil.leftmost(self.number), self._still):
                 self.observer.warn(words)
 
     def _asymmetry(self, last: Point) -> None:

@@ -24,7 +24,7 @@ from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains
 from rodfem.ranks import end_together
-from rodfem.stability.leftmost import FREQUENCIES
+from rodfem.stability.nonsymmetric import FREQUENCIES
 from rodfem.timing import Clock
 
 PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")

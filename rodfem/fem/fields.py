@@ -23,13 +23,13 @@ from rodfem.fem import formulations
 from rodfem.fem.arclength import Arclength
 from rodfem.fem.formulation import CONTACT_FORCE, Formulation
 from rodfem.fem.rotation_field import AngleField, QuaternionField, Turning
+from rodfem.fem.values import LOAD
 from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.kinds import reals, whole
 from rodfem.problem.local_state import Constants
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import SAME_PLACE, same_place
 
-LOAD = "load"
 FACTORS = CHAIN, PETSC = "chain", "petsc"
 """What assembles and factors the matrices of a discretisation."""
 MOST = 1_000_000

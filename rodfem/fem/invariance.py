@@ -1,34 +1,35 @@
 r"""Detection of the continuous symmetries of a scene: invariance of its equations at generic states.
 
-With a potential a combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmetries` is a symmetry
-where it leaves the functional ``L`` invariant, at every state and load; without one where the equations ``F`` of
-equilibrium are equivariant, so that it carries equilibria into equilibria, for ``g(x) = A x + c`` ::
+A combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmetries` is a symmetry where the equations
+``F`` of equilibrium are equivariant, so that it carries equilibria into equilibria, for ``g(x) = A x + c`` ::
 
-    sum_j a_j dL(x)[g_j(x)] = 0,      or      dF(x)[g(x)] + A^t F(x) = 0,
+    dF(x)[g(x)] + A^t F(x) = 0
 
 for all ``x``; and where it moves nothing that an end holds.  The space of such ``a`` is the null space of a matrix with
 rows for each of a number of generic states.
 
-What acts on the rod, with a potential, has to be invariant by itself: beside a rod a thousand million times as stiff as
-the spring that holds it, the spring is round-off in ``L``.
+What acts on the rod, with a potential, has to be invariant by itself: beside a rod 1e12 times as stiff as the spring
+that holds it, the spring is round-off in ``F``.
 
 The motion of a closed rod along itself is a symmetry where no equation has the arclength in it.  Where one has, it may
-still be one together with a rotation (a ring under a dead radial load): the same condition, ``g`` with the state's
-derivative in it, is asked on a fine mesh, which has such a symmetry up to its small error.
+still be one together with a rotation (a ring under a dead radial load): ``g``, with the state's derivative in it, has
+to leave the functional ``L`` invariant, ``dL(x)[g(x)] = 0``, on a fine mesh, which has such a symmetry up to its error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from mpi4py import MPI
 
 from rodfem.errors import SceneError
-from rodfem.fem.fields import LOAD, Fields
+from rodfem.fem.fields import Fields
 from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
+from rodfem.fem.values import LOAD
 from rodfem.problem.contribution import Block, Motion
+from rodfem.problem.scene import Scene
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
@@ -63,24 +64,26 @@ SMOOTH = 0.35
 
 
 def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
-    """Find a basis of all exact symmetries; raises :class:`SceneError` where the equations are no numbers anywhere."""
+    """Find a basis of all exact symmetries, on one rank.
+
+    Raises :class:`SceneError` where the equations are no numbers anywhere.
+    """
     parts = elementary_generators(fields)
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved, dofs_held = np.zeros((len(parts),) * 2), _held(fields)
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
-    for seed in range(len(parts) + 6 if fields.scene.conservative else STATES):
+    for seed in range(STATES):
         state = generic_state(equations, seed)
         changes = np.array([s.change(state) for s in single])
-        asked = _change_of_functional if fields.scene.conservative else _change_of_equations
-        row, size = asked(state, single, changes)
+        row, size = _change_of_equations(state, single, changes)
         rows.append(row)
         sizes.append(size)
         # conditions on the weights a of a symmetry: invariance, and no motion of what an end holds
         changes /= fields.sizes  # conditions and motions are beside others in other units
         held.append(changes[:, dofs_held].T)
         free = changes[:, fields.number >= 0]
-        moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
-    free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
+        moved += free @ free.T
+    free = _null_space(np.vstack(held))
     greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
     if not np.isfinite(greatest).any():
         raise SceneError(
@@ -125,8 +128,7 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
         return np.eye(len(found))
     states = [generic_state(equations, seed, no_multipliers=True) for seed in range(len(found) + STATES)]
     changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
-    comm, sizes = equations.fields.comm, equations.fields.sizes
-    lengths = np.max(comm.allgather(abs(changes / sizes).max(axis=(0, 2))), axis=0)
+    lengths = abs(changes / equations.fields.sizes).max(axis=(0, 2))
     lengths = np.where(lengths > 0, lengths, 1.0)
     along = [_along(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
     size = max(largest for _, largest in along)
@@ -166,8 +168,9 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
     for seed in range(len(parts) + SLIDES):
         state = generic_state(equations, seed, SMOOTH)
         changes = np.array([*(s.change(state) for s in single), derivative(state)])
-        row, terms = _change_of_functional(state, single, changes)
-        rows.append(row[0] / terms.max())
+        residual = state.covector()
+        row, terms = changes @ residual, abs(changes) @ abs(residual)
+        rows.append(row / terms.max())
         held.append((changes[:-1] / fields.sizes)[:, _held(fields)].T)
     free = _null_space(np.vstack(held))
     exact, along = np.array(rows)[:, :-1] @ free, np.array(rows)[:, -1]
@@ -188,19 +191,10 @@ def _null_space(rows: np.ndarray, exact: float = EXACT) -> np.ndarray:
     return np.asarray(vectors[singular < exact * max(singular[0], 1.0)].T)
 
 
-def _change_of_functional(
-    state: Evaluation, single: list[Symmetry], changes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """``dL(x)[g]`` of the ``changes`` (m, local size) by each generator, (1, m), and the sums of magnitudes, (m,)."""
-    residual = state.covector()
-    sums = state.fields.comm.allreduce(np.array([changes @ residual, abs(changes) @ abs(residual)]), op=MPI.SUM)
-    return sums[:1], sums[1]
-
-
 def _change_of_equations(
     state: Evaluation, single: list[Symmetry], changes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,); for one rank alone.
+    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,).
 
     Across the columns of the multipliers that close a ring: what these have to change by follows from the rest.
     """
@@ -301,15 +295,7 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
 
     values = wave()
     if block.name == "q":
-        u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
-        clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
-        u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
-        if scene.sides[1].sign < 0:  # of one sign at the start and of the other at the end
-            half = np.pi * x
-            values = (u + 0.3 * values) * np.cos(half) + (v + 0.3 * wave()) * np.sin(half)
-        else:
-            values = u + 0.3 * values
-        values = fields.turning.normalised(values)
+        values = fields.turning.normalised(_rotated(scene, values, wave, x, rng))
     if block.name == fields.turning.name and not closed:
         values = _toward_clamps(fields, values, x)
     if block.name == "angle" and closed:
@@ -318,6 +304,22 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
     if block.name == "v":
         values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
     return values
+
+
+def _rotated(
+    scene: Scene, values: np.ndarray, wave: Callable[[], np.ndarray], x: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """Quaternions at ``x``, not of length one, that are far from zero: ``values`` about one direction.
+
+    Where a ring is closed by ``-q`` they are of one sign at its start and of the other at its end, with another
+    ``wave`` between.
+    """
+    u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
+    clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
+    u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
+    if scene.sides[1].sign >= 0:
+        return np.asarray(u + 0.3 * values)
+    return np.asarray((u + 0.3 * values) * np.cos(np.pi * x) + (v + 0.3 * wave()) * np.sin(np.pi * x))
 
 
 def _toward_clamps(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:

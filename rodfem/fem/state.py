@@ -24,7 +24,7 @@ from rodfem.linalg.matrices import shared
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
     from rodfem.fem.parameters import Line
-    from rodfem.fem.phase import Phase
+    from rodfem.fem.symmetries import Phase
     from rodfem.fem.system import System
 
 

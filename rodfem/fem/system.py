@@ -6,7 +6,7 @@ the load, and one drift scalar for each symmetry.  The last two kinds are border
 * the row of the load is the linear equation ``row . (x - x0) = 0`` (an arclength or "fixed load" equation);
 * a drift scalar ``d`` adds ``d g`` to the equations, ``g`` the metric times the symmetry's generator at a reference
   state, and its row is the phase condition ``g . (x - x0) = 0``.  By the symmetry ``d`` vanishes at an equilibrium.
-  Its force is another one for a rod that floats under loads without a potential (:mod:`rodfem.fem.phase`).
+  Its force is another one for a rod that floats under loads without a potential (:mod:`rodfem.fem.symmetries`).
   At a state that the symmetry leaves alone the generator is zero, and the row is ``d = 0`` instead.
 """
 
@@ -26,14 +26,12 @@ from rodfem import compat
 from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_pattern, new_matrix, vector_places
 from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
-from rodfem.fem.fields import LOAD, Discretization, Fields
-from rodfem.fem.generators import Generators
+from rodfem.fem.fields import Discretization, Fields
 from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.parameters import Line
-from rodfem.fem.phase import DriftForces, no_phase, phase_at
 from rodfem.fem.state import State
-from rodfem.fem.symmetries import Symmetry, capable, may_slide
-from rodfem.fem.values import NodalValues
+from rodfem.fem.symmetries import DriftForces, Generators, Symmetry, capable, may_slide, no_phase, phase_at
+from rodfem.fem.values import LOAD, NodalValues
 from rodfem.fem.verification import Verification
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Sizes
@@ -145,7 +143,7 @@ class System:
         """
         scene, d = self.scene, self.fields.discretization
         fields, equations = self.fields, self.equations
-        if fields.unknowns > FEW or (self.comm.size > 1 and not scene.conservative):  # each rank asks all equations
+        if fields.unknowns > FEW or self.comm.size > 1:  # each rank asks all equations
             fields, equations = self._elsewhere(replace(d, elements=max(6, 2 * len(scene.joints) + 2), vertices=None))
         found = find_symmetries(fields, equations)
         if not may_slide(scene):
@@ -346,7 +344,7 @@ class System:
     # --- symmetry ----------------------------------------------------------------------------------------------
 
     def set_phase(self, reference: PETSc.Vec | None) -> None:
-        """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.phase`); None: none active."""
+        """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.symmetries`); None: none active."""
         if reference is None:
             self.phase = no_phase(self)
         elif not self.phase.belongs_to(reference):

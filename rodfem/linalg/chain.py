@@ -148,16 +148,9 @@ class Elimination:
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
-        return self._solved(self.lib.chain_solve, right)
-
-    def solve_transposed(self, right: np.ndarray) -> np.ndarray:
-        """The same of a matrix without symmetry, transposed."""
-        return self._solved(self.lib.chain_solve_transposed, right)
-
-    def _solved(self, solve: Any, right: np.ndarray) -> np.ndarray:
         right = np.asarray(right, dtype=float, order="F")
         out = np.empty_like(right)
-        if solve(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
+        if self.lib.chain_solve(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
             raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
         return out
 

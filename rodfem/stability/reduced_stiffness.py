@@ -30,7 +30,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Inertia
-from rodfem.stability.round_off import quotient_error
+from rodfem.stability.near_zero import quotient_error
 
 NEAR = 1e-3
 """Eigenvalue of H, over the lowest bending one, below which S is too near singular to be solved with."""

@@ -8,7 +8,7 @@ from golden_cases import cases, single_branches
 
 from rodfem import Diagram, Discretization, Plan, trace
 from rodfem.continuation.compiled_step import CompiledStep, Made
-from rodfem.fem.phase import phase_at
+from rodfem.fem.symmetries import phase_at
 from rodfem.fem.verification import Verification
 
 pytestmark = pytest.mark.alone

@@ -18,7 +18,7 @@ from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
-from rodfem.fem.phase import phase_at
+from rodfem.fem.symmetries import phase_at
 from rodfem.linalg.matrices import shared
 from rodfem.stability.motion_names import DEPENDENT, MotionNames
 from rodfem.stability.pencil import symmetry_modes
