@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.arc import STRAYED
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Crossing, Node
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.piece import Piece
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
-from rodfem.continuation.states_between import STRAYED
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize

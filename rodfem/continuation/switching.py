@@ -12,9 +12,7 @@ from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.normal_form import SEEN
 from rodfem.continuation.singular import SingularSystem
 from rodfem.continuation.singular_points import LEVEL, Change, singular_point
-from rodfem.continuation.states_between import solve_at_load
 from rodfem.continuation.static_solver import STILL
-from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import across, project_out
 from rodfem.stability.round_off import decide
@@ -102,24 +100,6 @@ def leave(
     return None
 
 
-def between(solver: BranchSolver, special: SpecialPoint, outer: Point, load: float) -> Point | None:
-    """State at ``load`` of a branch between ``special``, which it leaves, and its point ``outer``; None without one.
-
-    ``solver`` has the mesh.  The state is on the side of ``outer``: what leaves in the opposite way is another one.
-    """
-    chord = outer.x - special.point.x
-    ends = replace(special.point, arclength=0.0), replace(outer, arclength=1.0)
-
-    def along(part: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-        return special.point.x + chord * part, chord
-
-    try:
-        x, part, outcome = solve_at_load(solver, along, *ends, load)
-    except ConvergenceError:  # the load is none of those between
-        return None
-    return solver.point(x, part * outer.arclength, solver.load_tangent(x, True), outcome)
-
-
 def start_branch(
     special: SpecialPoint,
     direction: PETSc.Vec,
@@ -143,7 +123,7 @@ def start_branch(
     first = leave(solver, special, direction, amplitude)
     if first is None:
         return None
-    origin = replace(special.point, tangent=direction, arclength=0.0, slope=solver.system.scalar(direction))
+    origin = replace(special.point, tangent=None, arclength=0.0, slope=solver.system.scalar(direction))
     fold = fold_beside(solver, special, direction) if ways == 1 else None
     if fold is not None and (beyond := leave(solver, special, direction, NEAREST)) is not None:
         return _through(special, fold, Branch(name, parent, depth, [origin, beyond]))

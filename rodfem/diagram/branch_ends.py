@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from petsc4py import PETSc
-
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
+from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import END
-from rodfem.continuation.prediction import hermite
-from rodfem.continuation.states_between import point_between, solve_at
-from rodfem.diagram.equivalence import near
+from rodfem.diagram.equivalence import Alike, near
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.tolerances import INSIDE, SAME_SPECIAL, SAME_STATE
@@ -30,21 +27,11 @@ LEAST = 12
 NEIGHBOUR = 4
 """Steps within which a closed loop passes its beginning."""
 
-Alike = Callable[[Point, Point, float], bool]
-"""Whether two points are equivalent within a tolerance, whatever meshes they are on."""
-
 
 def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
     """The point between ``a`` and ``b`` at which the smallest stretch vanishes."""
-    states: dict[float, PETSc.Vec] = {}
-
-    def stretch(s: float) -> float:
-        states[s] = solve_at(solver, lambda t: hermite(a, b, t), s)
-        return solver.shape.stretch(states[s])
-
-    s = zero_between(stretch, a.arclength + INSIDE * (b.arclength - a.arclength), b.arclength, ALONG)
-    row = solver.row(hermite(a, b, s)[1])
-    return solver.point(states[s], s, solver.tangent(row, at=states[s]))
+    arc, first = Arc(solver, a, b), a.arclength + INSIDE * (b.arclength - a.arclength)
+    return arc.point(zero_between(lambda s: solver.shape.stretch(arc.state(s)), first, b.arclength, ALONG))
 
 
 def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
@@ -53,7 +40,10 @@ def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
     A rod that is squeezed to nothing has no stiffness against some motions: at the very end their eigenvalues are zero,
     whatever sign they had before.
     """
-    return point_between(solver, a, last, last.arclength - ASIDE * (last.arclength - a.arclength))
+    try:
+        return Arc(solver, a, last).point(last.arclength - ASIDE * (last.arclength - a.arclength))
+    except ConvergenceError:
+        return None
 
 
 def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) -> SpecialPoint:
@@ -121,12 +111,10 @@ def closing(
         or a.load == b.load
     ):
         return None
-    s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
-    x, outcome = solver.at_load(hermite(a, b, s)[0], first.load, reach=1.0)
-    if not outcome.converged:  # beside a fold, say: not there
+    try:
+        point = Arc(solver, a, b).at_load(first.load)
+    except ConvergenceError:  # beside a fold, say: not there
         return None
-    s = a.arclength + solver.system.distance(a.x, x)
-    point = solver.point(x, s, solver.load_tangent(x, b.load > a.load), outcome)
     return point if alike(point, first, SAME_STATE) else None
 
 

@@ -20,12 +20,11 @@ from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.known import equilibria_at
 from rodfem.deflation.search import find_equilibria
-from rodfem.diagram.equivalence import equivalent, near
+from rodfem.diagram.equivalence import are_images, equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.images import other_ordinates
 from rodfem.diagram.tracer import Tracer
-from rodfem.diagram.two_sides import are_images
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.bordered import Bordered

@@ -10,11 +10,11 @@ from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.first_mesh import check_start, frequency_mesh
 from rodfem.diagram.plan import Plan
+from rodfem.diagram.saved import as_asked
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import Sweep
 from rodfem.fem import form_compiler

@@ -10,14 +10,14 @@ from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.soft_rows import SoftRows
+from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.convexity_between import lost_in_step
-from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow, since_stop
+from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
-from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer
+from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.switching import FIRST
 from rodfem.diagram.branch_ends import (
     before_the_end,
@@ -28,14 +28,14 @@ from rodfem.diagram.branch_ends import (
     singular_end,
 )
 from rodfem.diagram.equivalence import equivalent
-from rodfem.diagram.finders import FINDERS
+from rodfem.diagram.events import Events
+from rodfem.diagram.finders import Finder, RequestedLoads, Step
 from rodfem.diagram.images import image_of
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.quadrature import Quadrature
+from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
-from rodfem.diagram.step import Step
-from rodfem.diagram.step_check import Unresolved
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
 from rodfem.tolerances import DRIFT, ROUND_OFF
@@ -68,8 +68,8 @@ class Tracer:
         self.gaps = Gaps(self.meshes)
         self.zeros = PersistentZeros(observer, self.high - self.low)
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
-        self.finders = [finder(plan) for finder in FINDERS]
-        self.invariants: dict[int, Invariants] = {}
+        self.finders: list[Finder] = [RequestedLoads(plan), Events(plan)]
+        self._checks: dict[int, RowCheck] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         self.quadrature = Quadrature(self.meshes.solvers, observer, self.scene.load)
 
@@ -189,11 +189,10 @@ class Tracer:
                     self.observer.warn(f"{branch.name} ends: {branch.ended}; use more elements or smaller steps.")
                 return True
             previous = history[-1]
-            width = self.high - self.low
-            last = closing(self.solver, branch, previous, item, width, self.here, self.alike)
+            last = closing(self.solver, branch, previous, item, self.high - self.low, self.here, self.alike)
             item = last or item
             self._check_symmetry(item)
-            self._check_invariants(item)
+            self._check(item)
             self.control.row(item, self.solver)
             self.zeros.check(self.solver, history, item, self.specials.undecided)
             try:
@@ -202,13 +201,7 @@ class Tracer:
                 if item.stretch <= 0:
                     self._end_at_zero_stretch(branch, previous, item)
                     return True
-                reason = self._between(
-                    branch,
-                    previous,
-                    item,
-                    self._own(branch, since_stop(history, self.scene.stops)[-4:]),
-                    closed=bool(last),
-                )
+                reason = self._between(branch, previous, item, closed=bool(last))
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
                 history[:] = [p for p in history if p.arclength <= self.specials.settled]
@@ -224,18 +217,10 @@ class Tracer:
                 return True
         return True
 
-    @staticmethod
-    def _own(branch: Branch, rows: Sequence[Point]) -> list[Point]:
-        """Rows but for the branch point that a branch leaves, at which it has another tangent than its own."""
-        return [row for row in rows if branch.parent is None or row is not branch.points[0]]
-
-    def _between(self, branch: Branch, a: Point, b: Point, rows: Sequence[Point] = (), *, closed: bool = False) -> str:
-        """Insert special points between two points; a reason if the branch ends there.
-
-        The ``rows`` are those that the step to ``b`` was predicted from; ``closed``: ``b`` is where the branch began.
-        """
+    def _between(self, branch: Branch, a: Point, b: Point, *, closed: bool = False) -> str:
+        """Insert special points between two points, the second maybe where the branch began; a reason if it ends."""
         with self.solver.system.clock.scope("location"):
-            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b, rows)
+            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(b)
             if last := self._leaving(branch, specials, b):
                 return last
             step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
@@ -259,7 +244,7 @@ class Tracer:
         found = [*known, *step.singular, *(s for finder in self.finders for s in finder.between(step))]
         if reason := self._insert(branch, found):
             return reason
-        self._check_invariants(step.b)
+        self._check(step.b)
         branch.append(step.b)
         self.observer.progress(branch, step.b)
         return END_OF_RANGE
@@ -274,7 +259,7 @@ class Tracer:
             self.control.special(fold)
             self.observer.special(branch, fold)
         step = Step(self.solver, a, b, folds, begins=a is branch.points[0])
-        for special in (s for finder in self.finders if finder.at_start for s in finder.between(step)):
+        for special in (s for finder in self.finders for s in finder.between(step)):
             self.control.special(special)
             branch.insert(special)
             self.observer.special(branch, special)
@@ -289,7 +274,7 @@ class Tracer:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
             if not special.unfolding > ROUND_OFF:  # else the mesh has an equilibrium beside it only
-                self._check_invariants(special.point)
+                self._check(special.point)
             self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = ""
@@ -306,7 +291,7 @@ class Tracer:
 
     def _ends_not_convex(self, branch: Branch, a: Point, b: Point) -> bool:
         """Whether the branch ends at the row ``a`` as the stored energy ceases to be convex between it and ``b``."""
-        why = lost_in_step(self.solver, a, b)
+        why = Arc(self.solver, a, b).lost_convexity()
         if why:
             branch.ended = self._rest(branch) or why
         return bool(why)
@@ -318,7 +303,7 @@ class Tracer:
         if beside is not None and self._ends_not_convex(branch, a, beside):
             return
         if beside is not None and beside.negative != a.negative:  # what passes zero before is zero at the end once more
-            self._check_invariants(beside)
+            self._check(beside)
             if reason := self._between(branch, a, beside):
                 branch.ended = reason
                 return
@@ -375,10 +360,10 @@ class Tracer:
                 "accuracy."
             )
 
-    def _check_invariants(self, point: Point) -> None:
-        if point.mesh not in self.invariants:
-            self.invariants[point.mesh] = Invariants(self.meshes.solvers[point.mesh])
-        self.invariants[point.mesh](point)
+    def _check(self, point: Point) -> None:
+        if point.mesh not in self._checks:
+            self._checks[point.mesh] = RowCheck(self.meshes.solvers[point.mesh])
+        self._checks[point.mesh](point)
 
     def _finish(self, branch: Branch) -> None:
         for finder in self.finders:
