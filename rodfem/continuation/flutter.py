@@ -66,13 +66,10 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
         clearest, node = max(zip(found, nodes, strict=True), key=lambda pair: pair[0].spread)
         if clearest.spread > RANK:
             cluster, clear = clearest.cluster, node
-        series, means = (interpolant([f(m) for m in found]) for f in (_discriminant, _mean))
+        series, means = interpolant([f.discriminant for f in found]), interpolant([f.cluster.mean for f in found])
         root = real_root(series)
         if root is None:
-            first, last = _discriminant(found[0]), _discriminant(found[-1])
-            if first == last:
-                break
-            load += 2 * half * float(np.clip((first + last) / 2 / (first - last), -1, 1))
+            load += half * _secant(found[0].discriminant, found[-1].discriminant)
             continue
         load += half * root
         cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, means)))
@@ -89,12 +86,9 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
     return best
 
 
-def _discriminant(found: Measured) -> float:
-    return found.discriminant
-
-
-def _mean(found: Measured) -> float:
-    return found.cluster.mean
+def _secant(first: float, last: float) -> float:
+    """Zero of a line with these values at -1 and 1, at most 2 away from the middle; there where it is level."""
+    return 2 * float(np.clip((first + last) / 2 / (first - last), -1, 1)) if first != last else 0.0
 
 
 def interpolant(values: Sequence[float]) -> np.ndarray:
