@@ -77,8 +77,8 @@ def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
         mesh = d.finer(factor, richer=int(d.degree < HIGHEST))
         fine = StaticSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
         x = _vanishing(fine, fine.shape.restore(sample), end.point)
-        values = {"load": fine.system.scalar(x), "ordinate": fine.shape.ordinate(x), "stretch": fine.shape.stretch(x)}
-        found.append(replace(end.point, x=x, tangent=None, energy=fine.energy(x), **values))
+        point = replace(end.point, x=x, tangent=None, load=fine.system.scalar(x), energy=fine.energy(x))
+        found.append(replace(point, ordinate=fine.shape.ordinate(x), stretch=fine.shape.stretch(x)))
         sample = fine.shape.sample(x)
     before, point = found
     end.point = replace(point, x=solver.shape.restore(sample))

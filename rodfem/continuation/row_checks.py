@@ -44,8 +44,8 @@ def defect(system: System, rows: Sequence[Point]) -> float:
     a, b = rows[-2:]
     known = [p for p in rows[-ROWS:] if p.tangent is not None]
     nodes, length = np.array([p.arclength for p in known]), b.arclength - a.arclength
-    places = (a.arclength + (0.5 + sign * GAUSS) * length for sign in (-1, 1))
-    rest, chord = combine([p.tangent for p in known], sum(lagrange(nodes, s)[0] for s in places)), b.x - a.x
+    first, second = (lagrange(nodes, a.arclength + (0.5 + sign * GAUSS) * length)[0] for sign in (-1, 1))
+    rest, chord = combine([p.tangent for p in known], first + second), b.x - a.x
     rest.aypx(-length / 2, chord)
     image = system.metric * chord
     rest.axpy(-image.dot(rest) / image.dot(chord), chord)

@@ -14,9 +14,8 @@ from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.diagram import Diagram
-from rodfem.diagram.plan import Plan
+from rodfem.diagram.plan import EQUATIONS, Plan, not_held, plan_without
 from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
@@ -33,8 +32,6 @@ from rodfem.tolerances import NEGLIGIBLE, unit
 NEEDED = ("scene", "parameter", "branches", "range", "accuracy", "constants", "discretization", "meshes")
 """Entries of a diagram, beside those that all of its readers need."""
 OF_BRANCH = ("name", "parent", "ended", "columns", "special")
-EQUATIONS = "equations"
-"""Entry of what a run was asked for that has the fingerprint of the equations (:mod:`rodfem.fem.fingerprint`)."""
 OF_SPECIAL = ("kind", "multiplicity", "meets", "law", *SPECIAL)
 
 
@@ -173,25 +170,3 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[S
 def _number(value: Any) -> Any:
     """Value of a file, in which null stands for what is not finite."""
     return float("nan") if value is None else value
-
-
-def as_asked(system: System, plan: Plan) -> dict[str, Any]:
-    """What JSON can hold of a ``plan`` and of the equations of a ``system``; steps are a text, events their names."""
-    span = plan.over(system.scene)
-    chosen = {f.name: getattr(plan, f.name) for f in fields(plan)}
-    chosen |= {"span": span, "steps": repr(plan.steps), "events": [event.name for event in plan.events]}
-    return {"plan": chosen, EQUATIONS: fingerprint(system, span)}
-
-
-def not_held(asked: dict[str, Any]) -> str:
-    """What of a plan that was ``asked`` for no file holds: ``events`` or ``steps``; empty if all of it is there."""
-    entries = asked["plan"]
-    return "events" if entries["events"] else "steps" if entries["steps"] != repr(StepControl()) else ""
-
-
-def plan_without(asked: dict[str, Any]) -> Plan:
-    """Plan that was ``asked`` for, without what no file holds."""
-    known = {f.name for f in fields(Plan)} - {"steps", "events"}
-    given = {n: x for n, x in asked["plan"].items() if n in known}
-    entries: dict[str, Any] = {n: tuple(x) if isinstance(x, list) else x for n, x in given.items()}
-    return Plan(**entries)
