@@ -1170,18 +1170,6 @@ FAULTS = {
         "        if self.error_bars:",
         "tests/diagram/test_sharp_in_state.py",
     ),
-    "integrals-by-two-meshes-alone": Fault(
-        "rodfem/adaptivity/ordinate_bound.py",
-        "        if not self._integrals:",
-        "        if True:",
-        "tests/diagram/test_sharp_in_state.py",
-    ),
-    "integrals-without-their-quadrature": Fault(
-        "rodfem/adaptivity/ordinate_bound.py",
-        "        return abs(value - here.value) + here.left",
-        "        return here.left",
-        "tests/diagram/test_sharp_in_state.py",
-    ),
     "branches-that-attract-alone": Fault(
         "rodfem/continuation/reduced.py",
         "        if max(abs(values[i : i + 2])) > felt\n",

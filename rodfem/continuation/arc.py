@@ -112,8 +112,9 @@ class Arc:
         def beyond(s: float) -> float:
             return (known[s] if s in known else self.solver.system.scalar(state(s))) - load
 
-        margin = INSIDE * (last - first)  # never onto an end: a branch point is a state of the other branch, too
-        return min(max(zero_between(beyond, first, last, EXACT), first + margin), last - margin)
+        low, high = sorted(known)
+        margin = INSIDE * (high - low)  # never onto an end: a branch point is a state of the other branch, too
+        return min(max(zero_between(beyond, first, last, EXACT), low + margin), high - margin)
 
     def lost_convexity(self) -> str:
         """Why a branch ends on the arc; empty where the stored energy stays convex."""
