@@ -19,12 +19,11 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.switching import CLOSE, FIRST
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import combine
 from rodfem.roots import zero_between
 
-AWAY, REACH = 0.05, 2.0
-"""Distance at which branches are looked for, and how far from its prediction one may lie, in units of it."""
 AROUND = 12
 """Directions that are tried at random for each of more than two null vectors but one."""
 ALIGNED = 0.999
@@ -65,8 +64,8 @@ def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]
 def _seen(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], weights: np.ndarray) -> np.ndarray | None:
     """Weights (n,) of the direction in which an equilibrium is, that is found in that of others; None without one."""
     direction = combine(list(ways), weights)
-    x = origin + direction * AWAY
-    if not correct(solver.system, x, solver.row(direction), reach=REACH * AWAY).converged:
+    x = origin + direction * FIRST
+    if not correct(solver.system, x, solver.row(direction), reach=CLOSE * FIRST).converged:
         return None
     away = solver.system.metric * (x - origin)
     seen = np.array([away.dot(way) for way in ways])
@@ -78,7 +77,7 @@ def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], a
     system = solver.system
     along, across = (combine(list(ways), np.array([np.cos(t), np.sin(t)])) for t in (angle, angle + np.pi / 2))
     row, held = solver.row(along), system.metric * across
-    x, force = origin + along * AWAY, 0.0
+    x, force = origin + along * FIRST, 0.0
     equations, step, answer = (system.new_vector() for _ in range(3))
     for _ in range(MOST):
         system.set_phase(x)
@@ -94,7 +93,7 @@ def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], a
         x.axpy(-1.0, step)
         force -= more
         size = system.norm(step)
-        if not size < REACH * AWAY:
+        if not size < CLOSE * FIRST:
             break
         if size < STILL:
             return float(force)

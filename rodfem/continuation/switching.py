@@ -70,23 +70,21 @@ def _load_response(solver: BranchSolver, special: SpecialPoint) -> PETSc.Vec:
     return out
 
 
-def leave(
-    solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, first: float, shortest: float = SHORTEST
-) -> Point | None:
+def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, first: float) -> Point | None:
     """First point of the branch that leaves ``special`` along ``direction``, about ``first`` away, or None.
 
     The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
     fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
     meet turns as a rigid body about any axis): then Newton's method is damped along the family.  ``solver`` has the
     mesh, ``first`` is a length in the metric.  A transcritical branch whose load changes much faster than its state is
-    farther away: it is tried last.  No amplitude is tried below the ``shortest``.
+    farther away: it is tried last.
     """
     system = solver.system
     row, before = solver.row(direction), system.damping
     dampings = dict.fromkeys((before, before or solver.inertia.tolerance))
     for damping, reach in (*((damping, CLOSE) for damping in dampings), (before, STEEP)):
         system.damping, amplitude = damping, first
-        while amplitude > shortest:
+        while amplitude > SHORTEST:
             x = special.point.x + direction * amplitude
             outcome = correct(system, x, row, reach=reach * amplitude)
             if outcome.converged:

@@ -21,8 +21,7 @@ from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.known import equilibria_at
 from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.equivalence import are_images, equivalent, near
-from rodfem.diagram.first_name import ahead, name_of_first
-from rodfem.diagram.first_state import first_state
+from rodfem.diagram.first_state import ahead, first_state, name_of_first
 from rodfem.diagram.images import other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError

@@ -24,8 +24,7 @@ from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Side
 from rodfem.diagram.critical_loads import CriticalLoads
-from rodfem.diagram.first_name import name_of_first
-from rodfem.diagram.first_state import first_state
+from rodfem.diagram.first_state import first_state, name_of_first
 from rodfem.diagram.held import at_load
 from rodfem.diagram.load_steps import LoadSteps
 from rodfem.diagram.persistent_zeros import family_of

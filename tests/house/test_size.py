@@ -14,13 +14,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 39942,
-    "files of Python": 283,
-    "lines of C": 1452,
-    "module constants with a number": 518,
-    "functions of a complexity above 10": 123,
-    "functions of six parameters or more": 73,
-    "places that warn": 37,
+    "lines of Python": 39317,
+    "files of Python": 275,
+    "lines of C": 1451,
+    "module constants with a number": 504,
+    "functions of a complexity above 10": 111,
+    "functions of six parameters or more": 71,
+    "places that warn": 36,
     "files that import internals of UFL and FFCx": 12,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
