@@ -152,8 +152,8 @@ FAULTS = {
     ),
     "asked-row": Fault(
         "rodfem/diagram/finders.py",
-        "found.append(q if q is step.b else replace(q))",
-        "found.append(replace(q))",
+        "            yield arc.b\n",
+        "            yield replace(arc.b)\n",
         "tests/diagram/test_load_at_an_end.py",
     ),
     "start-anew": Fault(
@@ -176,13 +176,13 @@ FAULTS = {
     ),
     "beyond-a-corner-the-tangent-is-that-before-it": Fault(
         "rodfem/continuation/follow.py",
-        "_turn(solver, point, beside)",
-        "_turn(solver, point, -beside)",
+        "_moved(self.solver, point.x, self._beside)",
+        "_moved(self.solver, point.x, -self._beside)",
         "tests/problem/test_tables.py",
     ),
     "out-of-the-range": Fault(
         "rodfem/continuation/follow.py",
-        "(made.load - last.load) * last.slope > 0:",
+        "(beyond - last.load) * last.slope > 0:",
         "(made.load - last.load) * last.slope > 9e9:",
         "tests/diagram/test_load_at_an_end.py",
     ),
@@ -286,9 +286,9 @@ FAULTS = {
         "tests/codim2/test_locus.py",
     ),
     "zeros-of-a-mesh-make-two-branches-of-an-oval": Fault(
-        "rodfem/diagram/two_sides.py",
-        "    if (differ & ~(first.zero & second.zero & (first.values * second.values > 0))).any():\n",
-        "    if differ.any():\n",
+        "rodfem/diagram/equivalence.py",
+        "alike = (noise > 0) & (first * second > 0)",
+        "alike = (noise > 0) & False",
         "tests/hard/test_fuzz.py",
     ),
     "a-wave-that-is-even-on-its-elements-is-smooth": Fault(
@@ -298,19 +298,19 @@ FAULTS = {
         "tests/adaptivity/test_grading.py",
     ),
     "sides-on-both-sides-of-a-load-are-images": Fault(
-        "rodfem/diagram/two_sides.py",
+        "rodfem/diagram/equivalence.py",
         "LOCATED * special.located_to",
         "1e9 * special.located_to",
         "tests/hard/test_fuzz.py",
     ),
     "steps-are-short-from-where-a-branch-goes-back-to": Fault(
-        "rodfem/diagram/step_check.py",
+        "rodfem/diagram/shorter_steps.py",
         "max(piece.largest, piece.since - point.arclength)",
         "piece.largest",
         "tests/diagram/test_shorter_steps.py",
     ),
     "pieces-of-short-steps-are-forgotten": Fault(
-        "rodfem/diagram/step_check.py",
+        "rodfem/diagram/shorter_steps.py",
         "[piece for piece in self._pieces if piece not in inside] + [new]",
         "[new]",
         "tests/diagram/test_shorter_steps.py",
@@ -355,7 +355,7 @@ FAULTS = {
         "rodfem/adaptivity/error_estimate.py", "LEFT = 0.5", "LEFT = 0.0", "tests/adaptivity/test_event_bars.py"
     ),
     "curves-turn-into-another-branch": Fault(
-        f"{CONTINUATION}states_between.py",
+        f"{CONTINUATION}arc.py",
         "dot(tangent) > ALIGNED",
         "dot(tangent) > 0.0",
         "tests/diagram/test_events.py",
@@ -367,9 +367,9 @@ FAULTS = {
         "tests/diagram/test_another_rod.py",
     ),
     "convexity-is-looked-at-in-rows-alone": Fault(
-        f"{CONTINUATION}convexity_between.py",
-        "if margin(t) > 0.0 or holds(t):",
-        "if margin(t) > 0.0 or t < 1.0 or holds(t):",
+        f"{CONTINUATION}arc.py",
+        "if margin(t) <= 0.0 and not holds(t):",
+        "if margin(t) <= 0.0 and t == 1.0 and not holds(t):",
         "tests/continuation/test_convexity.py",
     ),
     "convexity-of-the-undeformed-state-alone": Fault(
@@ -385,7 +385,7 @@ FAULTS = {
         "rodfem/codim2/curve.py", "FAILURES = 2", "FAILURES = 200", "tests/codim2/test_locus.py"
     ),
     "convexity-in-units-of-one-end": Fault(
-        f"{CONTINUATION}convexity_between.py",
+        f"{CONTINUATION}arc.py",
         "convexity.scales(state(0.0), state(1.0))",
         "convexity.scales(state(0.0))",
         "tests/continuation/test_convexity.py",
@@ -420,12 +420,6 @@ FAULTS = {
         "*(",
         "tests/problem/test_scene_errors.py",
     ),
-    "no-balance-of-the-rod": Fault(
-        f"{CONTINUATION}invariants.py",
-        "return bool(total * max(largest, 1.0) <= UNBALANCED)",
-        "return bool(total * max(largest, 1.0) <= 1e6 * UNBALANCED)",
-        "tests/continuation/test_invariants.py",
-    ),
     "pitchforks-by-their-loads": Fault(
         f"{CONTINUATION}normal_form.py",
         "_pitchfork(leading(amplitudes, even, 2, origin.load_left), hidden",
@@ -434,15 +428,9 @@ FAULTS = {
     ),
     "no-index-before-zero-stretch": Fault(
         "rodfem/diagram/tracer.py",
-        "if beside is not None and beside.negative != a.negative:",
+        "if beside.negative != a.negative:",
         "if False:",
         "tests/adaptivity/test_zero_stretch.py",
-    ),
-    "sides-by-determinants-clear-of-the-least": Fault(
-        "rodfem/diagram/two_sides.py",
-        "        return False\n    widest",
-        "        pass\n    widest",
-        "tests/literature/test_postbuckling.py",
     ),
     "stable-in-space-by-frequencies": Fault(
         "rodfem/output/summary.py",
@@ -542,8 +530,8 @@ FAULTS = {
     ),
     "no-convexity-before-zero-stretch": Fault(
         "rodfem/diagram/tracer.py",
-        "if beside is not None and self._ends_not_convex(branch, a, beside):",
-        "if False:",
+        "if reason := self._lost_convexity(branch, a, beside):",
+        "if reason := '':",
         "tests/continuation/test_convexity.py",
     ),
     "symmetric-pencils-without-natural-units": Fault(
@@ -660,10 +648,6 @@ FAULTS = {
     "bar-of-another-law": Fault(
         "rodfem/adaptivity/error_estimate.py", "if again is None or not alike(again, law):", "if again is None:", ERRORS
     ),
-    "energy-is-not-compared-with-work": Fault(
-        f"{CONTINUATION}work.py", "return off <= SAFETY * expected + noise or", "return True or", WORK
-    ),
-    "energy-of-a-jump-vanishes": Fault(f"{CONTINUATION}work.py", "if off > last / SHRUNK:", "if False:", WORK),
     "potential-of-constraints-at-nodes": Fault(
         "rodfem/fem/equations.py", 'others["potential"] = potential', 'others["potential"] = L', WORK
     ),
@@ -672,9 +656,6 @@ FAULTS = {
         "    *rod->load_equation = out[rod->load];",
         "    if (!*rod->load_equation) *rod->load_equation = out[rod->load];",
         f"{WORK} {STEP}",
-    ),
-    "jumps-to-another-branch": Fault(
-        f"{CONTINUATION}jumping.py", "if moved <= FAR and off <= SHARE * moved", "if True", "tests/hard/test_fuzz.py"
     ),
     "step-checks-nothing": Fault(
         f"{CONTINUATION}step.c", "double left = fabs(step->right[i])", "double left = 0 * step->right[i]", STEP
@@ -766,19 +747,38 @@ FAULTS = {
         "SEEN, LARGEST = 1e3, 0.5",
         "tests/output/test_smooth.py",
     ),
+    # rows
+    "rows-of-another-branch-are-kept": Fault(
+        f"{CONTINUATION}follow.py",
+        "defect(system, rows) <= UNEXPLAINED",
+        "defect(system, rows) <= 1e9 * UNEXPLAINED",
+        "tests/continuation/test_row_checks.py",
+    ),
+    "a-defect-by-one-tangent": Fault(
+        f"{CONTINUATION}row_checks.py",
+        "known = [p for p in rows[-ROWS:] if",
+        "known = [p for p in rows[-1:] if",
+        "tests/continuation/test_row_checks.py",
+    ),
+    "rows-are-no-equilibria": Fault(
+        f"{CONTINUATION}row_checks.py",
+        "if not worst <= VIOLATED and",
+        "if not worst <= 1e9 * VIOLATED and",
+        "tests/continuation/test_row_checks.py",
+    ),
     # location
-    "location-is-blunt": Fault(f"{CONTINUATION}interpolant.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
+    "location-is-blunt": Fault(f"{CONTINUATION}flutter.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
     "location-at-another-zero": Fault(
-        f"{CONTINUATION}interpolant.py", "np.argmin(abs(real - guess))", "np.argmax(abs(real - guess))", LOCATE
+        f"{CONTINUATION}flutter.py", "np.argmin(abs(real))", "np.argmax(abs(real))", LOCATE
     ),
     "unresolved-points-are-merged-with-others": Fault(
         f"{CONTINUATION}index_chain.py",
-        "(p.resolved is False or q.resolved is False)",
-        "(q.resolved is False)",
+        "s.resolved is not False for s in (p, q))",
+        "True for s in (p, q))",
         CHAIN,
     ),
     "two-passages-of-one-load-are-merged": Fault(
-        f"{CONTINUATION}index_chain.py", "for row in between)\n        ):", "for row in ())\n        ):", CHAIN
+        f"{CONTINUATION}index_chain.py", "for row in between)\n", "for row in ())\n", CHAIN
     ),
     "breaks-are-not-recorded": Fault(
         f"{CONTINUATION}index_chain.py",
@@ -797,12 +797,6 @@ FAULTS = {
         'return NormalForm("pitchfork", best /',
         'return NormalForm("pitchfork", -best /',
         f"{ERRORS}",
-    ),
-    "no-fold-next-to-a-branch-point": Fault(
-        f"{CONTINUATION}switching.py",
-        "if odd * even >= 0 or abs(odd) >= 2 * abs(even):",
-        "if True:",
-        "tests/literature/test_postbuckling.py",
     ),
     "law-of-an-ordinate-that-says-nothing": Fault(
         f"{CONTINUATION}normal_form.py",
@@ -1176,22 +1170,10 @@ FAULTS = {
         "        if self.error_bars:",
         "tests/diagram/test_sharp_in_state.py",
     ),
-    "integrals-by-two-meshes-alone": Fault(
-        "rodfem/adaptivity/ordinate_bound.py",
-        "        if not self._integrals:",
-        "        if True:",
-        "tests/diagram/test_sharp_in_state.py",
-    ),
-    "integrals-without-their-quadrature": Fault(
-        "rodfem/adaptivity/ordinate_bound.py",
-        "        return abs(value - here.value) + here.left",
-        "        return here.left",
-        "tests/diagram/test_sharp_in_state.py",
-    ),
     "branches-that-attract-alone": Fault(
         "rodfem/continuation/reduced.py",
-        "        if max(abs(values[i : i + 2])) > felt:",
-        "        if False:",
+        "        if max(abs(values[i : i + 2])) > felt\n",
+        "        if False\n",
         "tests/continuation/test_reduced.py",
     ),
     "weak-springs-are-round-off": Fault(
@@ -1292,12 +1274,6 @@ FAULTS = {
     ),
     "terminal-left-without-its-cursor": Fault(
         "rodfem/app/screen.py", "            self._progress.stop()\n", "", "tests/app/test_screen.py"
-    ),
-    "a-piece-without-a-tangent-is-no-cubic": Fault(
-        "rodfem/continuation/states_between.py",
-        "x = solve_at(solver, lambda t: between(a, b, t), s)\n    except",
-        "x = solve_at(solver, lambda t: (a.x, a.tangent + b.tangent), s)\n    except",
-        "tests/hard/test_fuzz.py",
     ),
     "locus-of-a-mean-with-the-bar-of-one": Fault(
         "rodfem/codim2/criteria.py", "split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI

@@ -21,9 +21,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
+from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System

@@ -75,13 +75,12 @@ class Made:
 class Checked:
     """What was checked of a state ``x``.
 
-    The largest ``residual`` and the ``total`` of all, in natural units, and the largest difference of the squared
-    ``norm`` of a quaternion from one.
+    The largest ``residual``, in natural units, and the largest difference of the squared ``norm`` of a quaternion from
+    one.
     """
 
     x: PETSc.Vec
     residual: float
-    total: float
     norm: float
 
 
@@ -228,7 +227,7 @@ class CompiledStep:
         except ConvergenceError:
             return None
         outcome = NewtonResult(True, newton.iterations, newton.error, newton.moved)
-        self.checked = Checked(x, step.unbalanced, step.total, step.stretched)
+        self.checked = Checked(x, step.unbalanced, step.stretched)
         energies = Energies(step.energy_value, step.potential_value, -float(corrector.load_equation[0]))
         if system.equations.potential is None:
             energies = Energies(step.energy_value, float("nan"), float("nan"))

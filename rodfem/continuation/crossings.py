@@ -31,13 +31,14 @@ import numpy as np
 import scipy.linalg
 from numpy.polynomial import Polynomial
 
-from rodfem.continuation.interpolant import REAL
 from rodfem.stability.reduced_stiffness import negative
 from rodfem.stability.spectrum import FINITE
 from rodfem.tolerances import TINY
 
 AXIS = 0.4
 """Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
+REAL = 1e-6
+"""Imaginary part below which a zero of an interpolant, in lengths of its interval, is real."""
 DEEPEST = 8
 """Divisions of a piece."""
 SHORTEST = 1e-8

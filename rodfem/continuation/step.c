@@ -55,7 +55,7 @@ typedef struct {
     /* results */
     double weights[MOST * MOST]; /* of the generators in each condition, a row each; of those that vanish unscaled */
     double *x, *direction, *row, *tangent;
-    double predicted, along, length, energy_value, potential_value, unbalanced, total, stretched;
+    double predicted, along, length, energy_value, potential_value, unbalanced, stretched;
     int broken, verified;
 } Step;
 
@@ -205,15 +205,14 @@ static int verified(Step *step)
     return excess <= 0 || excess <= step->round_off * rounding(&step->saddle, own, g);
 }
 
-/* Largest residual of the equations at x, in natural units, the sum of all, and largest difference of the squared norm of a quaternion
+/* Largest residual of the equations at x, in natural units, and largest difference of the squared norm of a quaternion
    from one; the phase conditions are those of x.  */
 static int check(Step *step, const double *x)
 {
     if (((equations_at *)step->equations)(step->rod, x, step->right)) return 1;
-    step->unbalanced = step->total = step->stretched = 0;
+    step->unbalanced = step->stretched = 0;
     for (int i = 0; i < step->n; i++) {
         double left = fabs(step->right[i]) * (step->sizes ? step->sizes[i] : 1);
-        step->total += left;
         if (!(left <= step->unbalanced)) step->unbalanced = left; /* nan stays */
     }
     for (int i = 0; i < step->quaternions; i++) {

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rodfem.continuation.interpolant import SHARP
+from rodfem.continuation.flutter import SHARP
 from rodfem.continuation.kinds import DIVERGENCE
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Collisions, Critical, Measuring, Near, Side, Told, cluster_at, others_negative

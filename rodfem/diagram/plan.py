@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
@@ -184,3 +185,33 @@ class Plan:
         for argument in (SPECTRUM, MODES):
             if (asked := getattr(self, argument.name)) > most:
                 raise InputError(f"The mesh has no more than {most} eigenvalues, not {asked}", Remedy(FEWER, argument))
+
+
+EQUATIONS = "equations"
+"""Entry of what a run was asked for that has the fingerprint of the equations (:mod:`rodfem.fem.fingerprint`)."""
+
+
+def entries(plan: Plan, scene: Scene) -> dict[str, Any]:
+    """What JSON can hold of a ``plan`` for a ``scene``; steps are a text, events their names."""
+    chosen = {f.name: getattr(plan, f.name) for f in fields(plan)}
+    return chosen | {
+        "span": plan.over(scene),
+        "steps": repr(plan.steps),
+        "events": [event.name for event in plan.events],
+    }
+
+
+def not_held(asked: dict[str, Any]) -> str:
+    """What of a plan that was ``asked`` for no file holds: ``events`` or ``steps``; empty if all of it is there."""
+    held = asked["plan"]
+    return "events" if held["events"] else "steps" if held["steps"] != repr(StepControl()) else ""
+
+
+def plan_without(asked: dict[str, Any]) -> Plan:
+    """Plan that was ``asked`` for, without what no file holds."""
+    known = {f.name for f in fields(Plan)} - {"steps", "events"}
+    given: dict[str, Any] = {}
+    for n in known & asked["plan"].keys():
+        x = asked["plan"][n]
+        given[n] = tuple(x) if isinstance(x, list) else x
+    return Plan(**given)

@@ -14,9 +14,8 @@ from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.asked import EQUATIONS, not_held, plan_without
 from rodfem.diagram.diagram import Diagram
-from rodfem.diagram.plan import Plan
+from rodfem.diagram.plan import EQUATIONS, Plan, not_held, plan_without
 from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization

@@ -27,7 +27,7 @@ from rodfem.continuation.singular_points import (
     special_point,
     taut_where_it_turns,
 )
-from rodfem.diagram.step_check import ShorterSteps, StepCheck, Unresolved
+from rodfem.diagram.shorter_steps import ShorterSteps, Unresolved
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
 DIP = 0.1
@@ -57,7 +57,7 @@ class SpecialSearch:
         self._open: list[Point] = []
         self._before: Point | None = None
         self._nearest = -inf
-        self._check, self._steps = StepCheck(observer), ShorterSteps()
+        self._steps = ShorterSteps()
         self._condensations: dict[int, Condensation] = {}
         self._phi: np.ndarray | None = None
         self._mesh = -1
@@ -82,11 +82,10 @@ class SpecialSearch:
         """Largest step from a point: near gaps, and where a step was not explained, short ones."""
         return min(self.gaps.reach(self.meshes.solvers[point.mesh], point), self._steps.reach(point))
 
-    def after(self, a: Point, b: Point, rows: Sequence[Point] = ()) -> list[SpecialPoint]:
-        """Special points that the row ``b`` after ``a`` shows, in order of arclength.
+    def after(self, b: Point) -> list[SpecialPoint]:
+        """Special points that the row ``b`` shows, in order of arclength.
 
-        At a singular row the index is not known: it waits for the next one.  The ``rows`` are those that the step to
-        ``b`` was predicted from.
+        At a singular row the index is not known: it waits for the next one.
 
         Raises
         ------
@@ -100,12 +99,10 @@ class SpecialSearch:
             self._open = [self.meshes.here(settled, self.meshes.solvers[b.mesh])]
         try:
             self._open.append(b)
-            found = self._shown() if self._regular(b) or len(self._open) > PATIENCE else []
-            self._check(self.meshes.solvers[b.mesh], [*rows, b], self._steps)
+            return self._shown() if self._regular(b) or len(self._open) > PATIENCE else []
         except (Gap, Unresolved):
             self._open = [settled]
             raise
-        return found
 
     def rest(self) -> list[SpecialPoint]:
         """Special points among the last rows of a branch that only its end shows: those of singular rows."""

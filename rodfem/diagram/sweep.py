@@ -15,17 +15,16 @@ from typing import NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.arc import lost_between
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
-from rodfem.continuation.convexity_between import lost_between
 from rodfem.continuation.eigenvalue_curves import Curves
-from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
+from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Side
 from rodfem.diagram.critical_loads import CriticalLoads
-from rodfem.diagram.first_name import name_of_first
-from rodfem.diagram.first_state import first_state
+from rodfem.diagram.first_state import first_state, name_of_first
 from rodfem.diagram.held import at_load
 from rodfem.diagram.load_steps import LoadSteps
 from rodfem.diagram.persistent_zeros import family_of
@@ -74,7 +73,7 @@ class Sweep:
         self.number = plan.spectrum or FREQUENCIES
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, observer.warn)
-        self.invariants = Invariants(solver)
+        self.check = RowCheck(solver)
         self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._still = self.number  # frequencies that are zero at all loads
         self.branches: list[Branch] = []
@@ -221,17 +220,17 @@ class Sweep:
         return point
 
     def _point(self, x: PETSc.Vec) -> Point:
-        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check its invariants.
+        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check it.
 
-        Beside a state whose matrix is singular Newton's method ends early by its own measure: where the invariants are
-        violated the equations are solved once more.
+        Beside a state whose matrix is singular Newton's method ends early by its own measure: where it fails
+        the check the equations are solved once more.
         """
         point = self._evaluated(x)
         try:
-            self.invariants(point)
+            self.check(point)
         except ConvergenceError:
             point = self._evaluated(at_load(self.solver, x, point.load))
-            self.invariants(point)
+            self.check(point)
         return point
 
     def _evaluated(self, x: PETSc.Vec) -> Point:

@@ -11,7 +11,7 @@ from classics import SUPPORTS, column
 
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, StepControl, clamped, free, trace
 from rodfem.codim2.follow import locus
-from rodfem.continuation.convexity_between import lost_between
+from rodfem.continuation.arc import lost_between
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.local_state import Constants

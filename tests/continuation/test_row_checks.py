@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 from classics import column, euler
+from golden_cases import cases
 from petsc4py import PETSc
 
-from rodfem import Discretization, Plan, Solver, clamped, free, trace
+from rodfem import Discretization, Plan, Solver, StepControl, clamped, free, trace
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver, Step
-from rodfem.continuation.invariants import Invariants
+from rodfem.continuation.follow import UNEXPLAINED
+from rodfem.continuation.row_checks import RowCheck, defect
 from rodfem.errors import ConvergenceError
 from rodfem.fem.symmetries import add_change
 from rodfem.fem.system import System
@@ -52,7 +54,7 @@ def spoilt(system: System, x: PETSc.Vec, field: str) -> PETSc.Vec:
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_mutations_are_caught(formulation: str) -> None:
     solver, point = bent(formulation)
-    system, check, kept = solver.system, Invariants(solver), point.x
+    system, check, kept = solver.system, RowCheck(solver), point.x
     check(point)
     caught: dict[str, str] = {}
     for field in (b.name for b in system.fields.blocks):
@@ -101,23 +103,49 @@ def test_reactions_balance_the_load(aside: float) -> None:
             assert equations[tested] @ motion[tested] == pytest.approx(-work, abs=1e-9)
 
 
-@pytest.mark.long
+@pytest.mark.few(1)
 @pytest.mark.alone
-def test_a_balance_that_no_single_equation_misses() -> None:
-    """A distributed force that is too large by 1e-6: by 1e-9 in each equation of 1000 elements, and by 1e-6 in all."""
-    ends = clamped(), free()
-    scene = column("heavy", ends, (0.0, 4.0), distributed=lambda c: (c.P, 0.0, 0.0))
-    solver = Solver(scene, Discretization("pointwise", 1000, 1))
-    point, equilibria = solver.equilibrium(1.0), solver.equilibria
-    assert isinstance(equilibria, BranchSolver)
-    check = Invariants(equilibria)
-    check(point)
-    equilibria.system.set_load(point.x, 1 + SMALL)
-    residual = equilibria.system.new_vector()
-    equilibria.system.at(point.x).residual(residual)
-    assert residual.norm(PETSc.NormType.INFINITY) < 2e-9
-    with pytest.raises(ConvergenceError, match=r"reactions and loads do not balance: their (forces|moments) add up to"):
-        check(point)
+@pytest.mark.parametrize("steps", [StepControl(), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
+def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
+    """States of another branch at nearly the same load, farther than a step away, in place of the last row."""
+    diagram = trace(
+        cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False, steps=steps)
+    )
+    system, most, told = diagram.solvers[0].system, UNEXPLAINED * steps.aim, list[bool]()
+    own = [[p for p in b.points if not any(p is s.point for s in b.special)] for b in diagram.branches]
+    for branch in own:
+        for i in range(2, len(branch)):
+            assert defect(system, branch[max(i - 3, 0) : i + 1]) <= most
+            last, length = branch[i], branch[i].arclength - branch[i - 1].arclength
+            for other in (b for b in own if b is not branch):
+                near = min(other, key=lambda p: abs(p.load - last.load))
+                if abs(near.load - last.load) < 0.5 * length and system.distance(near.x, last.x) > length:
+                    jump = replace(near, arclength=last.arclength)
+                    told.append(defect(system, [*branch[max(i - 3, 0) : i], jump]) > most)
+    assert len(told) > 30 and all(told)
+
+
+@pytest.mark.alone
+def test_a_step_that_has_jumped_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the straight branch beyond the load 2 to the buckled one, with the tangent of the straight one."""
+    scene, mesh, plan = cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False)
+    straight, buckled = trace(scene, mesh, plan).branches[:2]
+    step: Callable[..., Step] = BranchSolver.step
+    jumped = list[float]()
+
+    def jumping(self: BranchSolver, *given: Any) -> Step:
+        made = step(self, *given)
+        near = min(buckled.points[2:], key=lambda p: abs(p.load - made.load))
+        if jumped or made.tangent is None or abs(near.load - made.load) > 0.1:
+            return made
+        jumped.append(near.load)
+        return replace(made, x=near.x.copy(), load=near.load, energies=None)
+
+    monkeypatch.setattr(BranchSolver, "step", jumping)
+    (found,) = trace(scene, mesh, replace(plan, depth=0))
+    assert jumped and found.ended == straight.ended
+    assert [s.point.load for s in found.special] == pytest.approx([s.point.load for s in straight.special], abs=1e-9)
+    assert max(abs(p.ordinate) for p in found.points) == pytest.approx(max(abs(p.ordinate) for p in straight.points))
 
 
 @pytest.mark.few(1)
