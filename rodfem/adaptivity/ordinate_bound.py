@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from rodfem.fem.quadrature_check import Pieces
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
+from rodfem.problem.roles import derived
 from rodfem.tolerances import same_place
 
 
@@ -35,7 +36,7 @@ class IntegralOrdinate:
 
     def __init__(self, system: System) -> None:
         """Cut the elements."""
-        self.system, self._pieces = system, Pieces(system)
+        self.system, self._pieces = system, derived(system.equations, Pieces, lambda: Pieces(system.equations))
 
     def __call__(self, x: PETSc.Vec) -> Integral:
         """Return the integral of a state ``x``."""
