@@ -117,8 +117,9 @@ def test_a_constant_that_asks_for_other_unknowns() -> None:
     rod = column("light", SUPPORTS["clamped-free"], (0.0, 4.0), inertia=Inertia(lambda c: c.k))
     light = Solver(rod, Discretization(elements=4, degree=4))
     heavy = light.rebind(k=1.0)
-    names = [solver.equilibria.system.fields.formulation.name for solver in (light, heavy, heavy.rebind(k=0.0))]
-    assert names == ["reduced", "pointwise", "reduced"]
+    fields = [solver.equilibria.system.fields for solver in (light, heavy, heavy.rebind(k=0.0))]
+    assert [f.formulation.name for f in fields] == ["reduced", "pointwise", "reduced"]
+    assert ["r" in f.dofs for f in fields] == [False, True, False]
 
 
 def test_other_functions_share_nothing() -> None:
