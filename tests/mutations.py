@@ -53,10 +53,29 @@ RECORDED = "tests/modes/test_recorded.py"
 CLOSE = "tests/diagram/test_close_critical_loads.py"
 MISSED = "tests/diagram/test_missed_loads.py"
 AT_SPECIAL = "tests/diagram/test_at_special_points.py"
+OTHER_CONSTANTS = "tests/diagram/test_other_constants.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "constants-of-the-first-scene-stay": Fault(
+        "rodfem/fem/equations.py",
+        "if line is self.register.line:",
+        "if self.register.line is not None:",
+        OTHER_CONSTANTS,
+    ),
+    "forms-of-other-functions-serve": Fault(
+        "rodfem/fem/equations.py",
+        "== (discretization, comm) and f.scene.alike(scene)",
+        "== (discretization, comm)",
+        OTHER_CONSTANTS,
+    ),
+    "unknowns-of-other-constants-stay": Fault(
+        "rodfem/fem/fields.py",
+        "(out.formulation, out.unknown_scalars) == (self.formulation, self.unknown_scalars)",
+        "True",
+        OTHER_CONSTANTS,
+    ),
     "phase-conditions-do-not-move": Fault(
         "rodfem/stability/reduced_stiffness.py",
         "                out += term + term.T",

@@ -154,7 +154,7 @@ class Plan:
                 )
             for value in (a, b):
                 try:
-                    scene.varying(scene.load, scene.span, **{name: value})
+                    scene.varying(**{name: value})
                 except InputError as trouble:
                     raise InputError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
         for argument, what in COUNTS.items():

@@ -29,6 +29,7 @@ from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
 from rodfem.fem.values import LOAD
 from rodfem.problem.contribution import Block, Motion
+from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import TINY
 
@@ -63,12 +64,9 @@ SMOOTH = 0.35
 """The same of a state that a fine mesh resolves to round-off, nearly."""
 
 
-def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
-    """Find a basis of all exact symmetries, on one rank.
-
-    Raises :class:`SceneError` where the equations are no numbers anywhere.
-    """
-    parts = elementary_generators(fields)
+def find_symmetries(equations: Equations) -> list[Symmetry]:
+    """Find a basis of all exact symmetries; raises :class:`SceneError` where the equations are no numbers anywhere."""
+    fields, parts = equations.fields, elementary_generators(equations.fields)
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved, dofs_held = np.zeros((len(parts),) * 2), _held(fields)
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
@@ -152,12 +150,12 @@ def _along(state: Evaluation, changes: np.ndarray) -> tuple[np.ndarray, float]:
     return values @ [1.0, -8.0, 8.0, -1.0] / (12 * STEP), float(abs(values).max())
 
 
-def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
+def find_motion_along(equations: Equations) -> Symmetry | None:
     """Find the motion of a closed rod along itself, with what has to go with it; None where that is no symmetry.
 
     For a scene whose equations have the arclength in them the mesh must be fine.
     """
-    parts = elementary_generators(fields)
+    fields, parts = equations.fields, elementary_generators(equations.fields)
     none = np.zeros(len(parts))
     if equations.uniform:
         return Symmetry(none, parts, along=1.0)
@@ -268,19 +266,27 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, no_m
     function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
     translation, say, only shows there.
     """
-    rng, fields = np.random.default_rng(seed), equations.fields
-    scene, named = fields.scene, dict[str, Any]()
-    for block in fields.blocks:
-        x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
-        named[block.name] = scene.units.of_field(block) * _generic(fields, block, x[..., None], rng, decay)
-    named |= {unknown.name: rng.normal() * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
+    fields, scene = equations.fields, equations.fields.scene
+    values, part = derived(equations, ("generic values", seed, decay), lambda: _generic_values(fields, seed, decay))
+    named = {block.name: scene.units.of_field(block) * values[block.name] for block in fields.blocks}
+    named |= {unknown.name: values[unknown.name] * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
     if no_multipliers:
         multipliers = [block.name for block in fields.blocks if block.multiplier]
         multipliers += [x.name for x in fields.unknown_scalars if x.group.motion is not Motion.POSITION]
         named |= {name: 0.0 * named[name] for name in multipliers}
     low, high = sorted(scene.span)
-    named[LOAD] = low + (high - low) * rng.uniform(0.1, 0.9)
+    named[LOAD] = low + (high - low) * part
     return Evaluation(equations, fields.filled(named), equations.line)
+
+
+def _generic_values(fields: Fields, seed: int, decay: float) -> tuple[dict[str, Any], float]:
+    """Values of a generic state by name, without units, and where in its range the load is: whatever the constants."""
+    rng, scene, named = np.random.default_rng(seed), fields.scene, dict[str, Any]()
+    for block in fields.blocks:
+        x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
+        named[block.name] = _generic(fields, block, x[..., None], rng, decay)
+    named |= {unknown.name: rng.normal() for unknown in fields.unknown_scalars}
+    return named, float(rng.uniform(0.1, 0.9))
 
 
 def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generator, decay: float) -> np.ndarray:

@@ -32,7 +32,7 @@ class InSpace:
         """Allocate the system of the same rod in space."""
         self.planar = planar
         fields = planar.fields
-        self.system = System(planar.scene.in_space(), fields.discretization, planar.comm, planar.clock, fields.mesh)
+        self.system = System(planar.scene.in_space(), fields.discretization, planar.comm, planar.clock)
         self.inertia = Inertia(self.system)
         self._out = self._out_of_plane()
 

@@ -9,7 +9,6 @@ import pytest
 import small_states
 from petsc4py import PETSc
 
-from rodfem import compat
 from rodfem.continuation import branch_solver, corrector
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
@@ -59,17 +58,6 @@ def test_second_variation_is_that_of_petsc(name: str, formulation: str) -> None:
         inertia._assemble_by_petsc(solver.system.at(point.x))
         np.testing.assert_array_equal(ours, matrix.values)
         np.testing.assert_array_equal(border, inertia.border.array_r)
-
-
-@pytest.mark.parametrize(("name", "formulation"), BOTH)
-def test_local_second_variation_is_that_of_dolfinx(name: str, formulation: str) -> None:
-    solver, points = rows(name, formulation)
-    for point in points[::7]:
-        state = solver.system.at(point.x)
-        ours = state.tangent().toarray()
-        state._register()
-        theirs = compat.local_table(solver.system.equations.jacobian.form).toarray()
-        assert abs(ours - theirs).max() <= 1e-14 * abs(theirs).max()
 
 
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
