@@ -16,8 +16,8 @@ from rodfem.output.endings import endings
 from rodfem.output.plot_diagram import END_MARKER, ENDS
 from rodfem.output.plot_frequencies import draw_into
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE
-from rodfem.output.sheet import HALO, PALETTE, axis_label
 from rodfem.output.smooth import between
+from rodfem.output.style import HALO, PALETTE, axis_label
 
 MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "mfc": "white"},

@@ -16,7 +16,7 @@ from rodfem.modes.modes import RIGID
 from rodfem.output.collisions import between_rows
 from rodfem.output.intervals import intervals_of
 from rodfem.output.plot_pieces import STABLE
-from rodfem.output.sheet import PALETTE
+from rodfem.output.style import PALETTE
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}
 """Places in the palette."""

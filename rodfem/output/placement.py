@@ -14,7 +14,7 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from rodfem.output.plot_pieces import Piece
-from rodfem.output.sheet import DPI, FONT, HALO
+from rodfem.output.style import DPI, FONT, HALO
 from rodfem.output.view import POINT
 
 Floats = NDArray[np.float64]

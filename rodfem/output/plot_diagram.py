@@ -25,7 +25,8 @@ from rodfem.output.placement import dense, place_words
 from rodfem.output.plot_images import draw_images
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, Piece, hidden
 from rodfem.output.program import status_of, terse
-from rodfem.output.sheet import (
+from rodfem.output.smooth import drawn_pieces
+from rodfem.output.style import (
     DPI,
     FONT,
     HALO,
@@ -39,7 +40,6 @@ from rodfem.output.sheet import (
     save,
     tex,
 )
-from rodfem.output.smooth import drawn_pieces
 from rodfem.output.view import POINT
 
 __all__ = ["draw_diagram", "main"]

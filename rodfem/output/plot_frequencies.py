@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.frequency_curves import DIVERGED, GROWTH, PAIR, FrequencyCurve, curves, ranges_of, top
-from rodfem.output.sheet import DPI, HALO, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
+from rodfem.output.style import DPI, HALO, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
 
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""

@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 
 from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
-from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, named, save, tex
 from rodfem.output.stable_region import in_words, passed, plane_of, stable_region
+from rodfem.output.style import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, named, save, tex
 from rodfem.output.view import POINT
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}

@@ -22,11 +22,12 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
-from rodfem.output.glyphs import glyphs_of
+from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.sheet import DPI, STYLE
-from rodfem.output.solids import Solid, curve_of, profile_of
-from rodfem.output.view import POINT, on_feet, view_of
+from rodfem.output.solids import Glyph, curve_of, profile_of
+from rodfem.output.style import DPI, FREE, REST, STABLE, STYLE, UNSTABLE
+from rodfem.output.view import POINT, axes_of, axis_of
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
 from rodfem.whole_files import draft_of
@@ -46,7 +47,6 @@ TEETH, BENT = 15, 0.05
 """Lines along d1 where a mode hardly displaces the rod; deflection of a rod, over its size, that is one."""
 GROWTH = 1e-9
 """Real part of the root of -mu, relative to it, above which a mode grows."""
-REST, UNSTABLE, STABLE, FREE = "#B4B4B4", "#D55E00", "#0072B2", "#009E73"
 
 
 def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence[int] = ()) -> Path:
@@ -130,7 +130,8 @@ class _Panel:
         self.shown: list[Collection] = []
         s, mu = modes.s, complex(modes.value[number])
         self.s = fine = np.linspace(s[0], s[-1], POINTS[moving])
-        self.r, self.frames = curve_of(s, modes.r, modes.q, fine)
+        self.r, turned = curve_of(s, modes.r, modes.q, fine)
+        self.frames = directors(turned)
         u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
         span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
         moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
@@ -160,20 +161,16 @@ class _Panel:
         self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=12.5, color=self.color)
 
     def _look(self, span: float) -> None:
-        """Choose the axes (see :func:`rodfem.output.view.view_of`), the limits, and the sign of the mode.
+        """Choose the axes (see :func:`rodfem.output.view.axes_of`), the limits, and the sign of the mode.
 
         It goes upwards at its greatest amplitude.
         """
-        held, moved = self.setting, self.u.real
-        if np.linalg.norm(self.u.imag) > np.linalg.norm(moved):
-            moved = self.u.imag
-        off = self.r - self.r[0]
-        axis = (self.r[-1] - self.r[0]) if held.axis is None else held.axis
+        moved = self.u.imag if np.linalg.norm(self.u.imag) > np.linalg.norm(self.u.real) else self.u.real
+        axis, off = axis_of(self.setting, self.r), self.r - self.r[0]
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
-        across = most if held.force is None and np.linalg.norm(most) > BENT * span else held.force
-        side, feet = held.widest(self.frames[0]), on_feet(held)
-        self.view = view_of(self.r, moved, axis=held.axis, down=held.down, load=across, side=side, feet=feet)
+        bent = self.setting.force is None and np.linalg.norm(most) > BENT * span
+        self.view = axes_of(self.setting, self.r, moved, self.frames[0], most if bent else None)
         raised = moved @ self.view[1]
         if raised[np.argmax(abs(raised))] < 0.0:
             self.u, self.w = -self.u, -self.w
@@ -195,9 +192,9 @@ class _Panel:
         u, w = np.real(self.u * factor), np.real(self.w * factor)
         return self.r + u, Rotation.from_rotvec(w).as_matrix() @ self.frames
 
-    def _glyphs(self, r: Floats, frames: Floats) -> list[Solid]:
+    def _glyphs(self, r: Floats, frames: Floats) -> list[Glyph]:
         """What holds and loads the rod: it goes along where it moves with the rod."""
-        return glyphs_of(self.setting, self.s, r, frames, self.radius, self.view, self.r)
+        return glyphs_of(self.setting, self.s, (r, frames), Look(self.radius, self.view), self.r)
 
     def draw(self, time: float | None = None) -> None:
         """Draw the rod at a time of the loop, from 0 to 1; None: at its greatest amplitude."""

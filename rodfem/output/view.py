@@ -62,7 +62,7 @@ def view_of(
     side
         Direction that is upwards where a straight rod has not moved.
     feet
-        Whether the rod is held in two places or more (:func:`on_feet`), and may be an arch.
+        Whether the rod is held in two places or more, and may be an arch.
 
     Returns
     -------
@@ -103,6 +103,22 @@ def view_of(
     return np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
 
 
+def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
+    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), held and loaded so.
+
+    ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to show, by default of dead forces.
+    """
+    load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
+    along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}
+    return view_of(reference, moved, load=load, feet=feet, **along)
+
+
+def thickness(centres: Floats) -> float:
+    """Mean radius with which a rod of this centreline (n, 3) is drawn: by its length, and by its extent if it coils."""
+    length = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
+    return float(min(length / 90.0, np.linalg.norm(np.ptp(centres, axis=0)) / 40.0))
+
+
 def axis_of(setting: Setting, reference: Floats) -> Floats:
     """Direction (3,) of the axis of a rod in the state ``reference`` (n, 3): from one end to the other.
 
@@ -126,11 +142,6 @@ def _standing(up: Floats, reference: Floats, load: Floats) -> float:
     bow, size = (reference - feet).mean(axis=0), np.linalg.norm(np.ptp(reference, axis=0))
     arch = np.linalg.norm(bow) > ARCHED * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
     return sign_of(up @ bow) if arch and load @ bow < 0 else 1.0
-
-
-def on_feet(setting: Setting) -> bool:
-    """Whether a rod is held in two places or more."""
-    return sum(bool(x.held.any()) for x in setting.supports) > 1
 
 
 def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:

@@ -13,15 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.modes.modes import RIGID, SYMMETRY, load_modes
 from rodfem.modes.recorded import Few
-from rodfem.output.glyphs import glyphs_of
+from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.plot_modes import GROWTH, LARGEST
 from rodfem.output.view import POINT
 from rodfem.problem.setting import Setting
-from rodfem.report.bodies import Shelf
 from rodfem.report.packing import packed
 from rodfem.report.readings import eigenvalue_in_words
 from rodfem.report.shapes import Shapes
-from rodfem.report.stage import Stage
 from rodfem.tolerances import SAME_EIGENVALUE
 
 Floats = NDArray[np.float64]
@@ -82,35 +80,17 @@ def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: 
     return [mode._replace(zero=any(mode is other for other in vanish)) for mode in shown]
 
 
-def motions_of(
-    modes: Sequence[Shown],
-    row: int,
-    shapes: Shapes,
-    setting: Setting,
-    stage: Stage,
-    shelf: Shelf,
-    bodies: Sequence[int],
-) -> list[dict[str, Any]]:
-    """Modes of one state as the page has them, with the maps of its supports at an amplitude of one.
+def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Setting, look: Look) -> list[dict[str, Any]]:
+    """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one.
 
-    Parameters
-    ----------
-    modes, row
-        The modes, and the row of the branch.
-    shapes, setting
-        States of the branch, and what holds and loads this one.
-    stage, shelf
-        Size and direction of the picture, and the bodies of all supports.
-    bodies
-        Numbers of those of this state.
+    ``setting`` is what holds and loads the state, ``look`` that of the picture.
     """
     r, frames = shapes[row]
     span = float(np.linalg.norm(np.ptp(r, axis=0)))
 
     def moved(u: Floats, w: Floats) -> Any:
         turned = Rotation.from_rotvec(w).as_matrix() @ frames
-        solids = glyphs_of(setting, shapes.s, r + u, turned, stage.radius, stage.axes, r)
-        return packed([shelf.fitted(body, solid) for body, solid in zip(bodies, solids, strict=False)])
+        return packed([x.map for x in glyphs_of(setting, shapes.s, (r + u, turned), look, r)])
 
     out = []
     for mode in modes:

@@ -13,7 +13,7 @@ from rodfem.errors import InputError
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.contents import check_run, read_diagram
 from rodfem.output.digits import with_unit
-from rodfem.output.sheet import mesh_in_words, ordinate_in_words
+from rodfem.output.style import mesh_in_words, ordinate_in_words
 from rodfem.report.branches import DERIVED, ordinates_of
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.loci import loci_of

@@ -16,10 +16,9 @@ from rodfem.modes.recorded import read as recorded
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_images import is_traced
 from rodfem.output.profiles import POINTS, PROFILES, profiles_of
-from rodfem.output.sheet import PALETTE
-from rodfem.output.solids import profile_of
+from rodfem.output.solids import body_of, profile_of
+from rodfem.output.style import PALETTE
 from rodfem.problem.setting import read as read_setting
-from rodfem.report.bodies import FLAT, Shelf
 from rodfem.report.branches import branch_data
 from rodfem.report.motions import modes_of, motions_of
 from rodfem.report.packing import packed, plain
@@ -44,7 +43,8 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     shapes = _shapes(data, groups, folder)
     states = sum(len(each.r) for each in shapes.values())
     stage = stage_of(data, shapes, groups)
-    shelf, with_modes, branches = Shelf(stage.radius), rows_with_modes(folder / "modes.h5"), []
+    shelf: dict[tuple[str, str], int] = {}
+    with_modes, branches = rows_with_modes(folder / "modes.h5"), []
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
         name = branch["name"]
         here, group = shapes[name], groups[name]
@@ -59,7 +59,7 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
             zeros = 0 if "omega2" in branch["columns"] else branch["columns"]["zero"][row]
             shown = modes_of(path, (name, row), few, nodes, zeros)
             if shown:
-                modes[row] = motions_of(shown, row, here, setting, stage, shelf, found[row][0])
+                modes[row] = motions_of(shown, here, row, setting, stage.look)
         along = profiles_data(group, states)
         image = "" if is_traced(branch, data["branches"]) else branch.get("image", "")
         branches.append(
@@ -115,10 +115,12 @@ def _shapes(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Sha
     return shapes
 
 
-def _placed(shapes: Shapes, row: int, group: Any, stage: Stage, shelf: Shelf) -> tuple[list[int], list[Floats]]:
-    """Bodies of the supports and loads of a state, and their maps."""
-    r, frames = shapes[row]
-    return shelf.place_all(glyphs_of(read_setting(group, row), shapes.s, r, frames, stage.radius, stage.axes))
+def _placed(
+    shapes: Shapes, row: int, group: Any, stage: Stage, shelf: dict[tuple[str, str], int]
+) -> tuple[list[int], list[Floats]]:
+    """Numbers on the ``shelf`` of the bodies of supports and loads of a state, and their maps."""
+    glyphs = glyphs_of(read_setting(group, row), shapes.s, shapes[row], stage.look)
+    return [shelf.setdefault((x.body, x.color), len(shelf)) for x in glyphs], [x.map for x in glyphs]
 
 
 def _drawn(shapes: Shapes, found: list[tuple[list[int], list[Floats]]]) -> dict[str, Any]:
@@ -136,9 +138,9 @@ def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, 
         "s": packed(shapes.s),
         "outline": packed(_outline(shapes, stage, OUTLINE)),
         "stripe": packed(OVER * _outline(shapes, stage, STRIPE)),
-        "radius": stage.radius,
+        "radius": stage.look.radius,
         "size": float(shapes.s[-1] - shapes.s[0]),
-        "axes": stage.axes.tolist(),
+        "axes": stage.look.axes.tolist(),
         "loadDirection": None if stage.load is None else stage.load.tolist(),
         "notes": list(stage.setting.notes),
         "start": [[branch["name"] for branch in data["branches"]].index(stage.branch), stage.row],
@@ -147,17 +149,19 @@ def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, 
 
 def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
     """Outline of the cross-sections (1, k, 2), or (S, k, 2) at the stations where they differ."""
-    whole = stage.radius * profile_of(shapes.s, stage.setting.section, angles)
-    return whole[:1] if np.ptp(whole, axis=0).max() < UNIFORM * stage.radius else whole
+    whole = stage.look.radius * profile_of(shapes.s, stage.setting.section, angles)
+    return whole[:1] if np.ptp(whole, axis=0).max() < UNIFORM * stage.look.radius else whole
 
 
-def _solids(shelf: Shelf) -> list[dict[str, Any]]:
+def _solids(shelf: dict[tuple[str, str], int]) -> list[dict[str, Any]]:
+    """Bodies in their colours; a box and a wedge have sharp edges."""
+    made = [(*body_of(body), body, color) for body, color in shelf]
     return [
         {
-            "points": packed(body.solid.points),
-            "triangles": body.solid.triangles.ravel().tolist(),
-            "colour": body.solid.color,
-            "flat": len(body.solid.points) <= FLAT,
+            "points": packed(points),
+            "triangles": triangles.ravel().tolist(),
+            "colour": color,
+            "flat": body in ("box", "wedge"),
         }
-        for body in shelf.bodies
+        for points, triangles, body, color in made
     ]

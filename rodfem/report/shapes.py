@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from rodfem.errors import InputError
+from rodfem.output.solids import curve_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES
 
@@ -71,8 +71,5 @@ def _state(nodes: tuple[Floats, Floats, Floats], count: int, group: Any) -> tupl
     s, r, q = nodes
     if len(s) < FEWEST_NODES or not np.isfinite(r).all() or not np.isfinite(q).all() or not (np.diff(s) > 0).all():
         raise InputError(f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again.")
-    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
-    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
     at = np.linspace(s[0], s[-1], count)
-    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
-    return at, CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return at, *curve_of(s, r, q, at)

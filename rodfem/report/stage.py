@@ -9,41 +9,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rodfem.output.glyphs import Look
 from rodfem.output.typical import typical_state
-from rodfem.output.view import axis_of, on_feet, view_of
+from rodfem.output.view import axes_of, thickness
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.shapes import Shapes
 
 Floats = NDArray[np.float64]
 
-SLENDER, COILED = 90.0, 40.0
-"""Length of a rod, and extent of its centreline, over its drawn radius, at least."""
-
 
 @dataclass(frozen=True)
 class Stage:
     """The picture of the typical state.
 
-    Attributes
-    ----------
-    branch, row
-        The state.
-    axes
-        To the right, upwards and to the viewer, as rows (3, 3).
-    load
-        Unit vector along the dead load (3,), or None.
-    radius
-        Mean radius of the rod.
-    setting
-        What holds and loads it.
+    ``branch`` and ``row`` are those of the state, ``look`` size and directions of the picture, ``load`` the unit vector
+    along the dead load (3,), or None, and ``setting`` what holds and loads the rod.
     """
 
     branch: str
     row: int
-    axes: Floats
+    look: Look
     load: Floats | None
-    radius: float
     setting: Setting
 
 
@@ -51,15 +38,10 @@ def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any)
     """Stage for a diagram; ``groups`` are those of the branches in ``states.h5``, ``shapes`` their states."""
     branch, row, _ = typical_state(data)
     first = data["branches"][0]
-    loads = np.array(first["columns"]["load"])
-    left = int(np.argmin(abs(loads - next(b["columns"]["load"][row] for b in data["branches"] if b["name"] == branch))))
-    reference = shapes[first["name"]].r[0 if branch == first["name"] else left]
-    (r, frames), setting = shapes[branch][row], read_setting(groups[branch], row)
-    side = setting.widest(frames[0])
-    axis = axis_of(setting, reference)
-    down, load, feet = setting.down, setting.force, on_feet(setting)
-    axes = view_of(reference, r - reference, axis=axis, down=down, load=load, side=side, feet=feet)
-    load = load if down is None else down
-    length = float(shapes[branch].s[-1] - shapes[branch].s[0])
-    radius = min(length / SLENDER, float(np.linalg.norm(np.ptp(r, axis=0))) / COILED)
-    return Stage(branch, row, axes, None if load is None else load / np.linalg.norm(load), radius, setting)
+    load = next(b["columns"]["load"][row] for b in data["branches"] if b["name"] == branch)
+    left = 0 if branch == first["name"] else int(np.argmin(abs(np.array(first["columns"]["load"]) - load)))
+    reference, (r, frames) = shapes[first["name"]].r[left], shapes[branch][row]
+    setting = read_setting(groups[branch], row)
+    down = setting.force if setting.down is None else setting.down
+    axes = axes_of(setting, reference, r - reference, frames[0])
+    return Stage(branch, row, Look(thickness(r), axes), None if down is None else down / np.linalg.norm(down), setting)

@@ -25,7 +25,7 @@ from rodfem.output.placement import dense
 from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram, figure_of
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
-from rodfem.output.sheet import PALETTE
+from rodfem.output.style import PALETTE
 from rodfem.problem.scene import Ordinate
 
 pytestmark = pytest.mark.alone

@@ -16,8 +16,8 @@ from mpi4py import MPI
 
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.output.plot_pieces import STABLE, STYLES
-from rodfem.output.sheet import DPI, HALO, PALETTE, STYLE, save
 from rodfem.output.smooth import drawn_pieces
+from rodfem.output.style import DPI, HALO, PALETTE, STYLE, save
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Point

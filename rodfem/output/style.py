@@ -29,6 +29,16 @@ GREEK = (
     *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "pi"),
     *("rho", "sigma", "tau", "phi", "chi", "psi", "omega"),
 )
+ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
+"""A rod in space, the line along d1 on it, and arrows along d1 and d2."""
+GREY, DARK, STEEL, LOAD = "#9A9A9A", "#6E6E6E", "#707C8A", "#B3123E"
+"""What holds a rod, its axles and strings, springs and rails, and loads."""
+REST, UNSTABLE, STABLE, FREE = "#B4B4B4", "#D55E00", "#0072B2", "#009E73"
+"""A rod at rest in a picture of its modes, and modes that grow, swing, or cost no energy."""
+WARNING: dict[str, Any] = {"mec": LOAD, "mew": 1.8, "mfc": "#F0E442"}
+"""Mark of what a diagram does not explain."""
+NOTE: dict[str, Any] = {"color": "0.4", "fontsize": FONT - 3}
+"""Line at the foot of a picture."""
 HALO = [withStroke(linewidth=3.2, foreground="white")]
 
 
