@@ -762,8 +762,8 @@ FAULTS = {
     ),
     "pictures-draw-chords": Fault(
         "rodfem/output/smooth.py",
-        "SEEN, LARGEST = 1e-3, 0.5",
-        "SEEN, LARGEST = 1e3, 0.5",
+        "SEEN = 1e-3",
+        "SEEN = 1e3",
         "tests/output/test_smooth.py",
     ),
     # location
@@ -1384,12 +1384,6 @@ FAULTS = {
     ),
     "stable-side-beyond-a-crossing": Fault(
         "rodfem/output/stable_region.py", "if passed(one).any() or not side", "if not side", LOCI
-    ),
-    "shade-goes-on-beyond-a-crossing": Fault(
-        "rodfem/output/plot_locus.py",
-        "np.where(crossings % 2, -1.0, 1.0)",
-        "np.ones(len(crossings))",
-        "tests/output/test_plot_diagram.py",
     ),
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/criteria.py", "curve.part > IMPERFECT", "curve.part > 1e9", LOCI

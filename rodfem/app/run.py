@@ -23,7 +23,7 @@ from rodfem.diagram.trace import PLAN, traced
 from rodfem.fem.fields import Discretization
 from rodfem.output.files import save_json
 from rodfem.output.folder import locked
-from rodfem.output.typical import typical_state
+from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first

@@ -1,4 +1,9 @@
-"""Frequencies of a branch of ``diagram.json`` as curves over the load, and the ranges of the load that are unstable."""
+"""Frequencies of a branch of ``diagram.json`` as curves over the load, and the ranges of the load that are unstable.
+
+The eigenvalues ``mu = s +- sqrt(D)`` have a square root at a flutter load; their mean ``s`` and
+``D = ((mu1 - mu2)/2)^2`` have none, and are parabolas through two rows on either side and the flutter load itself,
+where ``D = 0``.  So curves have points between the rows next to it, where a chord would show a corner.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +18,8 @@ from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.modes.modes import RIGID
-from rodfem.output.collisions import between_rows
 from rodfem.output.intervals import intervals_of
-from rodfem.output.plot_pieces import STABLE
+from rodfem.output.pieces import STABLE
 from rodfem.output.style import PALETTE
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}
@@ -26,7 +30,14 @@ REAL = 1e-6
 """An imaginary part smaller than this is none, relative to the root."""
 PAIR, GROWTH, DIVERGED = "complex pair, real part", "complex pair, imaginary part", "diverged, growth rate"
 LEAST = 1e-3
-"""Least frequency at the top of a picture."""
+"""Least frequency at the top of a picture; distance of eigenvalues that have met from their mean, relative to it."""
+SHARES = np.linspace(0.0, 1.0, 9)[1:-1] ** 2
+"""Where the step next to a flutter load has points, in parts of it from there."""
+JUST = 1e-5j
+"""Imaginary part of a pair that has just met, relative to it: the place where the curve of a pair begins."""
+
+Members = dict[int, list[tuple[float, int, complex, str]]]
+"""Load, row, eigenvalue and motion on each curve, by its number."""
 
 
 @dataclass(frozen=True)
@@ -76,27 +87,52 @@ class Range(NamedTuple):
 def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()) -> list[FrequencyCurve]:
     """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve.
 
-    With its ``special`` points curves have points between rows where two frequencies collide.
+    With its ``special`` points curves have points between rows where two frequencies meet.
     """
-    found: dict[int, list[tuple[float, int, complex, str]]] = {}
-    for row, (load, pairs, motions, numbers) in enumerate(
-        zip(columns["load"], columns["omega2"], columns["motion"], columns["curve"], strict=True)
-    ):
+    found: Members = {}
+    each = (columns[name] for name in ("load", "omega2", "motion", "curve"))
+    for row, (load, pairs, motions, numbers) in enumerate(zip(*each, strict=True)):
         for pair, motion, number in zip(pairs, motions, numbers, strict=True):
-            root = 0j if motion == RIGID else complex(*pair) ** 0.5  # what the file has is round-off
-            found.setdefault(number, []).append((load, row, root, motion))
-    for number, extra in between_rows(columns, special).items():
-        motion = found[number][-1][3]
-        same = {point.row for point in extra if point.load == columns["load"][point.row]}
-        found[number] = [member for member in found[number] if member[1] not in same]
-        found[number] += [(point.load, point.row, point.mu**0.5, motion) for point in extra]
+            mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
+            found.setdefault(number, []).append((load, row, mu, motion))
+    met = [point for point in special if point["kind"] == FLUTTER and point.get("omega2") is not None]
+    more = [_beside(columns["load"], found, point, {p["row"] for p in met}) for point in met]
+    for number, extra in ((number, extra) for each in more for number, extra in each.items()):
+        kept = [member for member in found[number] if member[0] != extra[0][0]]
+        found[number] = kept + extra
     out = []
     for members in found.values():
         members.sort(key=lambda member: member[0])
         (motion, _), *_ = Counter(member[3] for member in members).most_common()
-        loads, rows, roots, _ = zip(*members, strict=True)
-        out.append(FrequencyCurve(motion, np.array(loads), np.array(rows), np.array(roots)))
+        loads, rows, values, _ = zip(*members, strict=True)
+        out.append(FrequencyCurve(motion, np.array(loads), np.array(rows), np.array(values) ** 0.5))
     return sorted(out, key=lambda curve: (curve.motion, abs(curve.roots[0])))
+
+
+def _beside(loads: Sequence[float], known: Members, point: Mapping[str, Any], others: set[int]) -> Members:
+    """Points beside one flutter load, that of the load itself first; ``others`` are the rows of all of them."""
+    row, mean = int(point["row"]), float(point["omega2"])
+    at = {number: {member[1]: member[2] for member in members} for number, members in known.items()}
+    met = [number for number, values in at.items() if row in values and abs(values[row] - mean) <= LEAST * abs(mean)]
+    found: Members = {number: [(loads[row], row, complex(mean), known[number][-1][3])] for number in met}
+    for step in (-1, 1):
+        rows = [row + step, row + 2 * step]
+        if len(met) % 2 or others & set(rows) or not all(i in at[number] for number in met for i in rows):
+            continue
+        values = np.array([[at[number][i] for number in met] for i in rows])
+        centre = values.mean(axis=1)
+        square = ((values - centre[:, None]) ** 2).mean(axis=1).real
+        t = np.array([0.0, *(loads[i] - loads[row] for i in rows)])
+        mid, discriminant = (np.polyfit(t, (first, *rest), 2) for first, rest in ((mean, centre.real), (0.0, square)))
+        growing = square[0] < 0
+        for number, value in zip(met, values[0], strict=True):
+            sign = np.sign(value.imag) if growing else np.sign(value.real - centre[0].real)
+            just = [(float(np.nextafter(loads[row], loads[rows[0]])), row, mean * (1 + sign * JUST))] * bool(growing)
+            x = SHARES * t[1]
+            mu = np.polyval(mid, x) + sign * np.polyval(discriminant, x).astype(complex) ** 0.5
+            between = list(zip(loads[row] + x, np.where(SHARES > 0.5, rows[0], row), mu, strict=True))
+            found[number] += [(*place, found[number][0][3]) for place in just + between]
+    return found
 
 
 def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:

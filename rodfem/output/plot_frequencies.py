@@ -17,12 +17,12 @@ from matplotlib.patches import Patch
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.frequency_curves import DIVERGED, GROWTH, PAIR, FrequencyCurve, curves, ranges_of, top
-from rodfem.output.style import DPI, HALO, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
+from rodfem.output.style import HALO, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
 
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
-WIDTH, EVERY = 1.8, 0.03
-"""Width of the line of a real frequency; distance of the marks of others, over the diagonal of the axes."""
+WIDTH = 1.8
+"""Width of the line of a real frequency."""
 
 
 def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> Path:
@@ -44,13 +44,10 @@ def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
     if not branches:
         raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
-        axes = figure.subplots()
+        figure, axes = sheet(str(diagram["title"]), _about(diagram, branches))
         handles = draw_into(axes, branches, most)
         axes.set_xlabel(axis_label(diagram))
-        axes.set_title(str(diagram["title"]))
-        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9)
-        figure.supxlabel(_footer(diagram, branches), fontsize=8.5, color="0.4", x=0.01, ha="left")
+        explain(axes, handles)
     return figure
 
 
@@ -89,7 +86,7 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
     drawn = set()
     for (what, part), (marker, style) in zip(curve.parts.items(), PARTS.values(), strict=True):
         if not np.isnan(part).all():
-            axes.plot(curve.loads, part, marker + style, color=color, ms=4, lw=0.8, markevery=EVERY)
+            axes.plot(curve.loads, part, marker + style, color=color, ms=4, lw=0.8, markevery=0.03)
             drawn.add(what)
     return drawn
 
@@ -113,7 +110,7 @@ def _mark(axes: Axes, special: Mapping[str, Any]) -> None:
     text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
 
 
-def _footer(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:
+def _about(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:
     """Discretisation, and the greatest bound of the errors of the special loads."""
     text = mesh_in_words(diagram["discretization"])
     found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]

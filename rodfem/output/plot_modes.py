@@ -25,7 +25,7 @@ from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_settin
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
 from rodfem.output.solids import Glyph, curve_of, profile_of
-from rodfem.output.style import DPI, FREE, REST, STABLE, STYLE, UNSTABLE
+from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
 from rodfem.output.view import POINT, axes_of, axis_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
@@ -40,7 +40,7 @@ LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
 POINTS, SIDES, SLENDER = (240, 100), (14, 10), 65.0
 """Points along and around a tube, in a picture and in an animation; the rod's size over the tube's radius."""
-FRAMES, RATE, PERIODS, FAINTEST, GROWS = 60, 20, 2.0, 0.06, 0.8
+FRAMES, RATE, PERIODS, FAINTEST, RISING = 60, 20, 2.0, 0.06, 0.8
 """Of an animation: pictures, pictures a second, periods of an oscillation, amplitude at which a growing mode starts,
 and the share of the time in which it grows; in the rest it goes back, pale, so that the loop joins."""
 TEETH, BENT = 15, 0.05
@@ -117,8 +117,8 @@ def amplitude(root: complex, grows: bool, time: float) -> complex:
     most = np.log(1 / FAINTEST) / root.real
     if root.imag:
         most = min(most, PERIODS * 2 * np.pi / abs(root.imag))
-    back = max(0.0, time - GROWS) / (1 - GROWS)
-    grown = np.exp(root * most * (min(time / GROWS, 1.0) - 1))
+    back = max(0.0, time - RISING) / (1 - RISING)
+    grown = np.exp(root * most * (min(time / RISING, 1.0) - 1))
     return complex(grown + back**2 * (3 - 2 * back) * (np.exp(-root * most) - grown))
 
 
@@ -141,7 +141,7 @@ class _Panel:
         self.root = np.sqrt(-mu)
         zero = abs(mu) <= (modes.error[number] if np.isfinite(modes.error[number]) else 0.0)
         self.free = modes.motion[number] == SYMMETRY or zero
-        self.color = FREE if self.free else UNSTABLE if self.root.real > GROWTH * abs(self.root) else STABLE
+        self.color = FREE if self.free else GROWS if self.root.real > GROWTH * abs(self.root) else SWINGS
         self._title(modes, number, mu)
         angles = np.linspace(0, 2 * np.pi, self.sides + 1) - np.pi / self.sides
         self.profile = self.radius * profile_of(fine, setting.section, angles)
@@ -157,7 +157,7 @@ class _Panel:
         kind, error = modes.motion[number], float(modes.error[number])
         doubt = f" ({error:.0e})" if np.isfinite(error) else ""
         value = f"{mu.real:.6g}" if mu.imag == 0 else f"{mu.real:.5g} {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.5g}i"
-        what = {FREE: "zero", STABLE: "stable", UNSTABLE: "unstable" if mu.imag == 0 else "flutter"}[self.color]
+        what = {FREE: "zero", SWINGS: "stable", GROWS: "unstable" if mu.imag == 0 else "flutter"}[self.color]
         self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=12.5, color=self.color)
 
     def _look(self, span: float) -> None:
@@ -200,9 +200,9 @@ class _Panel:
         """Draw the rod at a time of the loop, from 0 to 1; None: at its greatest amplitude."""
         for drawn in self.shown:
             drawn.remove()
-        grows = self.color == UNSTABLE
+        grows = self.color == GROWS
         r, frames = self._moved(1.0 if time is None else amplitude(self.root, grows, time))
-        pale = 0.6 if grows and time is not None and time > GROWS else 0.0
+        pale = 0.6 if grows and time is not None and time > RISING else 0.0
         color = (1 - pale) * np.array(to_rgb(self.color)) + pale * np.array(to_rgb(REST))
         self.shown = self._rod(r, frames, color, 1)
         if solids := self._glyphs(r, frames):

@@ -12,9 +12,8 @@ from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
-from rodfem.output.endings import MEETS
 from rodfem.output.intervals import Interval, changes_at, coexisting, intervals_of, stable_ones, without_stable
-from rodfem.output.plot_pieces import PLANAR, STABLE, UNDECIDED
+from rodfem.output.pieces import MEETS, PLANAR, STABLE, UNDECIDED
 
 MOST_INTERVALS, MOST_NAMES = 6, 6
 """Intervals of a branch that are told one by one, and branches that are named in one sentence."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.digits import number
-from rodfem.output.endings import is_solved
+from rodfem.output.pieces import is_solved
 from rodfem.tolerances import unit
 
 READ = ("load", "ordinate")

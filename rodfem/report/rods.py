@@ -14,7 +14,7 @@ from rodfem.errors import InputError
 from rodfem.modes.modes import rows_with_modes
 from rodfem.modes.recorded import read as recorded
 from rodfem.output.glyphs import glyphs_of
-from rodfem.output.plot_images import is_traced
+from rodfem.output.plot_diagram import is_traced
 from rodfem.output.profiles import POINTS, PROFILES, profiles_of
 from rodfem.output.solids import body_of, profile_of
 from rodfem.output.style import PALETTE

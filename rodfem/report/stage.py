@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.output.glyphs import Look
-from rodfem.output.typical import typical_state
+from rodfem.output.pieces import typical_state
 from rodfem.output.view import axes_of, thickness
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting

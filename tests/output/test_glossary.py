@@ -16,7 +16,7 @@ from rodfem.output.glossary import ENTRIES, NAMES, explanation
 from rodfem.output.plot_diagram import MARKERS
 from rodfem.output.plot_frequencies import PARTS
 from rodfem.output.plot_locus import POINTS
-from rodfem.output.plot_pieces import STYLES
+from rodfem.output.style import LINES as STYLES
 
 HOME = Path(__file__).parents[2]
 pytestmark = pytest.mark.alone

@@ -18,10 +18,10 @@ from rodfem.errors import InputError
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.pieces import typical_state
 from rodfem.output.render import _read, draw_shape_safely
 from rodfem.output.solids import FLATTEST, SIDES, profile_of, turn
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
-from rodfem.output.typical import typical_state
 from rodfem.output.view import view_of
 from rodfem.problem.ends import (
     Attachment,
@@ -344,8 +344,8 @@ def test_typical_state_is_well_inside_what_it_is_said_to_be() -> None:
     assert typical_state({"branches": [first, leaves]}) == ("branch 1", 3, "3, stable")
     unstable = branch("branch 1", [0, 2, 1, 1, 1, 1], [singular(0)], parent=["straight", 0])
     assert typical_state({"branches": [first, unstable]}) == ("branch 1", 4, "4, unstable, index 1")
-    planar = branch("straight", [0] * 6, columns={"negative_in_space": [0, 1, 1, 1, 1, 1]})
-    assert typical_state({"branches": [planar | {"name": "x"}]})[2] == "0, stable"
+    planar = branch("straight", [0] * 6, columns={"negative_in_space": [0, 0, 1, 1, 1, 1]})
+    assert typical_state({"branches": [planar | {"name": "x"}]})[2] == "1, stable"
     planar["columns"]["negative_in_space"] = [1] * 6
     assert typical_state({"branches": [planar]})[2] == "3, stable in the plane, unstable in space, index 1"
     with pytest.raises(InputError, match="no states"):

@@ -10,7 +10,7 @@ from rodfem.app.cli import Parser, run_folder
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.contents import read_diagram
 from rodfem.output.digits import number
-from rodfem.output.endings import is_solved
+from rodfem.output.pieces import is_solved
 from rodfem.output.summary import in_sentences
 
 NEEDED = ("parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")

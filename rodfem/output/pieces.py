@@ -1,0 +1,176 @@
+"""Pieces of the branches of a diagram: consecutive rows of one index, why branches end, and the state that is shown.
+
+An index is that of the step between two rows.  It is the greater one of both rows, but at a special point that is known
+before and after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import groupby, pairwise
+from typing import Any, NamedTuple
+
+from rodfem.continuation.kinds import FREQUENCY, KINDS
+from rodfem.errors import InputError
+from rodfem.stability.soft_mode import index_range
+
+STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
+UNDECIDED = "stability undecided"
+COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
+"""Kinds whose index before and after is that of the steps beside."""
+COINCIDE = 1e-6
+"""Arclength within which a row of a branch is at the branch point that it leaves."""
+INSIDE = 0.6
+"""Where on a piece the state to show is taken, as a share of the piece's length along the branch."""
+COMPLETE = ("", "end of range", "closed loop", "not traced")
+"""Ends that need no mark."""
+MEETS, SQUEEZED, BEGINS = "meets", "stretch reaches zero", "begins here: "
+"""Beginning of an end on another branch, whose points say so; reason of an end at a load that is solved for; beginning
+of the note at the first row of a branch that was traced to both sides."""
+
+Branch = Mapping[str, Any]
+
+
+class Piece(NamedTuple):
+    """Rows ``first`` to ``last`` of a branch, with one index between them.
+
+    ``negative`` is the index, of a planar rod in its plane, ``in_space`` that among all perturbations (None where it is
+    not known), ``undecided`` the number of eigenvalues that may be negative besides; ``kink`` names functions on a kink
+    of which the states are, where the index is that of one side.
+    """
+
+    first: int
+    last: int
+    negative: int
+    in_space: int | None
+    undecided: int = 0
+    kink: str = ""
+
+    @property
+    def kind(self) -> str:
+        """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`."""
+        if self.kink or (self.undecided and not self.negative):
+            return UNDECIDED
+        return UNSTABLE if self.negative else PLANAR if self.in_space else STABLE
+
+    @property
+    def label(self) -> str:
+        """The index, or its least and greatest value, followed by the index in space in parentheses."""
+        index = index_range(self.negative, self.undecided, self.kink)
+        return index if self.in_space is None else f"{index} ({self.in_space})"
+
+
+def pieces_of(branch: Branch) -> list[Piece]:
+    """Pieces of a branch of ``diagram.json``, in order; raises ValueError where its columns differ in length."""
+    columns = branch["columns"]
+    rows = len(columns["load"])
+    if not rows == len(columns["ordinate"]) == len(columns["negative"]):
+        raise ValueError(f"columns of branch {branch['name']!r} differ in length: try to compute the diagram anew")
+    known = {}
+    for row, before, after in _indices(branch):
+        known |= {(row, side): index for side, index in ((0, before), (1, after)) if index is not None}
+    kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
+    negative, space = _off_kinks(columns["negative"], kink), _in_space(branch)
+    steps = []
+    for a, b in pairwise(range(rows)):
+        on = kink[a] if kink[b] else ""
+        left, right = ((columns["negative"] if on else negative)[row] for row in (a, b))
+        left, right, open_left, open_right = (
+            *(known.get((a, 1), left), known.get((b, 0), right)),
+            *((row, side) not in known and undecided[row] for row, side in ((a, 1), (b, 0))),
+        )
+        if undecided[a] + undecided[b]:
+            least = min(left, right)
+            more = max(left + open_left, right + open_right) - least
+        else:
+            more, least = 0, left if (a, 1) in known else right if (b, 0) in known else max(left, right)
+        steps.append((least, max(space[a], space[b], least) if space else None, more, on))
+    groups = [[step for step, _ in group] for _, group in groupby(enumerate(steps), lambda step: step[1])]
+    return [Piece(group[0], group[-1] + 1, *steps[group[0]]) for group in groups]
+
+
+def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
+    """Rows at which the index is known before and after, with both.
+
+    They are singular points, and rows beside them at the same load to its error bar: a load asked for may be that of a
+    special point, where the index of the row itself is not decided.  At the branch point that a branch leaves they are
+    undecided rows, too, whose index is that of the next row.
+    """
+    columns = branch["columns"]
+    loads, undecided = columns["load"], columns.get("undecided")
+    for point in (point for point in branch.get("special", []) if point["kind"] in COUNTED):
+        row, before, after = int(point["row"]), point.get("negative_before"), point.get("negative_after")
+        yield row, before, after
+        bar = max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0)
+        for step, index in ((-1, before), (1, after)) if after is not None else ():
+            other = row + step
+            while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= bar:
+                yield other, index, index
+                other += step
+    if branch.get("parent") and undecided and "arclength" in columns:
+        s = columns["arclength"]
+        near = [row for row in range(1, len(s) - 1) if s[row] - s[0] < COINCIDE and undecided[row]]
+        yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
+
+
+def _off_kinks(negative: list[int], kink: list[str]) -> list[int]:
+    """Index of each row; of one on a kink, where it is that of one side, that of the row beside it off the kink."""
+    negative, rows = list(negative), range(len(kink))
+    for a, b in (*pairwise(rows), *pairwise(reversed(rows))):
+        negative[a] = negative[b] if kink[a] and not kink[b] else negative[a]
+    return negative
+
+
+def _in_space(branch: Branch) -> list[int]:
+    """Index among all perturbations in each row, none where it is not known.
+
+    That of a singular row leaves out the eigenvalues that vanish there, so that the other rows decide.
+    """
+    column = branch["columns"].get("negative_in_space") or [None]
+    singular = {int(point["row"]) for point in branch.get("special", []) if point["kind"] in COUNTED}
+    return [] if None in column else [0 if row in singular else index for row, index in enumerate(column)]
+
+
+def endings(branch: Branch) -> list[tuple[int, str]]:
+    """First and last row of a branch of ``diagram.json``, each with the reason, where it is not the range that ends."""
+    notes = [str(special.get("note") or "") for special in branch.get("special", []) if special["row"] == 0]
+    begun = next((note.removeprefix(BEGINS) for note in notes if note.startswith(BEGINS)), "")
+    ends = (0, begun), (len(branch["columns"]["load"]) - 1, str(branch.get("ended") or ""))
+    reasons = [(row, sentence.split(" at ")[0].split(":")[0].split(" any more")[0]) for row, sentence in ends]
+    return [(row, reason) for row, reason in reasons if reason not in COMPLETE and not reason.startswith(MEETS)]
+
+
+def is_solved(branch: Branch, special: Mapping[str, Any]) -> bool:
+    """Whether the load of the end ``special`` of a branch is solved for: it is not the range that ends there."""
+    return (special["row"], SQUEEZED) in endings(branch)
+
+
+def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
+    """Branch, row and words of the state to draw: a stable one well inside a branch that leaves the first one.
+
+    Where none is stable there, one of another branch but the first; else one of least index on a branch that leaves the
+    first, said to be unstable; on the first branch only where there is no other.  Raises :class:`InputError` for a
+    diagram without states.
+    """
+    branches = [branch for branch in data["branches"] if branch["columns"]["load"]]
+    if not branches:
+        raise InputError("The diagram has no states to draw.")
+    first = data["branches"][0]["name"]
+
+    def rank(place: tuple[Branch, Piece]) -> tuple[bool, bool, int, int, float]:
+        branch, piece = place
+        s, aside = branch["columns"]["arclength"], branch["name"] != first
+        leaves = branch["parent"] is not None and branch["parent"][0] == first
+        length = s[piece.last] - s[piece.first]
+        return piece.kind == STABLE and aside, leaves, -piece.negative, -(piece.in_space or 0), length
+
+    alone = Piece(0, 0, branches[0]["columns"]["negative"][0], None)
+    found = [(branch, piece) for branch in branches for piece in pieces_of(branch)] or [(branches[0], alone)]
+    branch, piece = max(found, key=rank)
+    columns = branch["columns"]
+    s = columns["arclength"]
+    wanted = s[piece.first] + INSIDE * (s[piece.last] - s[piece.first])
+    row = min(range(piece.first, piece.last + 1), key=lambda row: abs(s[row] - wanted))
+    index = index_range(piece.negative, piece.undecided, piece.kink)
+    words = piece.kind + {STABLE: "", PLANAR: f", index {piece.in_space}"}.get(piece.kind, f", index {index}")
+    return branch["name"], row, f"{columns['load'][row]:.4g}, {words}"
