@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rodfem.continuation.branch import Branch, SpecialPoint, not_followed
+from rodfem.continuation.branch import Branch, not_followed
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Fields
@@ -26,6 +25,7 @@ from rodfem.modes.perturbation import Motion, Motions
 from rodfem.modes.recorded import Typical
 from rodfem.modes.recorded import write as write_typical
 from rodfem.output.contents import read_diagram
+from rodfem.output.table import COLUMNS, branch_data
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.supports import write as write_supports
@@ -38,43 +38,10 @@ if TYPE_CHECKING:
     import h5py
     from petsc4py import PETSc
 
-COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
-
-MEANING = {
-    "load": "value of the parameter",
-    "ordinate": "the scene's ordinate",
-    "energy": "stored energy int W ds of the rod, without the potential of the loads, springs and foundations",
-    "potential": "total potential energy V of rod, loads, springs and foundations",
-    "conjugate": "-dV/dload, what the load does work on: along a branch dV = -conjugate dload",
-    "negative": "number of negative eigenvalues of the constrained second variation (the index): 0 is stable",
-    "zero": "number of eigenvalues that vanish, those of symmetries included",
-    "stretch": "least stretch v3 along the rod",
-    "slope": "the load's component of the unit tangent",
-    "drift": "largest drift scalar: the error with which the mesh has the symmetries",
-    "arclength": "length along the branch, in the metric of rotations and load",
-    "error": "size of the last Newton correction",
-    "mesh": "number of the discretisation in meshes",
-    "undecided": "number of eigenvalues whose sign is not decided: the index is negative, or greater by up to so many",
-    "kink": "what has a kink at the very state (equations): the index is that of one side, stability is undecided",
-    "soft": "eigenvalues near zero by name: what moves",
-    "soft_value": "their values, in the metric",
-    "soft_uncertainty": "bounds of the errors of these by round-off, and by the mesh where there are error bars",
-}
-"""Columns in words, as they stand in the file."""
-OPTIONAL = ("potential", "conjugate", "estimate", "spectrum", "negative_in_space", "omega2", "motion", "curve")
-"""Columns that a branch has where one of its rows has an entry."""
-UNDECIDED = "undecided"
-"""Column that a branch has where one of its rows has undecided eigenvalues."""
-KINK = "kink"
-"""Column that a branch has where one of its rows is on a kink."""
-SOFT = {"soft": "name", "soft_value": "value", "soft_uncertainty": "uncertainty"}
-"""Columns that a branch has where one of its rows has soft modes, and what they hold of each of them."""
-ALIKE = ("row", "negative_before", "negative_after", "located_to", "error_estimate", "coupling", "omega2", "unfolding")
-SPECIAL = {"ordinate_error_estimate": "ordinate_error", "followed": "switched", "note": "note"}
-SPECIAL |= {name: name for name in ALIKE}
-"""Entries of a special point, and the attributes that they hold, most of which have the same name."""
 NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")
 """Numbers whose natural sizes stand in the file."""
+PARTS = ("assembly", "solve", "stability", "location", "error bars", "modes", "setup")
+"""Parts of a run whose times stand in the file."""
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
 """Meaning of ``negative`` where loads have no potential."""
 
@@ -114,18 +81,12 @@ def as_data(
         "discretization": mesh_of(system),
         "accuracy": accuracy,
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
-        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
+        "meaning": {x.name: x.words for x in COLUMNS} | ({} if scene.conservative else {"negative": UNSTABLE}),
         "branch_points_not_followed": not_followed(branches),
         "meshes": [_mesh_data(s.fields) for s in systems],
-        "branches": [_branch_data(b) for b in branches],
+        "branches": [branch_data(b) for b in branches],
         "timing": {
-            "assembly_s": s.get("assembly", 0.0),
-            "solve_s": s.get("solve", 0.0),
-            "stability_s": s.get("stability", 0.0),
-            "location_s": s.get("location", 0.0),
-            "error_bars_s": s.get("error bars", 0.0),
-            "modes_s": s.get("modes", 0.0),
-            "setup_s": s.get("setup", 0.0),
+            **{f"{name.replace(' ', '_')}_s": s.get(name, 0.0) for name in PARTS},
             "total_s": clock.total(),
             "points": points,
             "ms_per_point": clock.each(points),
@@ -142,56 +103,6 @@ def _mesh_data(fields: Fields) -> dict[str, Any]:
         "unknowns": fields.unknowns,
         "vertices": None if d.vertices is None else list(d.vertices),
     }
-
-
-def _branch_data(branch: Branch) -> dict[str, Any]:
-    rows = {id(p): i for i, p in enumerate(branch.points)}
-    columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
-    for name in OPTIONAL:
-        column = [_plain(getattr(p, name)) for p in branch.points]
-        if any(value not in (None, []) for value in column):
-            columns[name] = column
-    if any(p.undecided for p in branch.points):
-        columns[UNDECIDED] = [p.undecided for p in branch.points]
-    if any(p.kink for p in branch.points):
-        columns[KINK] = [p.kink for p in branch.points]
-    if any(p.soft for p in branch.points):
-        for name, attribute in SOFT.items():
-            columns[name] = [[_plain(getattr(mode, attribute)) for mode in p.soft] for p in branch.points]
-    if "omega2" in columns:
-        columns["unstable"] = columns["negative"]
-    return {
-        "name": branch.name,
-        "parent": list(branch.parent) if branch.parent else None,
-        "ended": branch.ended,
-        "columns": columns,
-        "special": [_special_data(s) for s in branch.special],
-        "singular_start": branch.singular_start,
-        "image": branch.image,
-        "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
-    }
-
-
-def _special_data(s: SpecialPoint) -> dict[str, Any]:
-    return {
-        "kind": s.kind,
-        "load": s.point.load,
-        "ordinate": s.point.ordinate,
-        "energy": s.point.energy,
-        "zero": s.point.zero,
-        "multiplicity": s.multiplicity,
-        "resolved": s.resolved,
-        "meets": list(s.connects_to) if s.connects_to else None,
-        "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
-        **{entry: _plain(getattr(s, attribute)) for entry, attribute in SPECIAL.items()},
-    }
-
-
-def _plain(value: Any) -> Any:
-    """What JSON can hold: numbers that are not finite become null."""
-    if value is None or isinstance(value, (int, str, list)):
-        return value
-    return float(value) if np.isfinite(value) else None
 
 
 def as_json(data: dict[str, Any]) -> bytes:

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
+from rodfem.output.table import COLUMNS, SPECIAL
 
 ENTRIES = {
     # special points
@@ -120,14 +121,6 @@ ENTRIES = {
     "transcritical": "The new branch passes through the critical load, with a slope.",
     "vertical branch": "The new branch consists of states at one and the same load.",
     "multiplicity | directions at once": "Number of eigenvalues that vanish at a special point and not beside it.",
-    "coupling": (
-        "Cosine between the null vector and the derivative of the equations in the load: zero at a branch point, "
-        "not at a fold."
-    ),
-    "unfolding": (
-        "Imperfection of the equations at a branch point, relative to the metric: round-off, or what takes the "
-        "point apart."
-    ),
     "null vector": "Perturbation whose eigenvalue vanishes at a special point.",
     # numbers and their errors
     "load | parameter": "The number that varies along a diagram, as the scene declares it.",
@@ -151,16 +144,8 @@ ENTRIES = {
         "a state is open."
     ),
     "no estimate": "The second computation that bounds the error failed, or was not asked for.",
-    "located to | located_to": (
-        "Uncertainty of the load of a special point on this mesh, without the error of the mesh."
-    ),
     "accuracy": "Error that every load and ordinate keeps below, by meshes chosen on the way.",
-    "error": "Of a row: size of the last Newton correction, in the metric.",
     "metric": "Measure of a change of state: root mean square of the rotation in radian, with centreline and load.",
-    "arclength": "Length along a branch in the metric.",
-    "slope": "The load's component of the unit tangent of a branch; it changes its sign at a fold.",
-    "stretch": "Least stretch v3 along the rod; the rod ends to exist where it is zero.",
-    "mesh": "Number of the discretisation of a row, in `meshes`.",
     "row | point": "One equilibrium of a branch.",
     "reduced | pointwise | formulation": (
         "Reduced: the contact force and the centreline follow from the rotation by integration. Pointwise: they "
@@ -187,9 +172,6 @@ ENTRIES = {
     "depth | branch_points_not_followed": (
         "Number of switches from the first branch; the plan says how many are followed."
     ),
-    "meets": "This special point is one of another branch, too.",
-    "followed": "Whether branches were sought from a branch point.",
-    "note": "What else there is to say of a special point.",
     "ended": "Why a branch has no more rows.",
     "end of range": "The branch reaches a bound of the load's range.",
     "closed loop": "The branch has come back to its beginning.",
@@ -203,7 +185,6 @@ ENTRIES = {
         "The rotation that a mode mostly consists of: about a director of the cross-section, about the axis, several, "
         "or none, as in vibrations along the rod. A rod that nothing holds has rigid motions of frequency zero."
     ),
-    "curve": "Number of the curve of frequencies that an eigenvalue is on.",
     "complex pair, real part | complex pair, imaginary part": (
         "Two frequencies a +- ib: the rod oscillates with a, and the oscillation grows as exp(b t)."
     ),
@@ -228,6 +209,11 @@ ENTRIES = {
     "cusp": "Where two folds meet and vanish: beyond it there is no hysteresis.",
     "fold meets branch point": "Where a locus of folds ends on one of branch points.",
 }
+KNOWN = {name for key in ENTRIES for name in key.split(" | ")}
+ENTRIES |= {
+    x.name: f"{x.words[0].upper()}{x.words[1:]}." for x in (*COLUMNS, *SPECIAL) if x.name not in {*KNOWN, "kind"}
+}
+"""What is not explained above has the words of the table."""
 NAMES = {name: key for key in ENTRIES for name in key.split(" | ")}
 """Entry of each name."""
 NEAR = 3
@@ -262,4 +248,5 @@ def is_entry(word: str) -> bool:
 def _found(word: str) -> list[str]:
     """Names of the entries of a word: those of a code, or its own."""
     found = [name for name, kind in KINDS.items() if kind.code == word.upper()]
-    return found or [name for name in NAMES if name.lower() == " ".join(word.lower().split())]
+    wanted = " ".join(word.lower().split())
+    return found or [name for name in NAMES if name.lower() in (wanted, wanted.replace(" ", "_"))]

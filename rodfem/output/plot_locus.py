@@ -62,6 +62,7 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     _check(loci)
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(loci[0]["title"], _about(loci))
+        axes.margins(0.04, 0.12)
         _draw_curves(axes, loci)
         for one in loci:
             if region := stable_region(one, loci):

@@ -66,7 +66,7 @@ def sheet(title: str, about: str) -> tuple[Figure, Axes]:
 def explain(axes: Axes, handles: Sequence[Artist]) -> None:
     """Write the legend below the axes, each entry once: inside there may be no room."""
     entries = {str(handle.get_label()): handle for handle in handles}
-    columns = max(1, min(4, 140 // (12 + max(map(len, entries), default=0))))
+    columns = max(1, min(4, 150 // (12 + max(map(len, entries), default=0))))
     place = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": offset_copy(axes.transAxes, axes.figure, 0, -36, "points")}
     axes.legend(handles=list(entries.values()), loc="upper center", ncols=columns, fontsize=FONT - 2.5, **place)
     axes.figure.draw_without_rendering()  # pixels are final
