@@ -101,7 +101,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     terminal.save(diagram)
     data = diagram.data
     on_first(comm, lambda: save_json(data, output / "diagram.json"))
-    terminal.table(branches, diagram.solvers[0].system, plan.most_branches)
+    terminal.table(data, branches, plan.most_branches)
     terminal.summary(data)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)

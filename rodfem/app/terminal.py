@@ -16,8 +16,8 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem import code_cache
-from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH, Branch, NormalForm, Point, SpecialPoint, not_followed
-from rodfem.continuation.kinds import END, FLUTTER
+from rodfem.continuation.branch import ORDINATE, Branch, Point, SpecialPoint, not_followed
+from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
@@ -25,8 +25,10 @@ from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
 from rodfem.launcher import RANK
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import NO_ESTIMATE, in_decimals, in_words, index_in_words, number, rounded_up, with_unit
+from rodfem.output.digits import in_decimals, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
+from rodfem.output.table import row_data, special_data
+from rodfem.output.words import COUNT, INDEX, index_in_words, law_in_words, many, table_of
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -36,22 +38,9 @@ from rodfem.timing import WORK, Clock
 if TYPE_CHECKING:
     from rodfem.app.screen import Screen
 
-INDEX, UNSTABLE = "index", "unstable"
-"""Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
 WIDTH, PAUSE = 110, 30.0
 """Columns of a paragraph; seconds between two lines of progress that stay."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
-
-
-def _law(law: NormalForm, resolved: bool | None) -> str:
-    """Local law of a branch point, whose state the mesh has ``resolved`` or not, in words."""
-    if law.kind == VERTICAL_BRANCH:
-        return f"{law.kind}: a family of equilibria at one and the same load"
-    sign, x = "-" if law.coefficient < 0 else "+", "x" if law.of == ORDINATE else "a"
-    x += f"^{law.power}" if law.power > 1 else ""
-    if isfinite(law.uncertainty) and law.uncertainty >= abs(law.coefficient):
-        return f"{law.kind}, load = load_b + c {x} + ..., where c is not told from zero"
-    return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty, resolved)} {x} + ..."
 
 
 def _mesh(system: System) -> str:
@@ -171,7 +160,7 @@ class Report(Observer):
             self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         self.units, self.load = scene.units, scene.load
-        self.count = INDEX if scene.conservative else UNSTABLE
+        self.count = INDEX if scene.conservative else COUNT
         self.wide = len("0->1 (in space 2)") if scene.planar and scene.conservative else max(6, len(self.count))
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
@@ -242,16 +231,17 @@ class Report(Observer):
     def _line(self, special: SpecialPoint) -> str:
         p, units = special.point, self.units
         connects_to = f"  meets {special.connects_to[0]}" if special.connects_to else ""
+        index = index_in_words(special_data(special), row_data(p))
         return (
             f"{special.kind.code}   {in_decimals(p.load, 10, units.load):<14} "
             f"{in_decimals(p.ordinate, 9, units.ordinate):<14} {in_decimals(p.energy, 6, units.energy):<10} "
-            f"{index_in_words(special):>{self.wide}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
+            f"{index:>{self.wide}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
         )
 
     def law(self, special: SpecialPoint) -> None:
         """Print the local law of a branch point, if it has one."""
         if special.law is not None:
-            law = _law(special.law, special.resolved)
+            law = law_in_words(special_data(special))
             even = special.law.power == 1 and "pitchfork" in special.law.kind
             what = "x is the change of the ordinate" + ", of second order in the amplitude" * even
             if special.law.of != ORDINATE:
@@ -264,46 +254,38 @@ class Report(Observer):
             self.say("  " + self._line(branch.special[-1]))
         self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
 
-    def table(self, branches: Sequence[Branch], system: System, most: int = 0) -> None:
-        """Print the final table: every special point with its error bar; ``most`` is the plan's number of branches."""
-        scene = system.scene
-        load, ordinate = (with_unit(scene.load, scene.parameters[scene.load].unit),
-                          with_unit(scene.ordinate.name, scene.ordinate.unit))  # fmt: skip
-        known = any(isfinite(s.error_estimate) for b in branches for s in b.special)
+    def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
+        """Print the final table: every special point of a diagram, with its error bar.
+
+        ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
+        """
+        load, ordinate = (with_unit(data[name], data.get(f"{name}_unit") or "") for name in ("parameter", "ordinate"))
+        special, rows = [s for branch in branches for s in branch.special], list(table_of(data))
+        known = any(isfinite(s.error_estimate) for s in special)
         bars = "in parentheses a bound of the error" if known else "no estimate of the errors"
         self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
-        wide = max([len("branch point"), *(len(s.kind.words) for b in branches for s in b.special)])
+        wide = max([len("branch point"), *(len(row[1]) for row in rows)])
         self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
-        scale = max([self.units.ordinate, *(abs(p.ordinate) for b in branches for p in b.points)])
         for branch in branches:
-            for s in branch.special:
-                load, ordinate, index = in_words(s, scale)
-                load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
-                zero = f", {s.point.zero} zero" if s.point.zero else ""
-                self.say(f"  {branch.name:<12} {s.kind.words:<{wide}} {load:<24} {ordinate:<24} {index}{zero}")
-                for mode in s.point.soft:
-                    self.say(f"    {mode}")
-                if s.kind == FLUTTER:
-                    self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
-                if s.note:
-                    self.say(f"    {s.note}")
-            for sentence in filter(None, (branch.start_in_words(scene.load), *map(str, branch.unexplained))):
+            for name, kind, load, ordinate, index, remarks in (row for row in rows if row[0] == branch.name):
+                self.say(f"  {name:<12} {kind:<{wide}} {load:<24} {ordinate:<24} {index}")
+                for remark in remarks:
+                    self.say(f"    {remark}")
+            for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
                 self.warn(f"{branch.name}: {sentence}")
-
-        if coarse := sum(s.resolved is False for b in branches for s in b.special):
+        if coarse := sum(s.resolved is False for s in special):
             self.warn(
-                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: the value in parentheses is "
-                "no bound there, and whether the rod has such a point is open; use more elements or a higher degree."
+                f"The mesh does not resolve {many(coarse, 'special point')}: the value in parentheses is no bound "
+                "there, and whether the rod has such a point is open; use more elements or a higher degree."
             )
-        missed = not_followed(branches)
-        if missed:
+        if missed := not_followed(branches):
             deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
             more = Argument("Plan", "depth", deepest + 1)
             limit = f"as the depth is {deepest} (switches from the first branch)"
             if most and len(branches) >= most:
                 more, limit = Argument("Plan", "most_branches", 2 * most), f"as there are {len(branches)} branches"
-            many = "s were" if missed > 1 else " was"
-            self.say(f"  {missed} branch point{many} not followed, {limit}: {more} follows what leaves there")
+            points = many(missed, "branch point was", "branch points were")
+            self.say(f"  {points} not followed, {limit}: {more} follows what leaves there")
 
     def summary(self, data: Mapping[str, Any]) -> None:
         """Print a diagram, the contents of ``diagram.json``, in sentences."""
@@ -353,7 +335,7 @@ class Report(Observer):
         """
         index, many = index_range(found.negative, found.undecided), "s"[: found.negative + found.undecided != 1]
         unstable = f"unstable in {index} direction{many}"
-        if self.count == UNSTABLE:
+        if self.count == COUNT:
             unstable = f"unstable, {index} eigenvalue{many} negative or complex"
         if found.stable is None:
             unstable = f"undecided, {self.count} {index_range(found.negative, found.undecided, found.kink)}"

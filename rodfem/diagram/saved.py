@@ -24,7 +24,7 @@ from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import check_run
 from rodfem.output.files import load_json, load_state
-from rodfem.output.table import ALWAYS, COLUMNS, point_values, special_values
+from rodfem.output.table import ALWAYS, COLUMNS, SPECIAL, point_values, special_values
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
@@ -32,17 +32,7 @@ from rodfem.tolerances import NEGLIGIBLE, unit
 NEEDED = ("scene", "parameter", "branches", "range", "accuracy", "constants", "discretization", "meshes")
 """Entries of a diagram, beside those that all of its readers need."""
 OF_BRANCH = ("name", "parent", "ended", "columns", "special")
-OF_SPECIAL = (
-    "kind",
-    "multiplicity",
-    "meets",
-    "law",
-    "row",
-    "negative_before",
-    "negative_after",
-    "located_to",
-    "followed",
-)
+OF_SPECIAL = tuple(entry.name for entry in SPECIAL if entry.name not in ("energy", "resolved", "omega2_error_estimate"))
 
 
 @checked(folder=path("results/column"), scene=SCENE, comm=RANKS)

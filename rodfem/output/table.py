@@ -187,6 +187,10 @@ SPECIAL = (
     Entry("followed", "boolean", "", "whether branches were sought from it", of=lambda special: special.switched),
     Entry("omega2", "number or null", "1/time²", "double eigenvalue of flutter, zero of divergence"),
     Entry(
+        *("omega2_error_estimate", "number or null", "1/time²", "bound of the error of that of flutter"),
+        of=lambda special: special.omega2_error,
+    ),
+    Entry(
         *("law", "object or null", "", "`load = load_b + coefficient x^power + ...` of a branch that leaves it"),
         of=lambda special: None if special.law is None else {k: plain(v) for k, v in asdict(special.law).items()},
     ),
@@ -223,6 +227,11 @@ def branch_data(branch: Branch) -> dict[str, Any]:
     }
 
 
+def row_data(point: Point) -> dict[str, Any]:
+    """Columns of one point."""
+    return {entry.name: entry.value(point) for entry in COLUMNS}
+
+
 def special_data(special: SpecialPoint) -> dict[str, Any]:
     """A special point as ``diagram.json`` has it."""
     return {entry.name: entry.value(special) for entry in SPECIAL}
@@ -238,7 +247,11 @@ def point_values(columns: Mapping[str, Sequence[Any]], row: int) -> dict[str, An
 
 def special_values(entry: Data) -> dict[str, Any]:
     """Attributes of a special point of a file, as :class:`~rodfem.continuation.branch.SpecialPoint` takes them."""
-    names = {"ordinate_error_estimate": "ordinate_error", "followed": "switched"}
+    names = {
+        "ordinate_error_estimate": "ordinate_error",
+        "omega2_error_estimate": "omega2_error",
+        "followed": "switched",
+    }
     read = [e.name for e in SPECIAL if e.of is None and e.name != "multiplicity"] + [*names]
     values = {names.get(name, name): nan if entry.get(name) is None else entry[name] for name in read}
     law = {name: nan if value is None else value for name, value in (entry["law"] or {}).items()}

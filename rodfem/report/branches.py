@@ -16,10 +16,9 @@ from rodfem.output.frequency_curves import curves, ranges_of, top
 from rodfem.output.pieces import endings, pieces_of
 from rodfem.output.plot_frequencies import SPECIAL
 from rodfem.output.smooth import between
+from rodfem.output.words import readings_of, words_of
 from rodfem.report.packing import plain
-from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
-from rodfem.report.words import words_of
 from rodfem.tolerances import NEGLIGIBLE
 from rodfem.writhe import writhe
 

@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.modes.modes import RIGID, SYMMETRY, load_modes
 from rodfem.modes.recorded import Few
+from rodfem.output.digits import eigenvalue_in_words
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.plot_modes import GROWTH, LARGEST
 from rodfem.output.view import POINT
 from rodfem.problem.setting import Setting
 from rodfem.report.packing import packed
-from rodfem.report.readings import eigenvalue_in_words
 from rodfem.report.shapes import Shapes
 from rodfem.tolerances import SAME_EIGENVALUE
 

@@ -337,7 +337,7 @@ def test_what_is_not_explained_is_kept() -> None:
     assert (entry["before"], entry["after"]) == (0, 1)
     assert columns["load"][entry["row"]] == broken.a.load
     terminal = io.StringIO()
-    Report(stream=terminal).table([branch], found.solver.system)
+    Report(stream=terminal).table({"branches": [branch_data(branch)], "parameter": "P", "ordinate": "x"}, [branch])
     assert f"! {branch.name}: {broken}" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
 
 

@@ -17,7 +17,7 @@ from rodfem.app.terminal import Report
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.pieces import pieces_of, typical_state
-from rodfem.report.words import words_of
+from rodfem.output.words import words_of
 
 
 def bent(energy: Any, at: tuple[float, ...]) -> Diagram:

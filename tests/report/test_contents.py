@@ -15,16 +15,15 @@ from scipy.integrate import quad
 from rodfem.app.commands.list import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
-from rodfem.output.digits import number
+from rodfem.output.digits import eigenvalue_in_words, number
 from rodfem.output.frequency_curves import curves
 from rodfem.output.pieces import endings
 from rodfem.output.solids import between, body_of
+from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.packing import packed, plain, script_json
-from rodfem.report.readings import eigenvalue_in_words, readings_of
 from rodfem.report.shapes import shapes_of, stations
-from rodfem.report.words import words_of
 from rodfem.writhe import writhe
 
 pytestmark = pytest.mark.alone

@@ -202,7 +202,7 @@ def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
     verdict = diagram.assess(asked)
     assert (verdict.negative, verdict.undecided, verdict.stable) == (1, 1, False)
     stream = io.StringIO()
-    Report(MPI.COMM_SELF, stream).table(diagram.branches, diagram.solvers[0].system)
+    Report(MPI.COMM_SELF, stream).table(diagram.data, diagram.branches)
     assert " 1 or 2" in stream.getvalue() and "sliding along the rod, mu = " in stream.getvalue()
     pieces = [p for p in pieces_of(diagram.data["branches"][1]) if p.undecided]
     assert {(p.label, p.kind) for p in pieces} == {("1 or 2", UNSTABLE)}

@@ -1,0 +1,227 @@
+"""Special points and rows of a diagram in words: each is made here, for the terminal, the page, notebooks and commands.
+
+They are those of the contents of ``diagram.json``; a run that is not saved yet has the same from
+:mod:`rodfem.output.table`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite, nan
+from typing import Any
+
+from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH
+from rodfem.continuation.kinds import FLUTTER, KINDS
+from rodfem.output.digits import NO_ESTIMATE, number
+from rodfem.output.pieces import is_solved
+from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, index_range, on_kink
+from rodfem.tolerances import unit
+
+Data = Mapping[str, Any]
+STABLE, PLANAR, UNSTABLE, CRITICAL, UNDECIDED = "stable", "planar", "unstable", "critical", "undecided"
+INDEX, COUNT = "index", "unstable"
+"""Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
+READ = ("load", "ordinate")
+"""Numbers of a row whose errors files have; those of energies and of left-most eigenvalues are not estimated."""
+GIVEN = "(given)"
+"""What stands in place of a bound at a load that was asked for."""
+
+
+@dataclass(frozen=True)
+class Words:
+    """``verdict`` is one of the five above; ``index`` short, as ``0`` or ``0→1``; ``sentence`` says both in full."""
+
+    verdict: str
+    index: str
+    sentence: str
+
+
+def many(count: int, noun: str, plural: str = "") -> str:
+    """A number of things: ``1 point``, ``2 points``."""
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
+def is_sweep(data: Data) -> bool:
+    """Whether stability is that of frequencies, under loads without a potential."""
+    return any("omega2" in branch["columns"] for branch in data["branches"])
+
+
+def row_of(branch: Data, row: int) -> dict[str, Any]:
+    """Columns of one row."""
+    return {name: column[row] for name, column in branch["columns"].items()}
+
+
+# --- special points ---------------------------------------------------------------------------------------------------
+
+
+def index_in_words(special: Data, row: Data) -> str:
+    """Index at a special point, whose columns are ``row``: before and after if it changes."""
+    before, after = special["negative_before"], special["negative_after"]
+    index = f"{before}->{after}" if before != after else index_range(row["negative"], row.get("undecided") or 0)
+    index += f" {ONE_SIDE}" if row.get("kink") else ""
+    space = row.get("negative_in_space")
+    return index if space is None else f"{index} (in space {space})"
+
+
+def scale_of(data: Data) -> float:
+    """Size of the ordinates of a diagram."""
+    values = [abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"] if x is not None]
+    return max([*values, (data.get("natural") or {}).get("ordinate", 0.0)])
+
+
+def special_in_words(branch: Data, special: Data, scale: float = 0.0) -> tuple[str, str, str]:
+    """Load, ordinate and index of a special point; a load that is given is exact.  ``scale`` is that of ordinates."""
+    bars = [special.get(name) for name in ("error_estimate", "ordinate_error_estimate")]
+    sizes = zip(READ, bars, (0.0, scale), strict=True)
+    load, ordinate = (
+        number(special[x], inf if bar is None else bar, special.get("resolved"), s) for x, bar, s in sizes
+    )
+    if KINDS[special["kind"]].given and not is_solved(branch, special):
+        load = f"{special['load']:.10g}"
+    return load, ordinate, index_in_words(special, row_of(branch, special["row"]))
+
+
+def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
+    """Branch, kind, load, ordinate and index of each special point, and remarks; without bars where none is known."""
+    scale, every = scale_of(data), [(branch, special) for branch in data["branches"] for special in branch["special"]]
+    known = any(special.get("error_estimate") is not None for _, special in every)
+    for branch, special in every:
+        load, ordinate, index = special_in_words(branch, special, scale)
+        load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
+        index += f", {special['zero']} zero" if special["zero"] else ""
+        remarks = [str(mode) for mode in soft_modes(row_of(branch, special["row"]))]
+        if special["kind"] == FLUTTER and special.get("omega2") is not None:
+            bar = special.get("omega2_error_estimate")
+            remarks.append(f"double eigenvalue omega^2 = {number(special['omega2'], inf if bar is None else bar)}")
+        remarks += [special["note"]] if special.get("note") else []
+        yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, remarks
+
+
+def soft_modes(row: Data) -> list[SoftMode]:
+    """Soft modes of the row of these columns."""
+    parts = [row.get(name) or [] for name in ("soft", "soft_value", "soft_uncertainty")]
+    return [SoftMode(*mode, inf if bar is None else bar) for *mode, bar in zip(*parts, strict=True)]
+
+
+def law_in_words(special: Data) -> str:
+    """Local law of a branch point; its coefficient has the digits of its bound if the mesh resolves the state."""
+    law = special["law"]
+    kind, c, bar = law["kind"], law["coefficient"], nan if law["uncertainty"] is None else law["uncertainty"]
+    if kind == VERTICAL_BRANCH:
+        return f"{kind}: a family of equilibria at one and the same load"
+    x = ("x" if law["of"] == ORDINATE else "a") + (f"^{law['power']}" if law["power"] > 1 else "")
+    if isfinite(bar) and bar >= abs(c):
+        return f"{kind}, load = load_b + c {x} + ..., where c is not told from zero"
+    return f"{kind}, load = load_b {'-' if c < 0 else '+'} {number(abs(c), bar, special.get('resolved'))} {x} + ..."
+
+
+def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, str]]:
+    """Load and ordinate of each row of a branch, those with an estimate, as ``0.3216501 (3e-07)``.
+
+    Special points have bounds of their own.  Those of other rows are relative, to ``natural`` sizes by the name of the
+    number; without these, as in older files, nothing is known of such rows.
+    """
+    columns = branch["columns"]
+    relative = columns.get("estimate") or [None] * len(columns["load"])
+    found: list[dict[str, str]] = []
+    for row, error in enumerate(relative):
+        sizes = natural if error is not None else {}
+        values = {name: columns[name][row] for name in READ if name in sizes}
+        found.append({name: number(x, error * unit(x, one=sizes[name])) for name, x in values.items() if x is not None})
+    for special in branch["special"]:
+        bars = zip(READ, (special.get("error_estimate"), special.get("ordinate_error_estimate")), strict=True)
+        here = {name: number(special[name], x, special.get("resolved")) for name, x in bars if x is not None}
+        given = KINDS[special["kind"]].given and not is_solved(branch, special)
+        found[special["row"]] = here | ({"load": f"{special['load']:.10g} {GIVEN}"} if given else {})
+    return found
+
+
+# --- rows -------------------------------------------------------------------------------------------------------------
+
+
+def words_of(branch: Data, *, planar: bool = False) -> list[Words]:
+    """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it.
+
+    Of a ``planar`` rod it is that in its plane, where nothing tells it in space.
+    """
+    specials: dict[int, list[Data]] = {}
+    for special in branch["special"]:
+        specials.setdefault(special["row"], []).append(special)
+    doubts: dict[int, list[str]] = {}
+    for row, sentence in _warnings(branch):
+        doubts.setdefault(row, []).append(f"Warning: {sentence}.")
+    out = []
+    for number_of_row in range(len(branch["columns"]["load"])):
+        row = row_of(branch, number_of_row)
+        plain = _at_special(row, specials.get(number_of_row, [])) or _stability(row)
+        sentence = plain.sentence
+        if planar and plain.verdict == STABLE and row.get("negative_in_space") is None:
+            sentence = sentence.replace("Stable", "Stable in its plane (not examined in space)", 1)
+        out.append(Words(plain.verdict, plain.index, " ".join([sentence, *doubts.get(number_of_row, [])])))
+    return out
+
+
+def _at_special(row: Data, specials: Sequence[Data]) -> Words | None:
+    """Words of a row with a special point at which something happens; None without one."""
+    kinds = [(KINDS[special["kind"]], special) for special in specials]
+    special = next((x for kind, x in kinds if not kind.given and kind.test != "number"), None)
+    if special is None or special["negative_before"] is None:
+        return None
+    before, after = special["negative_before"], special["negative_after"]
+    change = (f"{before}→{after}" if before != after else str(before)) + (f" {ONE_SIDE}" if row.get("kink") else "")
+    what = f": {many(special['multiplicity'], 'eigenvalue')} at zero" if special.get("multiplicity") else ""
+    return Words(CRITICAL, change, f"{special['kind'].capitalize()}{what}; index {change} along the branch.")
+
+
+def _stability(row: Data) -> Words:
+    negative, undecided, space = row["negative"], row.get("undecided") or 0, row.get("negative_in_space")
+    if row.get("kink"):
+        more = f", and {_too_near_zero(undecided)}" if undecided else ""
+        side = f"{many(negative, 'negative eigenvalue')} on one side{more}"
+        sentence = f"Stability undecided: {on_kink(row['kink'])}; {side}."
+        return Words(UNDECIDED, index_range(negative, undecided, row["kink"]), sentence)
+    if "omega2" in row:
+        return _of_frequencies(negative, row["omega2"])
+    zero = row["zero"]
+    neutral = f" {many(zero, 'eigenvalue')} {'is' if zero == 1 else 'are'} zero." if zero else ""
+    number_of = f"Unstable: {many(negative, 'negative eigenvalue')}"
+    if undecided:
+        sentence = (
+            f"{f'{number_of}, and' if negative else 'Stability undecided:'} {_too_near_zero(undecided)}.{neutral}"
+        )
+        return Words(UNSTABLE if negative else UNDECIDED, index_range(negative, undecided), sentence)
+    index = str(negative) if space is None else f"{negative} ({space})"
+    if negative:
+        return Words(UNSTABLE, index, f"{number_of}.{neutral}")
+    if space:
+        there = f"{many(space, 'negative eigenvalue')} there"
+        return Words(PLANAR, index, f"Stable in the plane, unstable in space: {there}.{neutral}")
+    return Words(STABLE, index, f"Stable: no negative eigenvalue of the second variation.{neutral}")
+
+
+def _too_near_zero(undecided: int) -> str:
+    sign = "its" if undecided == 1 else "their"
+    return f"{many(undecided, 'eigenvalue')} too near zero for {sign} sign to be known on this mesh"
+
+
+def _of_frequencies(negative: int, omega2: Sequence[Sequence[float]]) -> Words:
+    """Words for a state under loads without potential, by its squared frequencies, those found."""
+    found = f"of the {len(omega2)} values ω² found"
+    if not negative:
+        return Words(STABLE, "0", f"Stable: none {found} is negative or complex.")
+    growing = sum(1 for value in omega2 if value[1])
+    kinds = [f"{growing} complex (flutter)"] if growing else []
+    kinds += [f"{negative - growing} negative (divergence)"] if negative > growing else []
+    return Words(UNSTABLE, str(negative), f"Unstable: {found}, {' and '.join(kinds)}.")
+
+
+def _warnings(branch: Data) -> Iterator[tuple[int, str]]:
+    for change in branch.get("unexplained") or ():
+        for row in (change["row"], change["row"] + 1):
+            yield row, "the index changes beside this row without a special point"
+    if branch.get("singular_start"):
+        yield 0, "the first state is singular, and not located"
+    for special in branch["special"]:
+        if special.get("resolved") is False:
+            yield special["row"], "the mesh does not resolve this state"
