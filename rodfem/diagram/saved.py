@@ -24,7 +24,7 @@ from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import check_run
 from rodfem.output.files import load_json, load_state
-from rodfem.output.table import ALWAYS, COLUMNS, SPECIAL, point_values, special_values
+from rodfem.output.table import COLUMNS, SPECIAL, point_values, special_values
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
@@ -77,7 +77,7 @@ def _check_entries(data: dict[str, Any], path: Path) -> None:
     for branch in data["branches"]:
         where = f"{path}, branch {branch.get('name')!r},"
         DIAGRAM.check(branch, where, OF_BRANCH)
-        DIAGRAM.check(branch["columns"], where, [column.name for column in COLUMNS if column.empty is ALWAYS])
+        DIAGRAM.check(branch["columns"], where, [column.name for column in COLUMNS if column.always])
         for special in branch["special"]:
             DIAGRAM.check(special, where, OF_SPECIAL)
 

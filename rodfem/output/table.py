@@ -1,15 +1,16 @@
-"""The table of a diagram: each column of a branch, and each entry of a special point, declared once.
+"""The table of a diagram: each column of a branch, and each entry of a special point, declared once, in ``table.md``.
 
-An entry has its name, type and unit, what it means, when it is there, and where its value comes from.  Files are
-written and checked by it, ``docs/files.md`` has it, and so have the glossary, the page, and the tables of other
-programs.  A new column is one entry here, and the line that computes it in :class:`~rodfem.continuation.branch.Point`.
+A row there has the name, type and unit of an entry, what it means, and when it is there.  Files are written and checked
+by it, ``docs/files.md`` has it, and so have the glossary, the page, and the tables of other programs.  A new column is
+one row there, and the line that computes it in :class:`~rodfem.continuation.branch.Point`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from importlib.resources import files
 from math import inf, isfinite, nan
 from typing import Any
 
@@ -21,186 +22,72 @@ from rodfem.stability.soft_mode import SoftMode
 
 Data = Mapping[str, Any]
 Test = Callable[[Any], bool]
-ALWAYS = object()
-"""Value without which no branch has a column."""
+Source = Callable[[Any], Any]
+ROW = re.compile(r"^\| `(\w+)` \| ([^|]+?) \| ([^|]*?) ?\| (.+?) \| ([^|]*?) ?\|$", re.MULTILINE)
+PAGE = (files("rodfem.output") / "table.md").read_text(encoding="utf-8")
 
 
-@dataclass(frozen=True, eq=False)
+def _soft(attribute: str) -> Source:
+    return lambda point: [plain(getattr(mode, attribute)) for mode in point.soft]
+
+
+def _of_point(name: str) -> Source:
+    return lambda special: getattr(special.point, name)
+
+
+OF_POINT: dict[str, Source] = {
+    **{("soft" if name == "name" else f"soft_{name}"): _soft(name) for name in ("name", "value", "uncertainty")},
+    "unstable": lambda point: point.negative if point.omega2 else None,
+}
+OF_SPECIAL: dict[str, Source] = {
+    **{name: _of_point(name) for name in ("load", "ordinate", "energy", "zero")},
+    "kind": lambda special: str(special.kind),
+    "ordinate_error_estimate": lambda special: special.ordinate_error,
+    "omega2_error_estimate": lambda special: special.omega2_error,
+    "meets": lambda special: list(special.connects_to) if special.connects_to else None,
+    "followed": lambda special: special.switched,
+    "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
+}
+"""Where values come from that are no attributes of their name."""
+
+
+@dataclass(frozen=True)
 class Entry:
-    """One column of a branch, or one entry of a special point.
+    """One column of a branch, or one entry of a special point: ``name``, ``type``, ``unit``, ``words`` and ``where``.
 
-    Attributes
-    ----------
-    name, type, unit, words, where
-        As in ``docs/files.md``; ``words`` may be followed by a full stop and a second sentence.
-    of
-        Its value, of a point or a special point; None: the attribute of its name.
-    empty
-        Value of a row that has none: a column with no other values is left out.
+    ``of`` gives its value, None the attribute of its name.
     """
 
     name: str
     type: str
     unit: str
     words: str
-    where: str = ""
-    of: Callable[[Any], Any] | None = None
-    empty: Any = ALWAYS
+    where: str
+    of: Source | None
+
+    @property
+    def always(self) -> bool:
+        """Whether each branch has it."""
+        return not self.where
 
     def value(self, point: Point | SpecialPoint) -> Any:
         """What a file has of a point; numbers that are not finite become null."""
         return plain(getattr(point, self.name) if self.of is None else self.of(point))
 
+    def kept(self, column: Sequence[Any]) -> bool:
+        """Whether a branch has this column: it is always there, or a row has something in it."""
+        empty = {"(P, ": [], "null": None, "text": ""}
+        nothing = next((value for part, value in empty.items() if part in self.type), 0)
+        return self.always or any(value != nothing for value in column)
 
-def _soft(attribute: str) -> Callable[[Point], list[Any]]:
-    return lambda point: [plain(getattr(mode, attribute)) for mode in point.soft]
+
+def _entries(section: str, sources: Mapping[str, Source]) -> tuple[Entry, ...]:
+    text = PAGE.split(f"## {section}\n")[1].split("## ")[0]
+    return tuple(Entry(*cells, sources.get(cells[0])) for cells in ROW.findall(text))
 
 
-WITH_POTENTIAL, WITHOUT, SOME = "loads with a potential", "loads without potential", "a row has some"
-COLUMNS = (
-    Entry("load", "number (P)", "load", "value of the load"),
-    Entry("ordinate", "number (P) or null", "ordinate", "value of the ordinate"),
-    Entry(
-        *("energy", "number (P) or null", "energy"),
-        "stored energy `int W ds`, without the potential of the loads, springs and foundations",
-    ),
-    Entry("negative", "integer (P)", "1", "index, 0 is stable; under loads without potential as `unstable`"),
-    Entry("zero", "integer (P)", "1", "number of eigenvalues that vanish, those of symmetries included"),
-    Entry("stretch", "number (P) or null", "1", "least stretch `v3` along the rod"),
-    Entry(
-        *("slope", "number (P) or null", "1"),
-        "load's component of the unit tangent, which changes its sign at a fold; null in a sweep of frequencies",
-    ),
-    Entry(
-        *("drift", "number (P) or null", "metric"),
-        "largest drift scalar: the error with which the mesh has the symmetries",
-    ),
-    Entry("arclength", "number (P) or null", "metric", "length along the branch, in the metric of rotations and load"),
-    Entry("error", "number (P) or null", "metric", "size of the last Newton correction"),
-    Entry("mesh", "integer (P)", "1", "number of the discretisation in `meshes`, from 0 on"),
-    Entry(
-        *("potential", "number (P) or null", "energy"),
-        "total potential energy V of rod, loads, springs and foundations, up to a constant",
-        *(WITH_POTENTIAL, None, None),
-    ),
-    Entry(
-        *("conjugate", "number (P) or null", "energy over load"),
-        "`-dV/dload`, what the load does work on",
-        *(WITH_POTENTIAL, None, None),
-    ),
-    Entry(
-        *("estimate", "number (P) or null", "1"),
-        "estimated error of load and ordinate across the branch, relative to values greater than their `natural` sizes",
-        *("with `--accuracy`", None, None),
-    ),
-    Entry(
-        *("spectrum", "number (P, k)", "1/time²", "left-most eigenvalues mu = omega²"),
-        *("with `--spectrum`", None, []),
-    ),
-    Entry(
-        *("negative_in_space", "integer (P) or null", "1"),
-        "index among all perturbations, also those out of the plane",
-        *("planar rods", None, None),
-    ),
-    Entry(
-        *("omega2", "number (P, k, 2)", "1/time²", "eigenvalues omega² nearest zero, real and imaginary part"),
-        *(WITHOUT, None, []),
-    ),
-    Entry(
-        *("motion", "text (P, k)", ""),
-        "what the rod does in each: bending, torsion, a mixture, a motion without rotation, a rigid motion",
-        *(WITHOUT, None, []),
-    ),
-    Entry(
-        *("curve", "integer (P, k)", "1", "number of the curve of frequencies that each is on"),
-        *(WITHOUT, None, []),
-    ),
-    Entry(
-        *("undecided", "integer (P)", "1"),
-        "number of eigenvalues whose sign is not decided: the index is between `negative` and `negative` + `undecided`",
-        *(SOME, None, 0),
-    ),
-    Entry(
-        *("kink", "text (P)", ""),
-        "what has a kink at the very state (`equations`; older files name functions), or empty: `negative` is the "
-        "index on one side, stability is undecided",
-        *("a row is on one", None, ""),
-    ),
-    Entry(
-        *("soft", "text (P, k)", ""),
-        "eigenvalues near zero by their motions: sliding along the rod, a rotation, turning of the cross-sections, "
-        "bending, torsion",
-        *(SOME, _soft("name"), []),
-    ),
-    Entry("soft_value", "number (P, k)", "metric", "their values, in the metric", SOME, _soft("value"), []),
-    Entry(
-        *("soft_uncertainty", "number (P, k) or null", "metric"),
-        "bounds of the errors of these by round-off, and by the mesh where there are error bars; null: no bound",
-        *(SOME, _soft("uncertainty"), []),
-    ),
-    Entry(
-        *("unstable", "integer (P)", "1"),
-        "number of eigenvalues omega², of those found, that are negative or complex",
-        *(WITHOUT, lambda point: point.negative if point.omega2 else None, None),
-    ),
-)
-"""Columns of a branch, one entry a row; those without a value of rows that have none are always there."""
-SPECIAL = (
-    Entry(
-        *("kind", "text", ""),
-        "`branch point`, `fold`, `imperfect bifurcation`, `flutter`, `divergence`, `user` (a load of `--at`), `event` "
-        "(named in `note`), `end`",
-        of=lambda special: str(special.kind),
-    ),
-    Entry("load", "number", "load", "value of the load", of=lambda special: special.point.load),
-    Entry("ordinate", "number or null", "ordinate", "value of the ordinate", of=lambda special: special.point.ordinate),
-    Entry("energy", "number or null", "energy", "as the column", of=lambda special: special.point.energy),
-    Entry("row", "integer", "1", "its row in the columns and in `states.h5`"),
-    Entry("negative_before", "integer", "1", "index before it along the branch"),
-    Entry("negative_after", "integer", "1", "index after it"),
-    Entry("zero", "integer", "1", "number of eigenvalues that vanish", of=lambda special: special.point.zero),
-    Entry(
-        *("multiplicity", "integer", "1"),
-        "number of them that cross or touch zero here, which is that of null vectors in `states.h5`",
-    ),
-    Entry(
-        *("error_estimate", "number or null", "load, ordinate"),
-        "bound of the error: of the load; at `user` and `end` of the ordinate",
-    ),
-    Entry(
-        *("ordinate_error_estimate", "number or null", "ordinate", "bound of the ordinate's error"),
-        of=lambda special: special.ordinate_error,
-    ),
-    Entry("resolved", "boolean or null", "", "whether the mesh resolves the state; null: not examined"),
-    Entry(
-        "located_to", "number or null", "load", "uncertainty of the load on this mesh, the error of the mesh left out"
-    ),
-    Entry(
-        *("coupling", "number or null", "1"),
-        "cosine between the null vector and the derivative of the equations in the load: zero at a branch point, not "
-        "at a fold",
-    ),
-    Entry(
-        *("meets", "place or null", "", "branch on which it is too, and its number among the special points there"),
-        of=lambda special: list(special.connects_to) if special.connects_to else None,
-    ),
-    Entry("followed", "boolean", "", "whether branches were sought from it", of=lambda special: special.switched),
-    Entry("omega2", "number or null", "1/time²", "double eigenvalue of flutter, zero of divergence"),
-    Entry(
-        *("omega2_error_estimate", "number or null", "1/time²", "bound of the error of that of flutter"),
-        of=lambda special: special.omega2_error,
-    ),
-    Entry(
-        *("law", "object or null", "", "`load = load_b + coefficient x^power + ...` of a branch that leaves it"),
-        of=lambda special: None if special.law is None else {k: plain(v) for k, v in asdict(special.law).items()},
-    ),
-    Entry(
-        *("unfolding", "number or null", "1"),
-        "imperfection of the equations there, relative to the metric: round-off, or what takes the point apart",
-    ),
-    Entry("note", "text or null", "", "what else there is to say"),
-)
-"""Entries of a special point."""
+COLUMNS, SPECIAL = _entries("columns", OF_POINT), _entries("special", OF_SPECIAL)
+"""Columns of a branch, one entry a row; entries of a special point."""
 
 
 def plain(value: Any) -> Any:
@@ -213,13 +100,12 @@ def plain(value: Any) -> Any:
 def branch_data(branch: Branch) -> dict[str, Any]:
     """A branch as ``diagram.json`` has it."""
     rows = {id(p): i for i, p in enumerate(branch.points)}
-    columns = {entry.name: [entry.value(point) for point in branch.points] for entry in COLUMNS}
-    kept = [e.name for e in COLUMNS if e.empty is ALWAYS or any(value != e.empty for value in columns[e.name])]
+    columns = {entry: [entry.value(point) for point in branch.points] for entry in COLUMNS}
     return {
         "name": branch.name,
         "parent": list(branch.parent) if branch.parent else None,
         "ended": branch.ended,
-        "columns": {name: columns[name] for name in kept},
+        "columns": {entry.name: column for entry, column in columns.items() if entry.kept(column)},
         "special": [special_data(special) for special in branch.special],
         "singular_start": branch.singular_start,
         "image": branch.image,
@@ -240,7 +126,7 @@ def special_data(special: SpecialPoint) -> dict[str, Any]:
 def point_values(columns: Mapping[str, Sequence[Any]], row: int) -> dict[str, Any]:
     """Attributes of the point in a row of a file, as :class:`~rodfem.continuation.branch.Point` takes them."""
     found = {entry: columns[entry.name][row] for entry in COLUMNS if entry.of is None and entry.name in columns}
-    known = {e.name: nan if x is None else x for e, x in found.items() if x is not None or e.empty is ALWAYS}
+    known = {e.name: nan if x is None else x for e, x in found.items() if x is not None or e.always}
     parts = [columns[name][row] if name in columns else [] for name in ("soft", "soft_value", "soft_uncertainty")]
     return known | {"soft": [SoftMode(*mode, inf if bar is None else bar) for *mode, bar in zip(*parts, strict=True)]}
 
@@ -258,15 +144,6 @@ def special_values(entry: Data) -> dict[str, Any]:
     values["law"] = NormalForm(**{x: law[x] for x in NormalForm.__annotations__ if x in law}) if law else None
     values["connects_to"] = (entry["meets"][0], entry["meets"][1]) if entry["meets"] else None
     return values | {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
-
-
-def markdown(entries: Sequence[Entry]) -> Iterator[str]:
-    """Rows of the table of ``docs/files.md``."""
-    for e in entries:
-        kind = e.type.replace("place", "text, integer (2)")
-        yield f"| `{e.name}` | {kind} | {e.unit} | {e.words} | {e.where} |".replace("|  |", "| |").replace(
-            "|  |", "| |"
-        )
 
 
 def _is_count(x: Any) -> bool:
@@ -297,6 +174,7 @@ TYPES: dict[str, tuple[Test, str]] = {
 
 def test_of(kind: str) -> tuple[Test, str]:
     """Test of a type of :class:`Entry`, of one row where it has a dimension ``P``, and the type in words."""
+    kind = kind.replace("text, integer (2)", "place")
     base, size, null = re.fullmatch(r"(\w+)(?: \(([^)]*)\))?( or null)?", kind).groups()  # type: ignore[union-attr]
     test, words = TYPES[base]
     sizes = [x for x in (size or "").split(", ") if x not in ("", "P")]
