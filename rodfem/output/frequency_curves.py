@@ -91,22 +91,21 @@ def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()
     """
     found: Members = {}
     each = (columns[name] for name in ("load", "omega2", "motion", "curve"))
-    for row, (load, pairs, motions, numbers) in enumerate(zip(*each, strict=True)):
-        for pair, motion, number in zip(pairs, motions, numbers, strict=True):
+    for row, (load, *modes) in enumerate(zip(*each, strict=True)):
+        for pair, motion, number in zip(*modes, strict=True):
             mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
             found.setdefault(number, []).append((load, row, mu, motion))
     met = [point for point in special if point["kind"] == FLUTTER and point.get("omega2") is not None]
-    more = [_beside(columns["load"], found, point, {p["row"] for p in met}) for point in met]
-    for number, extra in ((number, extra) for each in more for number, extra in each.items()):
-        kept = [member for member in found[number] if member[0] != extra[0][0]]
-        found[number] = kept + extra
-    out = []
-    for members in found.values():
-        members.sort(key=lambda member: member[0])
-        (motion, _), *_ = Counter(member[3] for member in members).most_common()
-        loads, rows, values, _ = zip(*members, strict=True)
-        out.append(FrequencyCurve(motion, np.array(loads), np.array(rows), np.array(values) ** 0.5))
-    return sorted(out, key=lambda curve: (curve.motion, abs(curve.roots[0])))
+    for point in met:
+        for number, extra in _beside(columns["load"], found, point, {p["row"] for p in met}).items():
+            found[number] = [member for member in found[number] if member[0] != extra[0][0]] + extra
+    return sorted(map(_curve, found.values()), key=lambda curve: (curve.motion, abs(curve.roots[0])))
+
+
+def _curve(members: list[tuple[float, int, complex, str]]) -> FrequencyCurve:
+    loads, rows, values, motions = zip(*sorted(members, key=lambda member: member[0]), strict=True)
+    motion = Counter(motions).most_common(1)[0][0]
+    return FrequencyCurve(motion, np.array(loads), np.array(rows), np.array(values) ** 0.5)
 
 
 def _beside(loads: Sequence[float], known: Members, point: Mapping[str, Any], others: set[int]) -> Members:
@@ -114,44 +113,44 @@ def _beside(loads: Sequence[float], known: Members, point: Mapping[str, Any], ot
     row, mean = int(point["row"]), float(point["omega2"])
     at = {number: {member[1]: member[2] for member in members} for number, members in known.items()}
     met = [number for number, values in at.items() if row in values and abs(values[row] - mean) <= LEAST * abs(mean)]
-    found: Members = {number: [(loads[row], row, complex(mean), known[number][-1][3])] for number in met}
-    for step in (-1, 1):
-        rows = [row + step, row + 2 * step]
-        if len(met) % 2 or others & set(rows) or not all(i in at[number] for number in met for i in rows):
-            continue
-        values = np.array([[at[number][i] for number in met] for i in rows])
-        centre = values.mean(axis=1)
-        square = ((values - centre[:, None]) ** 2).mean(axis=1).real
-        t = np.array([0.0, *(loads[i] - loads[row] for i in rows)])
-        mid, discriminant = (np.polyfit(t, (first, *rest), 2) for first, rest in ((mean, centre.real), (0.0, square)))
-        growing = square[0] < 0
-        for number, value in zip(met, values[0], strict=True):
-            sign = np.sign(value.imag) if growing else np.sign(value.real - centre[0].real)
-            just = [(float(np.nextafter(loads[row], loads[rows[0]])), row, mean * (1 + sign * JUST))] * bool(growing)
-            x = SHARES * t[1]
-            mu = np.polyval(mid, x) + sign * np.polyval(discriminant, x).astype(complex) ** 0.5
-            between = list(zip(loads[row] + x, np.where(SHARES > 0.5, rows[0], row), mu, strict=True))
-            found[number] += [(*place, found[number][0][3]) for place in just + between]
-    return found
+    found = {number: [(loads[row], row, complex(mean))] for number in met}
+    for rows in ((row - 1, row - 2), (row + 1, row + 2)):
+        if len(met) % 2 == 0 and not others & {*rows} and all(i in at[number] for number in met for i in rows):
+            values = np.array([[mean] * len(met), *([at[number][i] for number in met] for i in rows)])
+            for number, extra in zip(met, _side(loads, (row, *rows), values), strict=True):
+                found[number] += extra
+    return {number: [(*place, known[number][-1][3]) for place in places] for number, places in found.items()}
+
+
+def _side(loads: Sequence[float], rows: tuple[int, int, int], mu: Any) -> list[list[tuple[float, int, complex]]]:
+    """Points between the first two ``rows`` of each eigenvalue that has met others in the first: ``mu`` (3, n)."""
+    t = np.array([loads[i] - loads[rows[0]] for i in rows])
+    centre = mu.mean(axis=1)
+    mid, discriminant = (np.polyfit(t, x.real, 2) for x in (centre, ((mu - centre[:, None]) ** 2).mean(axis=1)))
+    x, away = SHARES * t[1], mu[1] - centre[1].real
+    signs = np.where(abs(away.imag) > abs(away.real), np.sign(away.imag), np.sign(away.real))
+    near = np.where(SHARES > 0.5, rows[1], rows[0])
+    root = np.polyval(discriminant, x).astype(complex) ** 0.5
+    out = [list(zip(loads[rows[0]] + x, near, np.polyval(mid, x) + sign * root, strict=True)) for sign in signs]
+    if abs(away.imag).max() > abs(away.real).max():
+        first = float(np.nextafter(loads[rows[0]], loads[rows[1]]))
+        out = [[(first, rows[0], mu[0, 0] * (1 + sign * JUST)), *line] for sign, line in zip(signs, out, strict=True)]
+    return out
 
 
 def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:
     """Ranges of the load in which a branch is unstable in one way."""
-    columns = branch["columns"]
-    for interval in intervals_of(branch):
-        if interval.kind == STABLE:
-            continue
-        rows = range(interval.first, interval.last + 1)
-        values = [[complex(*v) for v in columns["omega2"][row]] for row in rows]
+    loads, omega2 = (branch["columns"][name] for name in ("load", "omega2"))
+    for interval in (interval for interval in intervals_of(branch) if interval.kind != STABLE):
+        values = [[complex(*v) for v in row] for row in omega2[interval.first : interval.last + 1]]
         least = REAL * max(abs(v) for row in values for v in row)
-        kinds = [_kinds(row, least) for row in values]
         # a step is what either end is: at critical loads eigenvalues are still real, or zero
-        steps = [a | b for a, b in pairwise(kinds)]
-        for kind, group in groupby(zip(rows, steps, strict=False), lambda step: step[1]):
+        steps = [a | b for a, b in pairwise(_kinds(row, least) for row in values)]
+        for kind, group in groupby(enumerate(steps, interval.first), lambda step: step[1]):
             places = [row for row, _ in group]
-            loads = columns["load"][places[0] : places[-1] + 2]
+            ends = loads[places[0]], loads[places[-1] + 1]
             words = "range of " + (" and ".join(k for k in (FLUTTER, DIVERGENCE) if k in kind) or "instability")
-            yield Range(min(loads), max(loads), words, RANGES[2 if len(kind) > 1 else int(FLUTTER in kind)])
+            yield Range(min(ends), max(ends), words, RANGES[2 if len(kind) > 1 else int(FLUTTER in kind)])
 
 
 def _kinds(values: Sequence[complex], least: float) -> frozenset[str]:

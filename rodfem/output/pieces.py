@@ -6,7 +6,8 @@ before and after.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
@@ -66,27 +67,32 @@ def pieces_of(branch: Branch) -> list[Piece]:
     rows = len(columns["load"])
     if not rows == len(columns["ordinate"]) == len(columns["negative"]):
         raise ValueError(f"columns of branch {branch['name']!r} differ in length: try to compute the diagram anew")
-    known = {}
-    for row, before, after in _indices(branch):
-        known |= {(row, side): index for side, index in ((0, before), (1, after)) if index is not None}
+    before, after, space = dict[int, int](), dict[int, int](), _in_space(branch)
+    for row, left, right in _indices(branch):
+        before |= {} if left is None else {row: left}
+        after |= {} if right is None else {row: right}
     kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
-    negative, space = _off_kinks(columns["negative"], kink), _in_space(branch)
+    off = _off_kinks(columns["negative"], kink)
     steps = []
     for a, b in pairwise(range(rows)):
         on = kink[a] if kink[b] else ""
-        left, right = ((columns["negative"] if on else negative)[row] for row in (a, b))
-        left, right, open_left, open_right = (
-            *(known.get((a, 1), left), known.get((b, 0), right)),
-            *((row, side) not in known and undecided[row] for row, side in ((a, 1), (b, 0))),
-        )
-        if undecided[a] + undecided[b]:
-            least = min(left, right)
-            more = max(left + open_left, right + open_right) - least
+        own = columns["negative"] if on else off
+        start = after.get(a, own[a]), 0 if a in after else undecided[a]
+        end = before.get(b, own[b]), 0 if b in before else undecided[b]
+        least = min(start[0], end[0])
+        if undecided[a] or undecided[b]:
+            steps.append((least, max(sum(start), sum(end)) - least, on))
         else:
-            more, least = 0, left if (a, 1) in known else right if (b, 0) in known else max(left, right)
-        steps.append((least, max(space[a], space[b], least) if space else None, more, on))
-    groups = [[step for step, _ in group] for _, group in groupby(enumerate(steps), lambda step: step[1])]
-    return [Piece(group[0], group[-1] + 1, *steps[group[0]]) for group in groups]
+            steps.append((after.get(a, before.get(b, max(own[a], own[b]))), 0, on))
+    return _grouped(steps, space)
+
+
+def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> list[Piece]:
+    """Pieces of steps that are alike: their index, how many may be negative besides, and what is on a kink."""
+    most = [max(space[i], space[i + 1], step[0]) if space else None for i, step in enumerate(steps)]
+    each = [(least, inside, more, on) for (least, more, on), inside in zip(steps, most, strict=True)]
+    groups = [[step for step, _ in group] for _, group in groupby(enumerate(each), lambda step: step[1])]
+    return [Piece(group[0], group[-1] + 1, *each[group[0]]) for group in groups]
 
 
 def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
@@ -97,20 +103,23 @@ def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
     undecided rows, too, whose index is that of the next row.
     """
     columns = branch["columns"]
-    loads, undecided = columns["load"], columns.get("undecided")
     for point in (point for point in branch.get("special", []) if point["kind"] in COUNTED):
-        row, before, after = int(point["row"]), point.get("negative_before"), point.get("negative_after")
-        yield row, before, after
-        bar = max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0)
-        for step, index in ((-1, before), (1, after)) if after is not None else ():
-            other = row + step
-            while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= bar:
-                yield other, index, index
-                other += step
-    if branch.get("parent") and undecided and "arclength" in columns:
-        s = columns["arclength"]
+        yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
+        yield from _beside(columns["load"], point) if point.get("negative_after") is not None else ()
+    if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
+        s, undecided = columns["arclength"], columns["undecided"]
         near = [row for row in range(1, len(s) - 1) if s[row] - s[0] < COINCIDE and undecided[row]]
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
+
+
+def _beside(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
+    """Rows on either side of a special point at its load, to its error bar, with the index there."""
+    row, bar = int(point["row"]), max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0)
+    for step, side in ((-1, "before"), (1, "after")):
+        other = row + step
+        while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= bar:
+            yield other, point[f"negative_{side}"], point[f"negative_{side}"]
+            other += step
 
 
 def _off_kinks(negative: list[int], kink: list[str]) -> list[int]:
@@ -136,8 +145,8 @@ def endings(branch: Branch) -> list[tuple[int, str]]:
     notes = [str(special.get("note") or "") for special in branch.get("special", []) if special["row"] == 0]
     begun = next((note.removeprefix(BEGINS) for note in notes if note.startswith(BEGINS)), "")
     ends = (0, begun), (len(branch["columns"]["load"]) - 1, str(branch.get("ended") or ""))
-    reasons = [(row, sentence.split(" at ")[0].split(":")[0].split(" any more")[0]) for row, sentence in ends]
-    return [(row, reason) for row, reason in reasons if reason not in COMPLETE and not reason.startswith(MEETS)]
+    reasons = [(row, re.split(r" at |:| any more", sentence)[0]) for row, sentence in ends]
+    return [(row, reason) for row, reason in reasons if not reason.startswith(MEETS) and reason not in COMPLETE]
 
 
 def is_solved(branch: Branch, special: Mapping[str, Any]) -> bool:

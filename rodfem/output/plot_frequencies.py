@@ -51,33 +51,29 @@ def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
     return figure
 
 
-def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
-    """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
-    motions: dict[str, str] = {}
-    shown: set[str] = set()
-    ranges: dict[str, Patch] = {}
-    axes.set_ylim(0, 1.15 * max(top(b, most) for b in branches))
-    for branch in branches:
-        ranges |= _shade(axes, branch)
-        for curve in curves(branch["columns"], branch["special"]):
-            motions.setdefault(curve.motion, curve.colour)
-            shown |= _draw_curve(axes, curve, motions[curve.motion])
-    for special in (s for branch in branches for s in branch["special"] if s["kind"] in SPECIAL):
-        _mark(axes, special)
-        shown.add(special["kind"])
-    axes.set_ylabel(r"frequency $\omega$")
-    handles: list[Artist] = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
-    handles += [
-        Line2D([], [], color="0.3", marker=marker, ls=style, lw=0.8, label=what)
-        for what, (marker, style) in PARTS.items()
-        if what in shown
-    ]
-    handles += [Line2D([], [], ls="none", label=kind, **SPECIAL[kind]) for kind in SPECIAL if kind in shown]
-    return handles + list(ranges.values())
-
-
 PARTS = dict(zip((PAIR, GROWTH, DIVERGED), (("x", "-"), ("+", "--"), ("+", ":")), strict=True))
 """Marker and line of roots that are not real."""
+
+
+def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
+    """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
+    motions, shown, ranges = dict[str, str](), set[str](), dict[str, Artist]()
+    axes.set_ylim(0, 1.15 * max(top(b, most) for b in branches))
+    axes.set_ylabel(r"frequency $\omega$")
+    for branch in branches:
+        for found in ranges_of(branch):
+            axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
+            ranges[found.words] = Patch(color=found.shade, label=found.words)
+        for curve in curves(branch["columns"], branch["special"]):
+            shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
+        for special in (special for special in branch["special"] if special["kind"] in SPECIAL):
+            _mark(axes, special)
+            shown.add(special["kind"])
+    handles: list[Artist] = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
+    parts = [{"color": "0.3", "marker": marker, "ls": style, "lw": 0.8, "label": what}
+             for what, (marker, style) in PARTS.items()]  # fmt: skip
+    marks = [{"ls": "none", "label": kind, **style} for kind, style in SPECIAL.items()]
+    return handles + [Line2D([], [], **x) for x in (*parts, *marks) if x["label"] in shown] + [*ranges.values()]
 
 
 def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
@@ -89,15 +85,6 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
             axes.plot(curve.loads, part, marker + style, color=color, ms=4, lw=0.8, markevery=0.03)
             drawn.add(what)
     return drawn
-
-
-def _shade(axes: Axes, branch: Mapping[str, Any]) -> dict[str, Patch]:
-    """Shade the ranges of the load in which a branch is unstable; returns them by the words of the legend."""
-    out = {}
-    for found in ranges_of(branch):
-        out[found.words] = Patch(color=found.shade, label=found.words)
-        axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
-    return out
 
 
 def _mark(axes: Axes, special: Mapping[str, Any]) -> None:
