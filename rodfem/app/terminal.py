@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from math import isfinite
 from textwrap import fill, wrap
@@ -64,6 +64,21 @@ def _roots(point: Point, one: float) -> dict[str, str]:
             text = re if value[0] >= 0 else f"{im}i"
             words.setdefault(kind, []).append(text if value[1] == 0 else f"{re}+-{im}i")
     return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
+
+
+def _eigenvalues(found: Verdict, modes: Modes | None) -> Iterator[str]:
+    """Eigenvalues of a verdict in words, with their errors and motions if ``modes`` were computed."""
+    errors, motions = np.full(len(found.values), np.nan), ("",) * len(found.values)
+    rows = zip(found.values, found.errors, errors, motions, strict=True)
+    if modes is not None:
+        rows = zip(modes.value, modes.residual, modes.error, modes.motion, strict=True)
+    for value, residual, error, motion in rows:
+        doubt = f" ({rounded_up(error):.0e})" if isfinite(error) else ""
+        number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
+        known = f"residual {residual:.0e}" if isfinite(residual) else ""
+        yield f"mu = {number + doubt:<28} {known:<15} {motion}".rstrip()
+    if modes is not None and modes.note:
+        yield modes.note
 
 
 def broken(line: str, columns: int) -> list[str]:
@@ -255,7 +270,7 @@ class Report(Observer):
         self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
 
     def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
-        """Print the final table: every special point of a diagram, with its error bar.
+        """Print the final table: every special point of a diagram, with its error bar, and what is left open.
 
         ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
         """
@@ -267,10 +282,9 @@ class Report(Observer):
         wide = max([len("branch point"), *(len(row[1]) for row in rows)])
         self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
-            for name, kind, load, ordinate, index, remarks in (row for row in rows if row[0] == branch.name):
-                self.say(f"  {name:<12} {kind:<{wide}} {load:<24} {ordinate:<24} {index}")
-                for remark in remarks:
-                    self.say(f"    {remark}")
+            for name, kind, *numbers, index, remarks in (row for row in rows if row[0] == branch.name):
+                self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
+                self.lines(remarks)
             for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
                 self.warn(f"{branch.name}: {sentence}")
         if coarse := sum(s.resolved is False for s in special):
@@ -278,6 +292,10 @@ class Report(Observer):
                 f"The mesh does not resolve {many(coarse, 'special point')}: the value in parentheses is no bound "
                 "there, and whether the rod has such a point is open; use more elements or a higher degree."
             )
+        self._not_followed(branches, most)
+
+    def _not_followed(self, branches: Sequence[Branch], most: int) -> None:
+        """Say how many branch points were not followed, why, and what would follow them."""
         if missed := not_followed(branches):
             deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
             more = Argument("Plan", "depth", deepest + 1)
@@ -287,6 +305,11 @@ class Report(Observer):
             points = many(missed, "branch point was", "branch points were")
             self.say(f"  {points} not followed, {limit}: {more} follows what leaves there")
 
+    def lines(self, remarks: Iterable[str]) -> None:
+        """Print lines that belong to the one before."""
+        for remark in remarks:
+            self.say(f"    {remark}")
+
     def summary(self, data: Mapping[str, Any]) -> None:
         """Print a diagram, the contents of ``diagram.json``, in sentences."""
         self.say("\nIn words (rodfem explain WORD has more)")
@@ -295,16 +318,14 @@ class Report(Observer):
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""
-        rows = [(b, s) for b in branches for s in b.special if s.point.spectrum]
+        rows = [(b.name, s.kind.words, s.point) for b in branches for s in b.special if s.point.spectrum]
         if rows:
             inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
             self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out; no error bars)")
-        wide = max((len(s.kind.words) for _, s in rows), default=0)
-        for branch, s in rows:
-            self.say(
-                f"  {branch.name:<12} {s.kind.words:<{wide}} {s.point.load:<13.8g} "
-                + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum)
-            )
+        wide = max((len(kind) for _, kind, _ in rows), default=0)
+        for name, kind, point in rows:
+            values = "  ".join(f"{mu:.6g}" for mu in point.spectrum)
+            self.say(f"  {name:<12} {kind:<{wide}} {point.load:<13.8g} {values}")
 
     def frequencies(self, branches: Sequence[Branch], load: str, rows: int = 11) -> None:
         """Print the square roots of the left-most eigenvalues against the load, if the scene has them."""
@@ -315,55 +336,43 @@ class Report(Observer):
             f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load} (errors not estimated)"
         )
         shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
-        columns = [_roots(p, self.units.omega2**0.5) for p in shown]
-        widths = {
-            kind: max(len(c.get(kind, "")) for c in [*columns, {kind: kind}])
-            for kind in sorted({k for c in columns for k in c})
-        }
-        self.say(f"  {load:>10}  " + "   ".join(f"{kind:<{width}}" for kind, width in widths.items()))
-        for p, column in zip(shown, columns, strict=True):
-            words = "   ".join(f"{column.get(kind, ''):<{width}}" for kind, width in widths.items())
-            self.say(f"  {in_decimals(p.load, 4, self.units.load):>10}  {words}".rstrip())
+        table = [_roots(p, self.units.omega2**0.5) for p in shown]
+        kinds = sorted({kind for words in table for kind in words})
+        widths = {kind: max(len(words.get(kind, "")) for words in [*table, {kind: kind}]) for kind in kinds}
+        heads = [f"{load:>10}", *(f"{in_decimals(p.load, 4, self.units.load):>10}" for p in shown)]
+        for head, words in zip(heads, [dict(zip(kinds, kinds, strict=True)), *table], strict=True):
+            cells = "   ".join(f"{words.get(kind, ''):<{width}}" for kind, width in widths.items())
+            self.say(f"  {head}  {cells}".rstrip())
         if "torsion" not in widths:
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
         """Print the verdict on one state, with its modes if they were computed.
 
-        ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` the modes, if
-        computed.
+        ``name`` is that of the branch, ``load`` the load in words.
         """
-        index, many = index_range(found.negative, found.undecided), "s"[: found.negative + found.undecided != 1]
-        unstable = f"unstable in {index} direction{many}"
-        if self.count == COUNT:
-            unstable = f"unstable, {index} eigenvalue{many} negative or complex"
-        if found.stable is None:
-            unstable = f"undecided, {self.count} {index_range(found.negative, found.undecided, found.kink)}"
-            unstable += f" of the {found.kink}" if found.kink else ""
-        unstable = "stable" if found.stable else unstable
         zero = f", {found.zero} zero" if found.zero else ""
-        self.say(f"  {name}, {load}: {unstable}{zero}")
-        for mode in found.soft:
-            self.say(f"    {mode}")
-        motions = ("",) * len(found.values) if modes is None else modes.motion
-        errors = np.full(len(found.values), np.nan) if modes is None else modes.error
-        values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)
-        for value, residual, error, motion in zip(values, residuals, errors, motions, strict=True):
-            doubt = f" ({rounded_up(error):.0e})" if isfinite(error) else ""
-            number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
-            known = f"residual {residual:.0e}" if isfinite(residual) else ""
-            self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
-        if modes is not None and modes.note:
-            self.say(f"    {modes.note}")
+        self.say(f"  {name}, {load}: {self._stability(found)}{zero}")
+        self.lines(map(str, found.soft))
+        self.lines(_eigenvalues(found, modes))
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
-        took = f"{found.factorisations} factorisation{'s'[: found.factorisations != 1]}, {1e3 * found.seconds:.1f} ms"
+        took = f"{many(found.factorisations, 'factorisation')}, {1e3 * found.seconds:.1f} ms"
         self.say(f"    {found.method} ({found.reason}){proof}; {took}")
         if found.band:
             inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
-            self.say(
-                f"    inertia decides beyond {found.band:.1e} (in the metric of rotations)"
-                + (f"; inside: {inside}" if inside else "")
-            )
+            inside = f"; inside: {inside}" if inside else ""
+            self.say(f"    inertia decides beyond {found.band:.1e} (in the metric of rotations){inside}")
+
+    def _stability(self, found: Verdict) -> str:
+        if found.stable:
+            return "stable"
+        index, one = index_range(found.negative, found.undecided), found.negative + found.undecided == 1
+        if found.stable is None:
+            of = f" of the {found.kink}" if found.kink else ""
+            return f"undecided, {self.count} {index_range(found.negative, found.undecided, found.kink)}{of}"
+        if self.count == COUNT:
+            return f"unstable, {index} eigenvalue{'s' * (not one)} negative or complex"
+        return f"unstable in {index} direction{'s' * (not one)}"
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""
