@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE, pieces_of
+from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE, Piece, pieces_of
 from rodfem.stability.soft_mode import on_kink
 from rodfem.tolerances import SAME_SPECIAL
 
@@ -75,15 +75,16 @@ class Interval:
 
 def intervals_of(branch: Mapping[str, Any]) -> list[Interval]:
     """Intervals of a branch in the order of its rows; none for a branch of one row."""
-    out = []
-    for kind, group in groupby(pieces_of(branch), lambda piece: piece.kind):
-        pieces = list(group)
-        indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
-        known = None if None in space else max(i for i in space if i is not None)
-        kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
-        soft, ends = any(piece.undecided for piece in pieces), (pieces[0].first, pieces[-1].last)
-        out.append(Interval(branch, kind, *ends, min(indices), max(indices), known, kink, soft))
-    return out
+    groups = groupby(pieces_of(branch), lambda piece: piece.kind)
+    return [_joined(branch, kind, list(group)) for kind, group in groups]
+
+
+def _joined(branch: Mapping[str, Any], kind: str, pieces: Sequence[Piece]) -> Interval:
+    indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
+    known = None if None in space else max(i for i in space if i is not None)
+    kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
+    soft, ends = any(piece.undecided for piece in pieces), (pieces[0].first, pieces[-1].last)
+    return Interval(branch, kind, *ends, min(indices), max(indices), known, kink, soft)
 
 
 def changes_at(branch: Mapping[str, Any], row: int) -> list[Mapping[str, Any]]:
