@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -122,6 +123,12 @@ def amplitude(root: complex, grows: bool, time: float) -> complex:
     return complex(grown + back**2 * (3 - 2 * back) * (np.exp(-root * most) - grown))
 
 
+def drawn_size(u: NDArray[Any], w: NDArray[Any], span: float) -> float:
+    """Factor with which a mode of displacement ``u`` and rotation ``w`` (n, 3) is drawn, of a rod of size ``span``."""
+    moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
+    return min(LARGEST[0] * span / max(moved, POINT * span), LARGEST[1] / max(turned, POINT))
+
+
 class _Panel:
     """One mode in its axes, seen across the plane in which most of it happens."""
 
@@ -134,10 +141,9 @@ class _Panel:
         self.frames = directors(turned)
         u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
         span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
-        moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
-        size = min(LARGEST[0] * span / max(moved, POINT * span), LARGEST[1] / max(turned, POINT))
+        size = drawn_size(u, w, span)
         self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
-        self.combed = size * moved < 0.5 * LARGEST[0] * span
+        self.combed = size * np.linalg.norm(abs(u), axis=1).max() < 0.5 * LARGEST[0] * span
         self.root = np.sqrt(-mu)
         zero = abs(mu) <= (modes.error[number] if np.isfinite(modes.error[number]) else 0.0)
         self.free = modes.motion[number] == SYMMETRY or zero
