@@ -1060,7 +1060,7 @@ FAULTS = {
         f"{FILES} {KILLS} tests/output/test_foreign_files.py",
     ),
     "not-finite-numbers-in-a-file": Fault(
-        "rodfem/output/files.py",
+        "rodfem/output/table.py",
         "return float(value) if np.isfinite(value) else None",
         "return float(value)",
         f"{FILES} tests/output/test_foreign_files.py",

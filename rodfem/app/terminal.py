@@ -349,7 +349,7 @@ class Report(Observer):
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
         """Print the verdict on one state, with its modes if they were computed.
 
-        ``name`` is that of the branch, ``load`` the load in words.
+        ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` its modes.
         """
         zero = f", {found.zero} zero" if found.zero else ""
         self.say(f"  {name}, {load}: {self._stability(found)}{zero}")

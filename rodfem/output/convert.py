@@ -132,18 +132,9 @@ def write_curves(
     own: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html, version 2.0, ``PolyData`` with
     steps.
 
-    Parameters
-    ----------
-    path
-        File, by custom ``*.vtkhdf``.
-    curves
-        Points (m, 3) of each step; m may differ from step to step.
-    fields
-        By name, values (m,) or (m, k) at the points of each step.
-    numbers
-        By name, one number for each step, (steps,).
-
-    Raises :class:`~rodfem.errors.InputError` where the file cannot be written.
+    ``path`` is the file, by custom ``*.vtkhdf``; ``curves`` are the points (m, 3) of each step, where m may differ from
+    step to step, ``fields`` by name values (m,) or (m, k) at the points of each step, and ``numbers`` by name one
+    number for each step, (steps,).  Raises :class:`~rodfem.errors.InputError` where the file cannot be written.
     """
     sizes = np.array([len(curve) for curve in curves])
     steps = len(sizes)

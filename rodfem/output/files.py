@@ -136,20 +136,9 @@ def save_run(
     that it has all branches of a ``diagram.json`` of the same run.  Raises :class:`InputError` on every rank where the
     folder cannot be written.
 
-    Parameters
-    ----------
-    data
-        Contents of ``diagram.json``.
-    branches
-        Branches that ``states.h5`` has not yet.
-    solvers
-        Solvers of the meshes that points name.
-    folder
-        Where the files are, which there is.
-    first
-        Whether ``states.h5`` is a new one.
-    modes
-        Modes of the typical states of each of the branches.
+    ``data`` are the contents of ``diagram.json``, ``branches`` those that ``states.h5`` has not yet, ``solvers`` those
+    of the meshes that points name, and ``modes`` those of the typical states of each of the branches.  ``first`` says
+    that ``states.h5`` is a new one.
     """
     states = folder / "states.h5"
     image = states_of(branches, solvers, states, run=data["run"], first=first, modes=modes)

@@ -58,18 +58,11 @@ class _Place:
 def glyphs_of(
     setting: Setting, s: Floats, pose: tuple[Floats, Floats], look: Look, home: Floats | None = None
 ) -> list[Glyph]:
-    """Glyphs for all that holds and loads a rod.
+    """Glyphs for all that holds and loads a rod, by its ``setting``.
 
-    Parameters
-    ----------
-    setting
-        As read from a file.
-    s, pose
-        Arclengths (n,); centreline (n, 3) and directors (n, 3, 3), the columns of each matrix.
-    look
-        Of the picture.
-    home
-        Centreline (n, 3) of the equilibrium from which a motion has taken the rod; None: it is there.
+    ``s`` (n,) are arclengths, ``pose`` the centreline (n, 3) and the directors (n, 3, 3) as columns; ``home`` (n, 3) is
+    the centreline of the equilibrium from which a motion has taken the rod, None: it is there.  ``look`` is that of the
+    picture.
     """
     centres, frames = pose
     home = centres if home is None else home

@@ -42,6 +42,7 @@ from rodfem.output.style import (
     sheet,
     tex,
 )
+from rodfem.output.view import POINT
 
 __all__ = ["draw_diagram", "main"]
 
@@ -87,26 +88,10 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of the opposite
     ordinate, are thin lines: they were not traced.
 
-    Parameters
-    ----------
-    diagram
-        Contents of ``diagram.json``; loads and ordinates are nondimensional.
-    path
-        Picture to write, 7.5 in by 5 in at 200 dpi; the suffix decides the format (.png, .pdf, .svg).
-
-    Returns
-    -------
-    path
-        The picture written; its folder is created where it is missing.
-
-    Raises
-    ------
-    InputError
-        If these are contents of another or a newer format.
-    ValueError
-        If there are no branches, if columns of one differ in length, or if the format is unknown.
-    KeyError
-        If an entry of ``diagram.json`` is missing.
+    ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
+    200 dpi.  Its suffix decides the format (.png, .pdf, .svg), and its folder is created.  Raises :class:`InputError`
+    for contents of another or a newer format, :class:`ValueError` where there are no branches, columns of one differ in
+    length, or the format is unknown, and :class:`KeyError` where an entry is missing.
     """
     return save(figure_of(diagram), path)
 
@@ -282,7 +267,7 @@ def _beside(curve: Floats, half: Floats) -> Floats:
     """Places (k, 2) for a word of ``half`` (2,) pixels beside a curve (n, 2), those in its middle first."""
     rows = ((0.5 + np.array([0, 0.15, -0.15, 0.3, -0.3, 0.4, -0.4])) * (len(curve) - 1)).round().astype(int)
     tangent = curve[np.minimum(rows + 4, len(curve) - 1)] - curve[np.maximum(rows - 4, 0)]
-    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(*tangent.T), POINT)[:, None]
     normal *= np.where(normal[:, 1] < 0, -1.0, 1.0)[:, None]
     away = normal * (abs(normal) @ half + GAP)[:, None]
     return np.stack([curve[rows] + away, curve[rows] - away], axis=1).reshape(-1, 2)

@@ -40,24 +40,9 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     where they were counted, as ``0|1``.  The stable side of a curve is shaded as far as the next curve, or the bound of
     the load: there stability is known as far as these curves tell, as no other one was looked for.
 
-    Parameters
-    ----------
-    loci
-        Contents of files written by :meth:`rodfem.codim2.locus.Locus.save`, of the same two parameters.
-    path
-        Picture to write, 7.5 in by 5 in at 200 dpi; the suffix decides the format.
-
-    Returns
-    -------
-    path
-        The picture written; its folder is created where it is missing.
-
-    Raises
-    ------
-    InputError
-        For contents of another or a newer format.
-    ValueError
-        Without any locus, or if they are not of the same parameters.
+    ``loci`` are the contents of files written by :meth:`rodfem.codim2.locus.Locus.save`, of the same two parameters;
+    ``path`` is the picture to write, and to return.  Raises :class:`InputError` for contents of another or a newer
+    format, and :class:`ValueError` without any locus, or if they are not of the same parameters.
     """
     _check(loci)
     with matplotlib.rc_context(STYLE):

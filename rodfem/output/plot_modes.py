@@ -53,27 +53,11 @@ GROWTH = 1e-9
 def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence[int] = ()) -> Path:
     """Draw the modes of one state, each in a panel of its own.
 
-    Parameters
-    ----------
-    path
-        The file ``modes.h5``.
-    branch, row
-        The state, as in ``states.h5``.
-    output
-        Picture to write; an animation where its suffix is .gif, in which unstable modes grow like ``exp(sqrt(-mu) t)``,
-        then go back, and stable ones oscillate, each in a time of its own.  Its end joins its beginning.
-    chosen
-        Numbers of the modes, from 1 on; all where none is given.
-
-    Returns
-    -------
-    output
-        The picture written; its folder is created where it is missing.
-
-    Raises
-    ------
-    InputError
-        If the file has no such modes.
+    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state, as in ``states.h5``.  ``output`` is the picture
+    to write, and to return; an animation where its suffix is .gif, in which unstable modes grow like
+    ``exp(sqrt(-mu) t)``, then go back, and stable ones oscillate, each in a time of its own: its end joins its
+    beginning.  ``chosen`` are numbers of modes, from 1 on; all where none is given.  Raises :class:`InputError` if the
+    file has no such modes.
     """
     modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)

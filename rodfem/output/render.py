@@ -48,35 +48,21 @@ def draw_shape(
 
     Parameters
     ----------
-    states
-        The file ``states.h5``; lengths in it are nondimensional.
-    branch, row
-        Name of the branch, and row of the state in it, counted from 0.
+    states, branch, row
+        The file ``states.h5``, the name of the branch, and the row of the state in it, counted from 0.
     path
-        Picture to write; the suffix decides the format (.png, .jpg, .bmp, .tif).
+        Picture to write, and to return; its folder is created.  The suffix decides the format (.png, .jpg, .bmp, .tif).
     caption
         Line at the foot of the picture: scene, branch and load when None, nothing when empty.
     radius
-        Mean radius of the rod, nondimensional; about 1/90 of its length when None.
+        Mean radius of the rod; that of :func:`rodfem.output.view.thickness` when None.
     size
         Width and height of the picture in pixels; words keep theirs, so that a smaller picture has larger ones.
     view
         Axes of the picture as rows (3, 3), as :func:`view_in` gives them; those of this state when None.
 
-    Returns
-    -------
-    path
-        The picture written; its folder is created where it is missing.
-
-    Raises
-    ------
-    ValueError
-        If the file, the branch or the row does not exist, an argument has no meaning, or (:class:`InputError`) the
-        file has another or a newer format.
-    ImportError
-        If PyVista or one of the libraries it needs is missing.
-    RuntimeError
-        If the picture comes out blank.
+    Raises :class:`ValueError` where there is no such state or an argument has no meaning, :class:`ImportError` where
+    PyVista or a library that it needs is missing, and :class:`RuntimeError` where the picture comes out blank.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -134,16 +120,9 @@ def view_in(states: Path, branch: str, row: int) -> Floats:
 class State:
     """A state as a picture needs it, at n places along the rod.
 
-    Attributes
-    ----------
-    s, centres, directors
-        Arclengths (n,), centreline (n, 3), and rotations (n, 3, 3) with columns d1, d2, d3.
-    reference
-        Centreline (n, 3) of the state that it has left: of the first branch, at the nearest load.
-    setting
-        What holds and loads the rod.
-    caption
-        Scene, branch and load.
+    Arclengths ``s`` (n,), centreline ``centres`` (n, 3), and ``directors`` (n, 3, 3) as columns; ``reference`` is the
+    centreline (n, 3) of the state that it has left, of the first branch at the nearest load, ``setting`` what holds and
+    loads the rod, and ``caption`` has scene, branch and load.
     """
 
     s: Floats
@@ -160,15 +139,8 @@ class State:
     def solids(self, look: Look) -> list[Solid | Glyph]:
         """The rod, its stripe, what holds it and what loads it."""
         around = (ROD, 1.0, np.linspace(-np.pi, np.pi, 49)[:-1]), (STRIPE, 1.02, np.linspace(-0.3, 0.3, 9))
-        rods = [
-            rod(
-                self.centres,
-                self.directors,
-                size * look.radius * profile_of(self.s, self.setting.section, angles),
-                color,
-            )
-            for color, size, angles in around
-        ]
+        outlines = [(size * profile_of(self.s, self.setting.section, angles), color) for color, size, angles in around]
+        rods = [rod(self.centres, self.directors, look.radius * outline, color) for outline, color in outlines]
         return [*rods, *glyphs_of(self.setting, self.s, (self.centres, self.directors), look)]
 
 
@@ -257,19 +229,9 @@ def draw_shape_safely(
 ) -> str | None:
     """Draw as `draw_shape` does, but in a process of its own, which may crash without harm.
 
-    ``states``, ``branch``, ``row``, ``path`` and ``options`` are as there.
-
-    Parameters
-    ----------
-    states, branch, row, path, **options
-        As for `draw_shape`; the options are caption and radius.
-    limit
-        Time that drawing may take, in seconds.
-
-    Returns
-    -------
-    trouble
-        None where the picture was written, else a sentence that says what failed and what to do.
+    ``states``, ``branch``, ``row`` and ``path`` are as there, ``options`` are caption and radius, ``limit`` is the time
+    in seconds that it may take.  Returns None where the picture was written, else a sentence that says what failed and
+    what to do.
     """
     command = [sys.executable, "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
     command += [f"--{key}={value}" for key, value in {"output": path, **options}.items() if value is not None]

@@ -124,7 +124,7 @@ def _loft(rings: Floats) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def glyph(body: str, color: str, at: Floats, axes: ArrayLike) -> Glyph:
-    """A body at a place (3,), whose directions x, y, z become the rows of ``axes`` (3, 3)."""
+    """A ``body`` of a ``color`` ``at`` a place (3,), whose directions x, y, z become the rows of ``axes`` (3, 3)."""
     return Glyph(body, color, np.vstack([axes, at]))
 
 
@@ -134,17 +134,17 @@ def ball(at: Floats, radius: float, color: str) -> Glyph:
 
 
 def between(body: str, start: Floats, end: Floats, radius: float, color: str) -> Glyph:
-    """A body that goes along z, from ``start`` (3,) to ``end`` (3,), with this ``radius``."""
+    """A ``body`` of a ``color`` along z, from ``start`` (3,) to ``end`` (3,), with this ``radius``."""
     a = across(end - start)
     b = np.cross(end - start, a)
     return glyph(body, color, start, [radius * a, radius * b / np.linalg.norm(b), end - start])
 
 
 def turn(centre: Floats, axis: Floats, size: float, front: Floats, color: str) -> Glyph:
-    """Arrow about an ``axis`` (3,), in the sense of a moment along it, whose head is in the direction ``front``.
+    """Arrow of a ``color`` about an ``axis`` (3,), in the sense of a moment along it.
 
-    It winds along the axis a little, so that it is seen from all sides.  ``centre`` (3,) is its own, ``size`` the
-    radius of the arc.
+    It winds along the axis a little, so that it is seen from all sides.  Its head is in the direction ``front``,
+    ``centre`` (3,) is its own, ``size`` the radius of the arc.
     """
     axis = axis / np.linalg.norm(axis)
     a = front - (front @ axis) * axis
@@ -172,7 +172,8 @@ def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Float
 def rod(centres: Floats, frames: Floats, profile: Floats, color: str) -> Solid:
     """Rod with the cross-sections of :func:`profile_of`, (n, k, 2), in the planes of d1 and d2 of ``frames``.
 
-    ``centres`` (n, 3) and ``frames`` (n, 3, 3) are those of the cross-sections, ``profile`` their outlines.
+    ``centres`` (n, 3) and ``frames`` (n, 3, 3) are those of the cross-sections, ``profile`` their outlines;
+    ``color`` is its colour.
     """
     return Solid(*_loft(centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], profile)), color)
 

@@ -29,18 +29,9 @@ class StableRegion(NamedTuple):
 def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> StableRegion | None:
     """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
 
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus; its stable side is that on which its index is zero.
-    loci
-        Those of all loci of the plane, ``one`` among them.
-
-    Returns
-    -------
-    region
-        None where neither side is stable all along the locus, as where another one crosses it, where it is not known
-        which side is, or where the locus has more than one load at a value of the second parameter.
+    ``one`` is the file of the locus, whose stable side is that on which its index is zero, and ``loci`` are all of the
+    plane.  None where neither side is stable all along the locus, as where another one crosses it, where it is not
+    known which side is, or where the locus has more than one load at a value of the second parameter.
     """
     columns, (load, other) = one["columns"], one["parameters"]
     x, y = (np.asarray(columns[name], dtype=float) for name in (other, load))
@@ -60,35 +51,17 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> 
 
 
 def plane_of(one: Mapping[str, Any]) -> str:
-    """What is to be said after ``stable`` or ``index`` of a locus: :data:`IN_PLANE`, or nothing.
-
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus.
-    """
+    """What is to be said after ``stable`` or ``index`` of a locus: :data:`IN_PLANE`, or nothing."""
     return IN_PLANE if one.get("planar") else ""
 
 
 def in_words(one: Mapping[str, Any]) -> str:
-    """What the region of a locus is, for legends.
-
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus.
-    """
+    """What the region of a locus is, for legends."""
     return f"stable{plane_of(one)}, as far as these curves tell"
 
 
 def passed(one: Mapping[str, Any]) -> NDArray[np.int_]:
-    """Number of curves that cross a locus between its start and each row, (rows,): at each the two sides change places.
-
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus.
-    """
+    """Number of curves that cross a locus between its start and each row (rows,): at each, sides change places."""
     rows, start = np.arange(len(one["columns"]["index"])), one["start"]
     beyond = [mark["row"] for mark in one["marks"] if mark["kind"] == CROSSES]
     return np.array([sum(start < at <= row or row <= at < start for at in beyond) for row in rows], dtype=int)

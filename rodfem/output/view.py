@@ -49,30 +49,17 @@ def view_of(
 ) -> Floats:
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
-    Parameters
-    ----------
-    reference, moved
-        Centreline (n, 3) of the state that the rod has left, and displacement (n, 3) from it.
-    axis
-        Direction (3,) of the rod's axis; None: from one end of ``reference`` to the other.
-    down
-        Direction of a load along the rod (gravity), which is downwards in the picture.
-    load
-        Direction of a force across the rod, or of its deflection, which is not along the line of sight.
-    side
-        Direction that is upwards where a straight rod has not moved.
-    feet
-        Whether the rod is held in two places or more, and may be an arch.
+    ``reference`` and ``moved`` (n, 3) are the centreline of the state that the rod has left, and the displacement from
+    it.  All other arguments are directions (3,): ``axis`` that of the rod (None: from one end of ``reference`` to the
+    other), ``down`` that of a load along the rod, of gravity, which is downwards, ``load`` that of a force across the
+    rod, or of its deflection, which is not along the line of sight, ``side`` what is upwards where a straight rod has
+    not moved.  With ``feet`` the rod is held in two places or more, and may be an arch.
 
-    Returns
-    -------
-    axes
-        Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is
-        the principal direction of the displacement across it.  A load that is not nearly along that direction is
-        vertical instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is
-        horizontal (:func:`upwards`), whichever way the rod moves and the load pulls, but for an arch on whose crown
-        the load presses: its crown is above its feet.  With gravity that is downwards.
-        A closed rod is shown in the plane nearest to it.
+    Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is the
+    principal direction of the displacement across it.  A load that is not nearly along that direction is vertical
+    instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is horizontal,
+    whichever way the rod moves and the load pulls, but for an arch on whose crown the load presses: its crown is above
+    its feet.  A closed rod is shown in the plane nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
@@ -106,7 +93,8 @@ def view_of(
 def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
     """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), held and loaded so.
 
-    ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to show, by default of dead forces.
+    ``setting`` holds and loads it, ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to
+    show, by default of dead forces.
     """
     load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
     along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}

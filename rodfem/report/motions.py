@@ -48,14 +48,9 @@ class Shown(NamedTuple):
 def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[Shown]:
     """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical.
 
-    Parameters
-    ----------
-    path, place
-        The file with error bars, None where it has not this state, and the branch and row in it.
-    typical
-        Modes that the run has recorded there, at nodes ``s``.
-    zeros
-        Number of eigenvalues that vanish, symmetries included.
+    ``path`` is the file with error bars, None where it has not this state, and ``place`` the branch and row in it;
+    ``typical`` are modes that the run has recorded there, at nodes ``s``, and ``zeros`` is the number of eigenvalues
+    that vanish, symmetries included.
     """
     shown: list[Shown] = []
     if path is not None:
@@ -84,7 +79,8 @@ def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[Shown]:
 def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Setting, look: Look) -> list[dict[str, Any]]:
     """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one.
 
-    ``setting`` is what holds and loads the state, ``look`` that of the picture.
+    ``shapes`` are those of the branch, ``setting`` is what holds and loads the state, ``look`` that of the picture, and
+    ``modes`` are those of :func:`modes_of`.
     """
     r, frames = shapes[row]
     span = float(np.linalg.norm(np.ptp(r, axis=0)))
