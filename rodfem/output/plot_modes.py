@@ -14,10 +14,10 @@ from matplotlib import rc_context
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import Collection, LineCollection, PolyCollection
-from matplotlib.colors import to_rgb
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
@@ -25,7 +25,7 @@ from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Glyph, curve_of, profile_of
+from rodfem.output.solids import Glyph, Solid, between, curve_of, striped
 from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
 from rodfem.output.view import POINT, axes_of, axis_of
 from rodfem.problem.quaternions import directors
@@ -39,8 +39,8 @@ Floats = NDArray[np.float64]
 PANEL, COLUMNS, TITLES = (4.0, 2.75), 3, 0.8  # inches; those that titles take above a panel
 LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
-POINTS, SIDES, SLENDER = (240, 100), (14, 10), 65.0
-"""Points along and around a tube, in a picture and in an animation; the rod's size over the tube's radius."""
+POINTS, SLENDER = 100, 65.0
+"""Points along a rod; its size over its radius."""
 FRAMES, RATE, PERIODS, FAINTEST, RISING = 60, 20, 2.0, 0.06, 0.8
 """Of an animation: pictures, pictures a second, periods of an oscillation, amplitude at which a growing mode starts,
 and the share of the time in which it grows; in the rest it goes back, pale, so that the loop joins."""
@@ -76,7 +76,7 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
             f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=14, y=1 - 0.1 / figure.get_figheight(), va="top"
         )
         places = [figure.add_subplot(rows, columns, i + 1) for i in range(len(numbers))]
-        panels = [_Panel(axes, modes, setting, n, moving) for axes, n in zip(places, numbers, strict=True)]
+        panels = [_Panel(axes, modes, setting, n) for axes, n in zip(places, numbers, strict=True)]
         if not moving:
             for panel in panels:
                 panel.draw()
@@ -116,39 +116,32 @@ def drawn_size(u: NDArray[Any], w: NDArray[Any], span: float) -> float:
 class _Panel:
     """One mode in its axes, seen across the plane in which most of it happens."""
 
-    def __init__(self, axes: Axes, modes: Modes, setting: Setting, number: int, moving: bool) -> None:
-        self.axes, self.sides, self.setting = axes, SIDES[moving], setting
-        self.shown: list[Collection] = []
-        s, mu = modes.s, complex(modes.value[number])
-        self.s = fine = np.linspace(s[0], s[-1], POINTS[moving])
-        self.r, turned = curve_of(s, modes.r, modes.q, fine)
+    def __init__(self, axes: Axes, modes: Modes, setting: Setting, number: int) -> None:
+        self.axes, self.setting, self.shown = axes, setting, list[PolyCollection]()
+        self.s = s = np.linspace(modes.s[0], modes.s[-1], POINTS)
+        self.r, turned = curve_of(modes.s, modes.r, modes.q, s)
         self.frames = directors(turned)
-        u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
-        span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
+        u, w = (CubicSpline(modes.s, part[number].astype(complex))(s) for part in (modes.displacement, modes.rotation))
+        span, mu, error = (
+            float(np.linalg.norm(np.ptp(self.r, axis=0))),
+            complex(modes.value[number]),
+            modes.error[number],
+        )
         size = drawn_size(u, w, span)
         self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
         self.combed = size * np.linalg.norm(abs(u), axis=1).max() < 0.5 * LARGEST[0] * span
         self.root = np.sqrt(-mu)
-        zero = abs(mu) <= (modes.error[number] if np.isfinite(modes.error[number]) else 0.0)
-        self.free = modes.motion[number] == SYMMETRY or zero
-        self.color = FREE if self.free else GROWS if self.root.real > GROWTH * abs(self.root) else SWINGS
-        self._title(modes, number, mu)
-        angles = np.linspace(0, 2 * np.pi, self.sides + 1) - np.pi / self.sides
-        self.profile = self.radius * profile_of(fine, setting.section, angles)
-        self._look(span)
-        self._rod(self.r, self.frames, REST, 0)
-        self._triad()
-        axes.set_xlim(*self.limits[0])
-        axes.set_ylim(*self.limits[1])
-        axes.set_aspect("equal")
-        axes.set_axis_off()
-
-    def _title(self, modes: Modes, number: int, mu: complex) -> None:
-        kind, error = modes.motion[number], float(modes.error[number])
+        free = modes.motion[number] == SYMMETRY or abs(mu) <= (error if np.isfinite(error) else 0.0)
+        self.color = FREE if free else GROWS if self.root.real > GROWTH * abs(self.root) else SWINGS
         doubt = f" ({error:.0e})" if np.isfinite(error) else ""
         value = f"{mu.real:.6g}" if mu.imag == 0 else f"{mu.real:.5g} {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.5g}i"
         what = {FREE: "zero", SWINGS: "stable", GROWS: "unstable" if mu.imag == 0 else "flutter"}[self.color]
-        self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=12.5, color=self.color)
+        words = f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {modes.motion[number]}"
+        axes.set_title(words, fontsize=12.5, color=self.color)
+        self._look(span)
+        self._show(self._rod(self.r, self.frames, REST), 0)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
 
     def _look(self, span: float) -> None:
         """Choose the axes (see :func:`rodfem.output.view.axes_of`), the limits, and the sign of the mode.
@@ -160,22 +153,28 @@ class _Panel:
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
         bent = self.setting.force is None and np.linalg.norm(most) > BENT * span
-        self.view = axes_of(self.setting, self.r, moved, self.frames[0], most if bent else None)
-        raised = moved @ self.view[1]
+        view = axes_of(self.setting, self.r, moved, self.frames[0], most if bent else None)
+        self.look, raised = Look(self.radius, view), moved @ view[1]
         if raised[np.argmax(abs(raised))] < 0.0:
             self.u, self.w = -self.u, -self.w
-        points = []
-        for factor in (1.0, -1.0, 1.0j, -1.0j):
-            r, frames = self._moved(factor)
-            points += [r, *(solid.points for solid in self._glyphs(r, frames))]
-        seen = np.concatenate(points) @ self.view[:2].T
-        low, high = seen.min(axis=0) - 3 * self.radius, seen.max(axis=0) + 3 * self.radius
+        states = [self._moved(factor) for factor in (1.0, -1.0, 1.0j, -1.0j)]
+        points = [solid.points for state in states for solid in [*self._rod(*state, REST), *self._glyphs(*state)]]
+        seen = np.concatenate(points) @ view[:2].T
+        low, high = seen.min(axis=0) - self.radius, seen.max(axis=0) + self.radius
         low[0] -= 0.15 * (high - low)[0]  # room for the triad
-        middle, half = (low + high) / 2, (high - low) / 2
-        half = np.maximum(
-            half, half[::-1] * np.array([PANEL[0], PANEL[1] - TITLES]) / np.array([PANEL[1] - TITLES, PANEL[0]])
-        )
-        self.limits = np.stack([middle - half, middle + half], axis=1)
+        shape = np.array([PANEL[0], PANEL[1] - TITLES])
+        grown = (shape * ((high - low) / shape).max() - (high - low)) / 2
+        low, high = low - grown, high + grown
+        self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        size = 0.07 * (high - low)[0]
+        corner, names = low + 1.6 * size, dict[tuple[float, ...], list[str]]()
+        for i, way in enumerate(view[:2].T):
+            self.axes.plot(*np.stack([corner, corner + size * way], axis=1), color="0.45", lw=1.2)
+            if np.linalg.norm(way) > 0.5:
+                names.setdefault(tuple(np.round(way, 0)), []).append(f"e{i + 1}")
+        for key, words in names.items():
+            place = corner + 1.5 * size * np.array(key) / np.linalg.norm(key)
+            self.axes.text(*place, ", ".join(words), fontsize=10, color="0.35", ha="center", va="center")
 
     def _moved(self, factor: complex) -> tuple[Floats, Floats]:
         """Centreline and directors of the rod in its mode, of a complex amplitude."""
@@ -184,7 +183,7 @@ class _Panel:
 
     def _glyphs(self, r: Floats, frames: Floats) -> list[Glyph]:
         """What holds and loads the rod: it goes along where it moves with the rod."""
-        return glyphs_of(self.setting, self.s, (r, frames), Look(self.radius, self.view), self.r)
+        return glyphs_of(self.setting, self.s, (r, frames), self.look, self.r)
 
     def draw(self, time: float | None = None) -> None:
         """Draw the rod at a time of the loop, from 0 to 1; None: at its greatest amplitude."""
@@ -193,66 +192,29 @@ class _Panel:
         grows = self.color == GROWS
         r, frames = self._moved(1.0 if time is None else amplitude(self.root, grows, time))
         pale = 0.6 if grows and time is not None and time > RISING else 0.0
-        color = (1 - pale) * np.array(to_rgb(self.color)) + pale * np.array(to_rgb(REST))
-        self.shown = self._rod(r, frames, color, 1)
-        if solids := self._glyphs(r, frames):
-            corners = np.concatenate([solid.points[solid.triangles] for solid in solids]) @ self.view.T
-            colors = np.concatenate([np.tile(to_rgb(x.color), (len(x.triangles), 1)) for x in solids])
-            across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            self.shown.append(self._facets(corners, across, colors, 0.5))
+        color = to_hex((1 - pale) * np.array(to_rgb(self.color)) + pale * np.array(to_rgb(REST)))
+        self.shown = [self._show(self._glyphs(r, frames), 0.5), self._show(self._rod(r, frames, color), 1)]
 
-    def _rod(self, centres: Floats, frames: Floats, color: ArrayLike, order: int) -> list[Collection]:
-        """Rod, with a comb along d1 where the mode turns it only: its teeth are lines before the rod and behind it."""
-        drawn: list[Collection] = [self._tube(centres, frames, color, order)]
-        if self.combed:
-            nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1:-1]
-            seen, d1 = centres[nodes] @ self.view.T, frames[nodes, :, 0] @ self.view.T
-            front = d1[:, 2] > 0
-            for chosen, place in ((front, order + 0.2), (~front, order - 0.2)):
-                ends = np.stack([seen[chosen], seen[chosen] + 6.0 * self.radius * d1[chosen]], axis=1)
-                lines = LineCollection(
-                    list(ends[..., :2]), colors=[0.6 * np.array(to_rgb(color))], lw=1.2, zorder=place
-                )
-                self.axes.add_collection(lines)
-                drawn.append(lines)
-        return drawn
+    def _rod(self, centres: Floats, frames: Floats, color: str) -> list[Solid | Glyph]:
+        """Rod with a stripe along d1, and with teeth along d1 where the mode turns it only."""
+        dark = to_hex(0.4 * np.array(to_rgb(color)))
+        nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1:-1] if self.combed else []
+        tips = centres + 6.0 * self.radius * frames[:, :, 0]
+        teeth = [between("bar", centres[i], tips[i], 0.12 * self.radius, dark) for i in nodes]
+        return [*striped((self.s, centres, frames), self.setting.section, self.radius, (color, dark), 12), *teeth]
 
-    def _tube(self, centres: Floats, frames: Floats, color: ArrayLike, order: int) -> PolyCollection:
-        """Rod with a stripe along d1."""
-        surface = centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], self.profile)
-        surface = surface @ self.view.T
-        corners = np.stack([surface[:-1, :-1], surface[1:, :-1], surface[1:, 1:], surface[:-1, 1:]], axis=2)
-        across = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 1] - corners[:, :, 3])
-        base = np.tile(np.array(to_rgb(color)), (*across.shape[:2], 1))
-        base[:, 0] *= 0.35  # the stripe
-        return self._facets(corners.reshape(-1, 4, 3), across.reshape(-1, 3), base.reshape(-1, 3), order)
-
-    def _facets(self, corners: Floats, across: Floats, colors: Floats, order: float) -> PolyCollection:
-        """Facets (n, k, 3) that face the viewer, far ones first, lit from above; ``across`` is their normal (n, 3)."""
+    def _show(self, solids: Sequence[Solid | Glyph], order: float) -> PolyCollection:
+        """Show the triangles of solids that face the viewer, far ones first, lit from above."""
+        corners = np.concatenate([np.empty((0, 3, 3)), *(x.points[x.triangles] for x in solids)]) @ self.look.axes.T
+        colors = np.concatenate([np.empty((0, 3)), *(np.tile(to_rgb(x.color), (len(x.triangles), 1)) for x in solids)])
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), TINY)
         light = 0.55 + 0.45 * np.clip(across @ np.array([-0.25, 0.75, 0.6]), 0, 1)
         near = np.argsort(corners[:, :, 2].mean(axis=1))
         near = near[across[near, 2] > 0]
-        shades = np.clip(colors * light[:, None], 0, 1)[near]
+        shades = (colors * light[:, None])[near]
         drawn = PolyCollection(corners[near, :, :2], facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=order)
-        self.axes.add_collection(drawn)
-        return drawn
-
-    def _triad(self) -> None:
-        """The directions e1, e2, e3, in the lower left corner; directions that look alike share a label."""
-        size = 0.07 * np.ptp(self.limits[0])
-        corner = self.limits[:, 0] + 1.6 * size
-        labels: list[tuple[Floats, list[str]]] = []
-        for i, axis in enumerate(self.view[:2].T):
-            self.axes.plot(*np.stack([corner, corner + size * axis], axis=1), color="0.45", lw=1.2, zorder=3)
-            if np.linalg.norm(axis) > 0.5:
-                place = next((names for at, names in labels if np.linalg.norm(at - axis) < 0.5), None)
-                if place is None:
-                    labels.append((axis, place := []))
-                place.append(f"e{i + 1}")
-        for axis, names in labels:
-            self.axes.text(*(corner + 1.5 * size * axis), ", ".join(names), fontsize=10, color="0.35", ha="center",
-                           va="center", zorder=3)  # fmt: skip
+        return self.axes.add_collection(drawn, autolim=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Glyph, Solid, curve_of, profile_of, rod
+from rodfem.output.solids import Glyph, Solid, curve_of, striped
 from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE
 from rodfem.output.view import axes_of, thickness
 from rodfem.problem.quaternions import directors
@@ -138,10 +138,9 @@ class State:
 
     def solids(self, look: Look) -> list[Solid | Glyph]:
         """The rod, its stripe, what holds it and what loads it."""
-        around = (ROD, 1.0, np.linspace(-np.pi, np.pi, 49)[:-1]), (STRIPE, 1.02, np.linspace(-0.3, 0.3, 9))
-        outlines = [(size * profile_of(self.s, self.setting.section, angles), color) for color, size, angles in around]
-        rods = [rod(self.centres, self.directors, look.radius * outline, color) for outline, color in outlines]
-        return [*rods, *glyphs_of(self.setting, self.s, (self.centres, self.directors), look)]
+        pose = self.centres, self.directors
+        rods = striped((self.s, *pose), self.setting.section, look.radius, (ROD, STRIPE))
+        return [*rods, *glyphs_of(self.setting, self.s, pose, look)]
 
 
 def _read(states: Path, branch: str, row: int, count: int = 800) -> State:

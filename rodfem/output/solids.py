@@ -7,6 +7,7 @@ whose map is stretched along its axis.  All bodies are lofts through closed ring
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -176,6 +177,24 @@ def rod(centres: Floats, frames: Floats, profile: Floats, color: str) -> Solid:
     ``color`` is its colour.
     """
     return Solid(*_loft(centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], profile)), color)
+
+
+def striped(
+    pose: tuple[Floats, Floats, Floats],
+    section: tuple[Floats, Floats] | None,
+    radius: float,
+    colors: Sequence[str],
+    sides: int = 2 * SIDES,
+) -> list[Solid]:
+    """A rod of a mean ``radius`` with a stripe along d1, in its ``pose``.
+
+    That has arclengths (n,), centreline (n, 3) and directors (n, 3, 3); ``section`` is that of :func:`profile_of`,
+    ``colors`` are those of the rod, of so many ``sides``, and of the stripe.
+    """
+    s, *place = pose
+    around = (1.0, np.linspace(-np.pi, np.pi, sides + 1)[:-1]), (1.02, np.linspace(-0.3, 0.3, sides // 6 + 1))
+    outlines = [size * radius * profile_of(s, section, angles) for size, angles in around]
+    return [rod(*place, outline, color) for outline, color in zip(outlines, colors, strict=True)]
 
 
 def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats) -> Floats:
