@@ -1383,7 +1383,7 @@ FAULTS = {
         LOCI,
     ),
     "stable-side-beyond-a-crossing": Fault(
-        "rodfem/output/stable_region.py", "if passed(one).any() or not side", "if not side", LOCI
+        "rodfem/output/stable_region.py", "if crossed or not side", "if not side", LOCI
     ),
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/criteria.py", "curve.part > IMPERFECT", "curve.part > 1e9", LOCI

@@ -285,14 +285,18 @@ class Report(Observer):
             for name, kind, *numbers, index, remarks in (row for row in rows if row[0] == branch.name):
                 self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
                 self.lines(remarks)
-            for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
-                self.warn(f"{branch.name}: {sentence}")
+            self._doubts(branch)
         if coarse := sum(s.resolved is False for s in special):
             self.warn(
                 f"The mesh does not resolve {many(coarse, 'special point')}: the value in parentheses is no bound "
                 "there, and whether the rod has such a point is open; use more elements or a higher degree."
             )
         self._not_followed(branches, most)
+
+    def _doubts(self, branch: Branch) -> None:
+        """Say where the index of a branch is not explained, and whether its first state is singular."""
+        for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
+            self.warn(f"{branch.name}: {sentence}")
 
     def _not_followed(self, branches: Sequence[Branch], most: int) -> None:
         """Say how many branch points were not followed, why, and what would follow them."""
@@ -337,12 +341,13 @@ class Report(Observer):
         )
         shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
         table = [_roots(p, self.units.omega2**0.5) for p in shown]
-        kinds = sorted({kind for words in table for kind in words})
-        widths = {kind: max(len(words.get(kind, "")) for words in [*table, {kind: kind}]) for kind in kinds}
-        heads = [f"{load:>10}", *(f"{in_decimals(p.load, 4, self.units.load):>10}" for p in shown)]
-        for head, words in zip(heads, [dict(zip(kinds, kinds, strict=True)), *table], strict=True):
+        kinds = sorted(set().union(*table))
+        table.insert(0, dict(zip(kinds, kinds, strict=True)))
+        widths = {kind: max(len(words.get(kind, "")) for words in table) for kind in kinds}
+        heads = [load, *(in_decimals(p.load, 4, self.units.load) for p in shown)]
+        for head, words in zip(heads, table, strict=True):
             cells = "   ".join(f"{words.get(kind, ''):<{width}}" for kind, width in widths.items())
-            self.say(f"  {head}  {cells}".rstrip())
+            self.say(f"  {head:>10}  {cells}".rstrip())
         if "torsion" not in widths:
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 

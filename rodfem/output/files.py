@@ -61,19 +61,18 @@ def as_data(
     """
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
-    s = clock.seconds
-    points = sum(len(b.points) for b in branches)
+    load, ordinate = scene.parameters[scene.load], scene.ordinate
     return {
         "format": DIAGRAM.mark(),
         "scene": scene.name,
         "title": scene.title or scene.name,
         "parameter": scene.load,
-        "parameter_label": scene.parameters[scene.load].label or scene.load,
-        "parameter_words": scene.parameters[scene.load].words,
-        "parameter_unit": scene.parameters[scene.load].unit,
-        "ordinate": scene.ordinate.name,
-        "ordinate_label": scene.ordinate.label or scene.ordinate.name,
-        "ordinate_unit": scene.ordinate.unit,
+        "parameter_label": load.label or scene.load,
+        "parameter_words": load.words,
+        "parameter_unit": load.unit,
+        "ordinate": ordinate.name,
+        "ordinate_label": ordinate.label or ordinate.name,
+        "ordinate_unit": ordinate.unit,
         "natural": {name: getattr(scene.units, name) for name in NATURAL},
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
@@ -85,14 +84,14 @@ def as_data(
         "branch_points_not_followed": not_followed(branches),
         "meshes": [_mesh_data(s.fields) for s in systems],
         "branches": [branch_data(b) for b in branches],
-        "timing": {
-            **{f"{name.replace(' ', '_')}_s": s.get(name, 0.0) for name in PARTS},
-            "total_s": clock.total(),
-            "points": points,
-            "ms_per_point": clock.each(points),
-            "ranks": system.comm.size,
-        },
+        "timing": _timing(clock, sum(len(b.points) for b in branches)) | {"ranks": system.comm.size},
     }
+
+
+def _timing(clock: Clock, points: int) -> dict[str, Any]:
+    """Times of the parts of a run, of all of it, and of each of so many points."""
+    parts = {f"{name.replace(' ', '_')}_s": clock.seconds.get(name, 0.0) for name in PARTS}
+    return parts | {"total_s": clock.total(), "points": points, "ms_per_point": clock.each(points)}
 
 
 def _mesh_data(fields: Fields) -> dict[str, Any]:
@@ -237,41 +236,40 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
     formulation, or lacks an unknown of the scene.  ``path`` is that of ``states.h5``, ``row`` the number of the row of
     ``branch``; the state is one of ``solver``.
     """
+    system = solver.system
+    sample = _sample(path, branch, row, system.fields.discretization.formulation)
+    names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
+    if missing := [name for name in ("s", "elements", *names) if name not in sample]:
+        raise InputError(
+            f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
+            "another scene, or by another version of rodfem; run the scene again."
+        )
+    _check_sound(sample, path)
+    try:
+        return solver.shape.restore(sample)
+    except UNREADABLE as trouble:
+        raise InputError(
+            f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
+            "run the scene again."
+        ) from trouble
+
+
+def _sample(path: Path, branch: str, row: int, formulation: str) -> dict[str, Any]:
+    """Arrays of a row of a file, whose states have to be of a formulation."""
     import h5py
 
-    wanted = solver.system.fields.discretization.formulation
     try:
         with h5py.File(path, "r") as file:
             STATES.check_hdf5(file, ("formulation", "branches"))
-            if file.attrs["formulation"] != wanted:
-                raise InputError(
-                    f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
-                )
-            group = file[f"branches/{branch}"]
-            sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
+            found, group = file.attrs["formulation"], file[f"branches/{branch}"]
+            if found != formulation:
+                raise InputError(f"{path} holds states of the {found} formulation: choose that, not {formulation}.")
+            return {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
     except UNREADABLE as trouble:
         if isinstance(trouble, InputError):
             raise
         raise InputError(
             f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
-        ) from trouble
-    system = solver.system
-    wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
-    missing = [name for name in ("s", "elements", *wanted_names) if name not in sample]
-    if missing:
-        raise InputError(
-            f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
-            "another scene, or by another version of rodfem; run the scene again."
-        )
-    try:
-        _check_sound(sample, path)
-        return solver.shape.restore(sample)
-    except UNREADABLE as trouble:
-        if isinstance(trouble, InputError):
-            raise
-        raise InputError(
-            f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
-            "run the scene again."
         ) from trouble
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.modes.modes import RIGID
-from rodfem.output.intervals import intervals_of
+from rodfem.output.intervals import Interval, intervals_of
 from rodfem.output.pieces import STABLE
 from rodfem.output.style import PALETTE
 
@@ -89,17 +89,22 @@ def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()
 
     With its ``special`` points curves have points between rows where two frequencies meet.
     """
+    found = _members(columns)
+    met = [point for point in special if point["kind"] == FLUTTER and point.get("omega2") is not None]
+    for point in met:
+        for number, extra in _beside(columns["load"], found, point, {p["row"] for p in met}).items():
+            found[number] = [member for member in found[number] if member[0] != extra[0][0]] + extra
+    return sorted(map(_curve, found.values()), key=lambda curve: (curve.motion, abs(curve.roots[0])))
+
+
+def _members(columns: Mapping[str, Any]) -> Members:
     found: Members = {}
     each = (columns[name] for name in ("load", "omega2", "motion", "curve"))
     for row, (load, *modes) in enumerate(zip(*each, strict=True)):
         for pair, motion, number in zip(*modes, strict=True):
             mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
             found.setdefault(number, []).append((load, row, mu, motion))
-    met = [point for point in special if point["kind"] == FLUTTER and point.get("omega2") is not None]
-    for point in met:
-        for number, extra in _beside(columns["load"], found, point, {p["row"] for p in met}).items():
-            found[number] = [member for member in found[number] if member[0] != extra[0][0]] + extra
-    return sorted(map(_curve, found.values()), key=lambda curve: (curve.motion, abs(curve.roots[0])))
+    return found
 
 
 def _curve(members: list[tuple[float, int, complex, str]]) -> FrequencyCurve:
@@ -112,11 +117,11 @@ def _beside(loads: Sequence[float], known: Members, point: Mapping[str, Any], ot
     """Points beside one flutter load, that of the load itself first; ``others`` are the rows of all of them."""
     row, mean = int(point["row"]), float(point["omega2"])
     at = {number: {member[1]: member[2] for member in members} for number, members in known.items()}
-    met = [number for number, values in at.items() if row in values and abs(values[row] - mean) <= LEAST * abs(mean)]
+    met = [number for number, values in at.items() if abs(values.get(row, np.inf) - mean) <= LEAST * abs(mean)]
     found = {number: [(loads[row], row, complex(mean))] for number in met}
     for rows in ((row - 1, row - 2), (row + 1, row + 2)):
-        if len(met) % 2 == 0 and not others & {*rows} and all(i in at[number] for number in met for i in rows):
-            values = np.array([[mean] * len(met), *([at[number][i] for number in met] for i in rows)])
+        values = np.array([[mean] * len(met), *([at[number].get(i, np.nan) for number in met] for i in rows)])
+        if len(met) % 2 == 0 and not others & {*rows} and np.isfinite(values).all():
             for number, extra in zip(met, _side(loads, (row, *rows), values), strict=True):
                 found[number] += extra
     return {number: [(*place, known[number][-1][3]) for place in places] for number, places in found.items()}
@@ -140,17 +145,20 @@ def _side(loads: Sequence[float], rows: tuple[int, int, int], mu: Any) -> list[l
 
 def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:
     """Ranges of the load in which a branch is unstable in one way."""
-    loads, omega2 = (branch["columns"][name] for name in ("load", "omega2"))
     for interval in (interval for interval in intervals_of(branch) if interval.kind != STABLE):
-        values = [[complex(*v) for v in row] for row in omega2[interval.first : interval.last + 1]]
-        least = REAL * max(abs(v) for row in values for v in row)
-        # a step is what either end is: at critical loads eigenvalues are still real, or zero
-        steps = [a | b for a, b in pairwise(_kinds(row, least) for row in values)]
-        for kind, group in groupby(enumerate(steps, interval.first), lambda step: step[1]):
+        for kind, group in groupby(enumerate(_unstable(interval), interval.first), lambda step: step[1]):
             places = [row for row, _ in group]
-            ends = loads[places[0]], loads[places[-1] + 1]
+            ends = [branch["columns"]["load"][row] for row in (places[0], places[-1] + 1)]
             words = "range of " + (" and ".join(k for k in (FLUTTER, DIVERGENCE) if k in kind) or "instability")
             yield Range(min(ends), max(ends), words, RANGES[2 if len(kind) > 1 else int(FLUTTER in kind)])
+
+
+def _unstable(interval: Interval) -> list[frozenset[str]]:
+    """Kinds of instability in each step: of either end, as at critical loads eigenvalues are still real, or zero."""
+    rows = interval.branch["columns"]["omega2"][interval.first : interval.last + 1]
+    values = [[complex(*v) for v in row] for row in rows]
+    least = REAL * max(abs(v) for row in values for v in row)
+    return [a | b for a, b in pairwise(_kinds(row, least) for row in values)]
 
 
 def _kinds(values: Sequence[complex], least: float) -> frozenset[str]:

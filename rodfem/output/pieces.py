@@ -67,24 +67,27 @@ def pieces_of(branch: Branch) -> list[Piece]:
     rows = len(columns["load"])
     if not rows == len(columns["ordinate"]) == len(columns["negative"]):
         raise ValueError(f"columns of branch {branch['name']!r} differ in length: try to compute the diagram anew")
-    before, after, space = dict[int, int](), dict[int, int](), _in_space(branch)
-    for row, left, right in _indices(branch):
-        before |= {} if left is None else {row: left}
-        after |= {} if right is None else {row: right}
+    known = {(row, side): index for row, *sides in _indices(branch) for side, index in enumerate(sides)}
     kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
-    off = _off_kinks(columns["negative"], kink)
-    steps = []
+    off, steps = _off_kinks(columns["negative"], kink), []
     for a, b in pairwise(range(rows)):
         on = kink[a] if kink[b] else ""
         own = columns["negative"] if on else off
-        start = after.get(a, own[a]), 0 if a in after else undecided[a]
-        end = before.get(b, own[b]), 0 if b in before else undecided[b]
-        least = min(start[0], end[0])
-        if undecided[a] or undecided[b]:
-            steps.append((least, max(sum(start), sum(end)) - least, on))
-        else:
-            steps.append((after.get(a, before.get(b, max(own[a], own[b]))), 0, on))
-    return _grouped(steps, space)
+        ends = [(known.get(end), own[end[0]], undecided[end[0]]) for end in ((a, 1), (b, 0))]
+        steps.append((*_index(ends), on))
+    return _grouped(steps, _in_space(branch))
+
+
+def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
+    """Least index between two rows, and how many eigenvalues may be negative besides.
+
+    Of either end it is known or not, then the index of the row, and the number of undecided eigenvalues there.
+    """
+    if not any(undecided for _, _, undecided in ends):
+        sure = [known for known, _, _ in ends if known is not None]
+        return (sure or [max(own for _, own, _ in ends)])[0], 0
+    least = min(own if known is None else known for known, own, _ in ends)
+    return least, max(own + undecided if known is None else known for known, own, undecided in ends) - least
 
 
 def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> list[Piece]:
@@ -107,9 +110,12 @@ def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
         yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
         yield from _beside(columns["load"], point) if point.get("negative_after") is not None else ()
     if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
-        s, undecided = columns["arclength"], columns["undecided"]
-        near = [row for row in range(1, len(s) - 1) if s[row] - s[0] < COINCIDE and undecided[row]]
+        near = _at_the_origin(columns["arclength"], columns["undecided"])
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
+
+
+def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
+    return [row for row in range(1, len(s) - 1) if s[row] - s[0] < COINCIDE and undecided[row]]
 
 
 def _beside(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
@@ -142,8 +148,8 @@ def _in_space(branch: Branch) -> list[int]:
 
 def endings(branch: Branch) -> list[tuple[int, str]]:
     """First and last row of a branch of ``diagram.json``, each with the reason, where it is not the range that ends."""
-    notes = [str(special.get("note") or "") for special in branch.get("special", []) if special["row"] == 0]
-    begun = next((note.removeprefix(BEGINS) for note in notes if note.startswith(BEGINS)), "")
+    notes = "".join(str(special.get("note") or "") for special in branch.get("special", []) if special["row"] == 0)
+    begun = notes.partition(BEGINS)[2]
     ends = (0, begun), (len(branch["columns"]["load"]) - 1, str(branch.get("ended") or ""))
     reasons = [(row, re.split(r" at |:| any more", sentence)[0]) for row, sentence in ends]
     return [(row, reason) for row, reason in reasons if not reason.startswith(MEETS) and reason not in COMPLETE]

@@ -134,19 +134,20 @@ def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Li
         lines += new
         shape, places = SHAPES[number // HUES % len(SHAPES)], _places(branch)
         handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"]))
-        if shape:
-            axes.plot(*places.T, ls="", marker=shape, ms=5.0, color=colour, markevery=0.08, zorder=3)
-        if not new:
-            axes.plot(*places.T, ".", color=colour, markersize=9)
+        if shape or not new:
+            axes.plot(*places.T, ls="", marker=shape or "o", ms=5.0, color=colour, markevery=0.08, zorder=3)
     for line in sorted(lines, key=lambda line: -line.piece.negative):  # the stable ones on top: see _uncover
         axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind])
+    return handles + _kinds(lines) + _draw_images(axes, branches) + _draw_marks(axes, branches), lines
+
+
+def _kinds(lines: Sequence[Line]) -> list[Line2D]:
+    """Handles of the legend for the kinds of lines, and for the indices beside them."""
     kinds = {line.piece.kind for line in lines}
-    handles += [Line2D([], [], color="0.45", label=kind, **style) for kind, style in LINES.items() if kind in kinds]
-    if lines:
-        in_space = any(line.piece.in_space is not None for line in lines)
-        words = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
-        handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words))
-    return handles + _draw_images(axes, branches) + _draw_marks(axes, branches), lines
+    out = [Line2D([], [], color="0.45", label=kind, **style) for kind, style in LINES.items() if kind in kinds]
+    in_space = any(line.piece.in_space is not None for line in lines)
+    words = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
+    return out + [Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words)] * bool(lines)
 
 
 def _draw_images(axes: Axes, branches: Branches) -> list[Line2D]:
@@ -280,15 +281,17 @@ def _about(diagram: Mapping[str, Any]) -> str:
     if d and diagram.get("accuracy"):
         parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
     special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
-    counted = [point for point in special if point["kind"] in COUNTED]
-    errors = [point.get("error_estimate") for point in counted if point.get("resolved") is not False]
-    known = [abs(error) for error in errors if error is not None and math.isfinite(error)]
-    if known:
-        share = f" (of {len(known)} out of {len(counted)})" if len(known) < len(counted) else ""
-        parts.append(f"error of the loads of special points at most {at_most(max(known))}{share}")
-    if coarse := sum(point.get("resolved") is False for point in special):
-        parts.append(f"{coarse} of {len(special)} special points not resolved by the mesh")
-    return "; ".join(parts)
+    coarse = sum(point.get("resolved") is False for point in special)
+    parts += [f"{coarse} of {len(special)} special points not resolved by the mesh"] * bool(coarse)
+    return "; ".join([*parts[:1], *_accuracy([point for point in special if point["kind"] in COUNTED]), *parts[1:]])
+
+
+def _accuracy(special: Branches) -> list[str]:
+    """Greatest bound of the errors of special points in words; nothing where none is known."""
+    bars = [point.get("error_estimate") for point in special if point.get("resolved") is not False]
+    known = [abs(bar) for bar in bars if bar is not None and math.isfinite(bar)]
+    share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
+    return [f"error of the loads of special points at most {at_most(max(known))}{share}"] if known else []
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -59,23 +59,28 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     intervals, load, name = intervals_of(branch), data["parameter"], _subject(branch, data)
     if not intervals:
         return f"{name} has one state only; {_end(branch)}."
-    told = intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
     start, stop = told_apart(intervals[0].loads[0], intervals[-1].loads[1], width=_width(data))
-    states = [_state(interval, data) for interval in told]
-    places = [change_in_words(one, after, data["branches"]) for one, after in zip(told, intervals[1:], strict=False)]
-    changes = [f"to {where}, where it {what}" for where, what in places]
-    parts = [f"{name} is {states[0]} from {load} = {start} {changes[0]}"] if changes else []
-    parts += [f"then {state} {change}" for state, change in zip(states[1:], changes[1:], strict=False)]
     if len(intervals) == 1:
         coarse = any(special.get("resolved") is False for special in branch["special"])
-        doubt = UNRESOLVED if coarse else ""
-        parts.append(f"{name} is {states[0]} on its whole range, from {load} = {start} to {stop}{doubt}")
-    elif len(intervals) == len(told):
-        parts.append(f"then {states[-1]} to {stop}")
+        state, doubt = _state(intervals[0], data), UNRESOLVED if coarse else ""
+        parts = [f"{name} is {state} on its whole range, from {load} = {start} to {stop}{doubt}"]
+    else:
+        (state, end), *others = _changes(intervals, data, stop)
+        parts = [f"{name} is {state} from {load} = {start} {end}", *(f"then {state} {end}" for state, end in others)]
+    return "; ".join(parts + ([] if branch["ended"] == "end of range" else [_end(branch)])) + "."
+
+
+def _changes(intervals: Sequence[Interval], data: Mapping[str, Any], stop: str) -> Iterator[tuple[str, str]]:
+    """States of intervals in order, each with what happens at its end; only the first of many."""
+    told = intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
+    for one, after in zip(told, intervals[1:], strict=False):
+        where, what = change_in_words(one, after, data["branches"])
+        yield _state(one, data), f"to {where}, where it {what}"
+    if len(intervals) == len(told):
+        yield _state(told[-1], data), f"to {stop}"
     else:
         more = many(len(intervals) - 1 - len(told), "time")
-        parts.append(f"then its stability changes {more} more before {load} = {stop}")
-    return "; ".join(parts + ([] if branch["ended"] == "end of range" else [_end(branch)])) + "."
+        yield "its stability", f"changes {more} more before {data['parameter']} = {stop}"
 
 
 def _end(branch: Mapping[str, Any]) -> str:

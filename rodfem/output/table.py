@@ -125,25 +125,35 @@ def special_data(special: SpecialPoint) -> dict[str, Any]:
 
 def point_values(columns: Mapping[str, Sequence[Any]], row: int) -> dict[str, Any]:
     """Attributes of the point in a row of a file, as :class:`~rodfem.continuation.branch.Point` takes them."""
-    found = {entry: columns[entry.name][row] for entry in COLUMNS if entry.of is None and entry.name in columns}
-    known = {e.name: nan if x is None else x for e, x in found.items() if x is not None or e.always}
-    parts = [columns[name][row] if name in columns else [] for name in ("soft", "soft_value", "soft_uncertainty")]
-    return known | {"soft": [SoftMode(*mode, inf if bar is None else bar) for *mode, bar in zip(*parts, strict=True)]}
+    found = {name: column[row] for name, column in columns.items()}
+    own = [entry for entry in COLUMNS if entry.of is None and entry.name in found]
+    known = {e.name: _number(found[e.name]) for e in own if e.always or found[e.name] is not None}
+    return known | {"soft": soft_modes(found)}
+
+
+def soft_modes(row: Data) -> list[SoftMode]:
+    """Soft modes of the row of these columns."""
+    parts = [row.get(name) or [] for name in ("soft", "soft_value", "soft_uncertainty")]
+    return [SoftMode(*mode, inf if bar is None else bar) for *mode, bar in zip(*parts, strict=True)]
 
 
 def special_values(entry: Data) -> dict[str, Any]:
     """Attributes of a special point of a file, as :class:`~rodfem.continuation.branch.SpecialPoint` takes them."""
-    names = {
-        "ordinate_error_estimate": "ordinate_error",
-        "omega2_error_estimate": "omega2_error",
-        "followed": "switched",
-    }
-    read = [e.name for e in SPECIAL if e.of is None and e.name != "multiplicity"] + [*names]
-    values = {names.get(name, name): nan if entry.get(name) is None else entry[name] for name in read}
-    law = {name: nan if value is None else value for name, value in (entry["law"] or {}).items()}
-    values["law"] = NormalForm(**{x: law[x] for x in NormalForm.__annotations__ if x in law}) if law else None
-    values["connects_to"] = (entry["meets"][0], entry["meets"][1]) if entry["meets"] else None
-    return values | {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
+    names = {f"{name}_error_estimate": f"{name}_error" for name in ("ordinate", "omega2")} | {"followed": "switched"}
+    read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")] + [*names]
+    values = {names.get(name, name): _number(entry.get(name)) for name in read}
+    values |= {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
+    values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
+    return values | {"law": _law(entry["law"]) if entry["law"] else None}
+
+
+def _law(law: Data) -> NormalForm:
+    return NormalForm(**{name: _number(law[name]) for name in NormalForm.__annotations__ if name in law})
+
+
+def _number(value: Any) -> Any:
+    """Value of a file, in which null stands for what is not finite."""
+    return nan if value is None else value
 
 
 def _is_count(x: Any) -> bool:

@@ -15,7 +15,8 @@ from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH
 from rodfem.continuation.kinds import FLUTTER, KINDS
 from rodfem.output.digits import NO_ESTIMATE, number
 from rodfem.output.pieces import is_solved
-from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, index_range, on_kink
+from rodfem.output.table import soft_modes
+from rodfem.stability.soft_mode import ONE_SIDE, index_range, on_kink
 from rodfem.tolerances import unit
 
 Data = Mapping[str, Any]
@@ -72,10 +73,12 @@ def scale_of(data: Data) -> float:
 
 def special_in_words(branch: Data, special: Data, scale: float = 0.0) -> tuple[str, str, str]:
     """Load, ordinate and index of a special point; a load that is given is exact.  ``scale`` is that of ordinates."""
-    bars = [special.get(name) for name in ("error_estimate", "ordinate_error_estimate")]
-    sizes = zip(READ, bars, (0.0, scale), strict=True)
+    resolved, bars = (
+        special.get("resolved"),
+        (_bar(special, "error_estimate"), _bar(special, "ordinate_error_estimate")),
+    )
     load, ordinate = (
-        number(special[x], inf if bar is None else bar, special.get("resolved"), s) for x, bar, s in sizes
+        number(special[name], bar, resolved, size) for name, bar, size in zip(READ, bars, (0.0, scale), strict=True)
     )
     if KINDS[special["kind"]].given and not is_solved(branch, special):
         load = f"{special['load']:.10g}"
@@ -90,18 +93,24 @@ def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
         load, ordinate, index = special_in_words(branch, special, scale)
         load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
         index += f", {special['zero']} zero" if special["zero"] else ""
-        remarks = [str(mode) for mode in soft_modes(row_of(branch, special["row"]))]
-        if special["kind"] == FLUTTER and special.get("omega2") is not None:
-            bar = special.get("omega2_error_estimate")
-            remarks.append(f"double eigenvalue omega^2 = {number(special['omega2'], inf if bar is None else bar)}")
-        remarks += [special["note"]] if special.get("note") else []
+        remarks = _remarks(special, row_of(branch, special["row"]))
         yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, remarks
 
 
-def soft_modes(row: Data) -> list[SoftMode]:
-    """Soft modes of the row of these columns."""
-    parts = [row.get(name) or [] for name in ("soft", "soft_value", "soft_uncertainty")]
-    return [SoftMode(*mode, inf if bar is None else bar) for *mode, bar in zip(*parts, strict=True)]
+def _remarks(special: Data, row: Data) -> list[str]:
+    """What else there is to say of a special point, whose columns are ``row``."""
+    remarks = [str(mode) for mode in soft_modes(row)]
+    if special["kind"] == FLUTTER and special.get("omega2") is not None:
+        remarks.append(
+            f"double eigenvalue omega^2 = {number(special['omega2'], _bar(special, 'omega2_error_estimate'))}"
+        )
+    return remarks + ([special["note"]] if special.get("note") else [])
+
+
+def _bar(special: Data, name: str) -> float:
+    """A bound of an error; not finite where there is none."""
+    found = special.get(name)
+    return inf if found is None else found
 
 
 def law_in_words(special: Data) -> str:
@@ -124,17 +133,20 @@ def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, st
     """
     columns = branch["columns"]
     relative = columns.get("estimate") or [None] * len(columns["load"])
-    found: list[dict[str, str]] = []
-    for row, error in enumerate(relative):
-        sizes = natural if error is not None else {}
-        values = {name: columns[name][row] for name in READ if name in sizes}
-        found.append({name: number(x, error * unit(x, one=sizes[name])) for name, x in values.items() if x is not None})
+    found = [_reading({name: columns[name][row] for name in READ if name in natural}, error, natural)
+             for row, error in enumerate(relative)]  # fmt: skip
     for special in branch["special"]:
         bars = zip(READ, (special.get("error_estimate"), special.get("ordinate_error_estimate")), strict=True)
         here = {name: number(special[name], x, special.get("resolved")) for name, x in bars if x is not None}
         given = KINDS[special["kind"]].given and not is_solved(branch, special)
         found[special["row"]] = here | ({"load": f"{special['load']:.10g} {GIVEN}"} if given else {})
     return found
+
+
+def _reading(values: Data, error: float | None, natural: Mapping[str, float]) -> dict[str, str]:
+    """Numbers of a row by name, with bounds of a relative error."""
+    known = {} if error is None else {name: value for name, value in values.items() if value is not None}
+    return {name: number(x, error * unit(x, one=natural[name])) for name, x in known.items()}  # type: ignore[operator]
 
 
 # --- rows -------------------------------------------------------------------------------------------------------------
@@ -183,21 +195,25 @@ def _stability(row: Data) -> Words:
         return Words(UNDECIDED, index_range(negative, undecided, row["kink"]), sentence)
     if "omega2" in row:
         return _of_frequencies(negative, row["omega2"])
-    zero = row["zero"]
-    neutral = f" {many(zero, 'eigenvalue')} {'is' if zero == 1 else 'are'} zero." if zero else ""
-    number_of = f"Unstable: {many(negative, 'negative eigenvalue')}"
+    verdict = UNSTABLE if negative else UNDECIDED if undecided else PLANAR if space else STABLE
+    index = index_range(negative, undecided) + ("" if space is None or undecided else f" ({space})")
+    return Words(verdict, index, f"{_verdict(negative, undecided, space)}.{_neutral(row['zero'])}")
+
+
+def _verdict(negative: int, undecided: int, space: int | None) -> str:
+    """Stability in words, by numbers of eigenvalues: negative ones, undecided ones, and negative ones in space."""
     if undecided:
-        sentence = (
-            f"{f'{number_of}, and' if negative else 'Stability undecided:'} {_too_near_zero(undecided)}.{neutral}"
-        )
-        return Words(UNSTABLE if negative else UNDECIDED, index_range(negative, undecided), sentence)
-    index = str(negative) if space is None else f"{negative} ({space})"
+        begin = f"Unstable: {many(negative, 'negative eigenvalue')}, and" if negative else "Stability undecided:"
+        return f"{begin} {_too_near_zero(undecided)}"
     if negative:
-        return Words(UNSTABLE, index, f"{number_of}.{neutral}")
+        return f"Unstable: {many(negative, 'negative eigenvalue')}"
     if space:
-        there = f"{many(space, 'negative eigenvalue')} there"
-        return Words(PLANAR, index, f"Stable in the plane, unstable in space: {there}.{neutral}")
-    return Words(STABLE, index, f"Stable: no negative eigenvalue of the second variation.{neutral}")
+        return f"Stable in the plane, unstable in space: {many(space, 'negative eigenvalue')} there"
+    return "Stable: no negative eigenvalue of the second variation"
+
+
+def _neutral(zero: int) -> str:
+    return f" {many(zero, 'eigenvalue')} {'is' if zero == 1 else 'are'} zero." if zero else ""
 
 
 def _too_near_zero(undecided: int) -> str:
