@@ -28,7 +28,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_decimals, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
 from rodfem.output.table import row_data, special_data
-from rodfem.output.words import COUNT, INDEX, index_in_words, law_in_words, many, table_of
+from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, law_in_words, many, table_of
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -274,17 +274,16 @@ class Report(Observer):
 
         ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
         """
-        load, ordinate = (with_unit(data[name], data.get(f"{name}_unit") or "") for name in ("parameter", "ordinate"))
+        load, ordinate = (with_unit(data[x], data.get(f"{x}_unit") or "") for x in ("parameter", "ordinate"))
         special, rows = [s for branch in branches for s in branch.special], list(table_of(data))
-        known = any(isfinite(s.error_estimate) for s in special)
-        bars = "in parentheses a bound of the error" if known else "no estimate of the errors"
+        bars = "in parentheses a bound of the error" if is_estimated(data) else "no estimate of the errors"
         self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
         wide = max([len("branch point"), *(len(row[1]) for row in rows)])
         self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
+        for name, kind, *numbers, index, remarks in rows:
+            self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
+            self.lines(remarks)
         for branch in branches:
-            for name, kind, *numbers, index, remarks in (row for row in rows if row[0] == branch.name):
-                self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
-                self.lines(remarks)
             self._doubts(branch)
         if coarse := sum(s.resolved is False for s in special):
             self.warn(
@@ -334,12 +333,15 @@ class Report(Observer):
     def frequencies(self, branches: Sequence[Branch], load: str, rows: int = 11) -> None:
         """Print the square roots of the left-most eigenvalues against the load, if the scene has them."""
         points = [p for b in branches for p in b.points if p.omega2]
-        if not points:
-            return
-        self.say(
-            f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load} (errors not estimated)"
-        )
         shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
+        if points:
+            self.say(
+                f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load} "
+                "(errors not estimated)"
+            )
+            self._frequencies(shown, load)
+
+    def _frequencies(self, shown: Sequence[Point], load: str) -> None:
         table = [_roots(p, self.units.omega2**0.5) for p in shown]
         kinds = sorted(set().union(*table))
         table.insert(0, dict(zip(kinds, kinds, strict=True)))

@@ -81,10 +81,9 @@ def _columns(columns: Mapping[str, list[Any]], stored: Mapping[str, Floats]) -> 
 
 def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
     """Nodal values of each row, without the nodes that only rows of finer meshes have."""
-    s = stored["s"]
+    s, out = stored["s"], dict[str, list[Floats]]()
     others = {POINTS, *PROFILES, *PROFILES.values()}
-    nodal = {name: x for name, x in stored.items() if x.ndim > 1 and x.shape[:2] == s.shape and name not in others}
-    out: dict[str, list[Floats]] = {}
+    nodal = {name: x for name, x in stored.items() if x.shape[:2] == s.shape and name not in others}
     for row, there in enumerate(np.isfinite(s)):
         here = {name: x[row, there] for name, x in nodal.items()}
         frames = directors(here["q"])
@@ -196,7 +195,7 @@ def to_csv(folder: Path, target: Path) -> list[Path]:
 def _table(rows: list[dict[str, Any]]) -> bytes:
     """Rows as text, numbers with all their digits, nothing where there is none."""
     names = list(dict.fromkeys(name for row in rows for name in row))
-    lines = [names, *([row.get(name) for name in names] for row in rows)]
+    lines: list[list[Any]] = [names, *([row.get(name) for name in names] for row in rows)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([["" if x is None else repr(x) if isinstance(x, float) else x for x in line] for line in lines])

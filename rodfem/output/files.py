@@ -18,7 +18,6 @@ import numpy as np
 from rodfem.continuation.branch import Branch, not_followed
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
-from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
 from rodfem.modes.perturbation import Motion, Motions
@@ -42,6 +41,7 @@ NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")
 """Numbers whose natural sizes stand in the file."""
 PARTS = ("assembly", "solve", "stability", "location", "error bars", "modes", "setup")
 """Parts of a run whose times stand in the file."""
+MEANING = {column.name: column.words for column in COLUMNS}
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
 """Meaning of ``negative`` where loads have no potential."""
 
@@ -80,10 +80,10 @@ def as_data(
         "discretization": mesh_of(system),
         "accuracy": accuracy,
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
-        "meaning": {x.name: x.words for x in COLUMNS} | ({} if scene.conservative else {"negative": UNSTABLE}),
+        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
         "branch_points_not_followed": not_followed(branches),
-        "meshes": [_mesh_data(s.fields) for s in systems],
-        "branches": [branch_data(b) for b in branches],
+        "meshes": list(map(_mesh_data, systems)),
+        "branches": list(map(branch_data, branches)),
         "timing": _timing(clock, sum(len(b.points) for b in branches)) | {"ranks": system.comm.size},
     }
 
@@ -94,8 +94,8 @@ def _timing(clock: Clock, points: int) -> dict[str, Any]:
     return parts | {"total_s": clock.total(), "points": points, "ms_per_point": clock.each(points)}
 
 
-def _mesh_data(fields: Fields) -> dict[str, Any]:
-    d = fields.discretization
+def _mesh_data(system: System) -> dict[str, Any]:
+    fields, d = system.fields, system.fields.discretization
     return {
         "elements": d.elements,
         "degree": d.degree,

@@ -110,21 +110,26 @@ def _members(columns: Mapping[str, Any]) -> Members:
 def _curve(members: list[tuple[float, int, complex, str]]) -> FrequencyCurve:
     loads, rows, values, motions = zip(*sorted(members, key=lambda member: member[0]), strict=True)
     motion = Counter(motions).most_common(1)[0][0]
-    return FrequencyCurve(motion, np.array(loads), np.array(rows), np.array(values) ** 0.5)
+    return FrequencyCurve(motion, np.array(loads), np.array(rows), np.sqrt(np.array(values, dtype=np.complex128)))
 
 
 def _beside(loads: Sequence[float], known: Members, point: Mapping[str, Any], others: set[int]) -> Members:
     """Points beside one flutter load, that of the load itself first; ``others`` are the rows of all of them."""
     row, mean = int(point["row"]), float(point["omega2"])
-    at = {number: {member[1]: member[2] for member in members} for number, members in known.items()}
-    met = [number for number, values in at.items() if abs(values.get(row, np.inf) - mean) <= LEAST * abs(mean)]
+    at = {number: {i: mu for _, i, mu, _ in members} for number, members in known.items()}
+    met = [number for number in at if abs(at[number].get(row, np.inf) - mean) <= LEAST * abs(mean)]
     found = {number: [(loads[row], row, complex(mean))] for number in met}
-    for rows in ((row - 1, row - 2), (row + 1, row + 2)):
-        values = np.array([[mean] * len(met), *([at[number].get(i, np.nan) for number in met] for i in rows)])
-        if len(met) % 2 == 0 and not others & {*rows} and np.isfinite(values).all():
-            for number, extra in zip(met, _side(loads, (row, *rows), values), strict=True):
-                found[number] += extra
+    for rows in ((row, row - 1, row - 2), (row, row + 1, row + 2)):
+        values = np.array([[mean] * len(met), *(_at(at, met, i) for i in rows[1:] if i not in others)])
+        if len(met) % 2 == 0 and values.shape[0] == len(rows) and np.isfinite(values).all():
+            for places, extra in zip(found.values(), _side(loads, rows, values), strict=True):
+                places += extra
     return {number: [(*place, known[number][-1][3]) for place in places] for number, places in found.items()}
+
+
+def _at(values: Mapping[int, Mapping[int, complex]], numbers: Sequence[int], row: int) -> list[complex]:
+    """Eigenvalues of a row on the curves of these numbers, nan where there is none."""
+    return [values[number].get(row, complex(np.nan)) for number in numbers]
 
 
 def _side(loads: Sequence[float], rows: tuple[int, int, int], mu: Any) -> list[list[tuple[float, int, complex]]]:
@@ -149,8 +154,8 @@ def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:
         for kind, group in groupby(enumerate(_unstable(interval), interval.first), lambda step: step[1]):
             places = [row for row, _ in group]
             ends = [branch["columns"]["load"][row] for row in (places[0], places[-1] + 1)]
-            words = "range of " + (" and ".join(k for k in (FLUTTER, DIVERGENCE) if k in kind) or "instability")
-            yield Range(min(ends), max(ends), words, RANGES[2 if len(kind) > 1 else int(FLUTTER in kind)])
+            words = " and ".join(sorted(kind, reverse=True)) or "instability"
+            yield Range(min(ends), max(ends), f"range of {words}", RANGES[2 if len(kind) > 1 else FLUTTER in kind])
 
 
 def _unstable(interval: Interval) -> list[frozenset[str]]:

@@ -118,6 +118,6 @@ def coexisting(stable: Sequence[Interval]) -> Iterator[tuple[Interval, Interval,
                 yield one, other, low, high
 
 
-def stable_ones(branches: Sequence[Mapping[str, Any]]) -> list[Interval]:
-    """All stable intervals of a diagram."""
-    return [x for branch in branches for x in intervals_of(branch) if x.kind == STABLE]
+def intervals_in(branches: Sequence[Mapping[str, Any]], kind: str) -> list[Interval]:
+    """All intervals of one ``kind`` of a diagram."""
+    return [x for branch in branches for x in intervals_of(branch) if x.kind == kind]

@@ -83,11 +83,12 @@ def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
 
     Of either end it is known or not, then the index of the row, and the number of undecided eigenvalues there.
     """
-    if not any(undecided for _, _, undecided in ends):
-        sure = [known for known, _, _ in ends if known is not None]
-        return (sure or [max(own for _, own, _ in ends)])[0], 0
-    least = min(own if known is None else known for known, own, _ in ends)
-    return least, max(own + undecided if known is None else known for known, own, undecided in ends) - least
+    sure, own, undecided = zip(*ends, strict=True)
+    if not any(undecided):
+        return next((known for known in sure if known is not None), max(own)), 0
+    least = [b if a is None else a for a, b in zip(sure, own, strict=True)]
+    more = [0 if known is not None else count for known, count in zip(sure, undecided, strict=True)]
+    return min(least), max(a + b for a, b in zip(least, more, strict=True)) - min(least)
 
 
 def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> list[Piece]:

@@ -58,22 +58,23 @@ PARTS = dict(zip((PAIR, GROWTH, DIVERGED), (("x", "-"), ("+", "--"), ("+", ":"))
 def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
     """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
     motions, shown, ranges = dict[str, str](), set[str](), dict[str, Artist]()
-    axes.set_ylim(0, 1.15 * max(top(b, most) for b in branches))
-    axes.set_ylabel(r"frequency $\omega$")
+    axes.set(ylim=(0, 1.15 * max(top(b, most) for b in branches)), ylabel=r"frequency $\omega$")
     for branch in branches:
         for found in ranges_of(branch):
             axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
             ranges[found.words] = Patch(color=found.shade, label=found.words)
         for curve in curves(branch["columns"], branch["special"]):
             shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
-        for special in (special for special in branch["special"] if special["kind"] in SPECIAL):
-            _mark(axes, special)
-            shown.add(special["kind"])
-    handles: list[Artist] = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
-    parts = [{"color": "0.3", "marker": marker, "ls": style, "lw": 0.8, "label": what}
-             for what, (marker, style) in PARTS.items()]  # fmt: skip
-    marks = [{"ls": "none", "label": kind, **style} for kind, style in SPECIAL.items()]
-    return handles + [Line2D([], [], **x) for x in (*parts, *marks) if x["label"] in shown] + [*ranges.values()]
+        shown |= _marked(axes, branch["special"])
+    lines = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
+    return [*lines, *(Line2D([], [], **ENTRIES[what]) for what in ENTRIES if what in shown), *ranges.values()]
+
+
+ENTRIES: dict[str, dict[str, Any]] = {
+    what: {"color": "0.3", "marker": marker, "ls": style, "lw": 0.8, "label": what}
+    for what, (marker, style) in PARTS.items()
+} | {kind: {"ls": "none", "label": kind, **style} for kind, style in SPECIAL.items()}
+"""Entries of the legend for what is not a line."""
 
 
 def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
@@ -87,14 +88,19 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
     return drawn
 
 
-def _mark(axes: Axes, special: Mapping[str, Any]) -> None:
-    """Mark a flutter or divergence load, and write it beside: of divergence above the axis, where its frequency is."""
-    omega = abs(complex(special["omega2"])) ** 0.5
-    axes.plot(special["load"], omega, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
-    here = float(special["load"]), float(omega)
-    place = (8.0, 6.0) if omega else (0.0, 14.0)
-    text = axes.annotate(f"{special['load']:.6g}", here, place, textcoords="offset points")
-    text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
+def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
+    """Mark flutter and divergence loads, and write them beside: of divergence above the axis, where its frequency is.
+
+    Returns their kinds.
+    """
+    found = [special for special in specials if special["kind"] in SPECIAL]
+    for special in found:
+        here = float(special["load"]), abs(complex(special["omega2"])) ** 0.5
+        axes.plot(*here, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
+        place = (8.0, 6.0) if here[1] else (0.0, 14.0)
+        text = axes.annotate(f"{special['load']:.6g}", here, place, textcoords="offset points")
+        text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
+    return {special["kind"] for special in found}
 
 
 def _about(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:

@@ -66,30 +66,31 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
             raise InputError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
     numbers = [n - 1 for n in chosen] or list(range(count))
     columns = min(COLUMNS, len(numbers)) if len(numbers) != 4 else 2
-    rows = ceil(len(numbers) / columns)
-    moving = output.suffix.lower() == ".gif"
+    rows, moving = ceil(len(numbers) / columns), output.suffix.lower() == ".gif"
     with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
         FigureCanvasAgg(figure)
         figure.subplots_adjust(0.01, 0.01, 0.99, 1 - (TITLES + 0.4) / (rows * PANEL[1] + 0.5), 0.04, 0.36)
-        figure.suptitle(
-            f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=14, y=1 - 0.1 / figure.get_figheight(), va="top"
-        )
-        places = [figure.add_subplot(rows, columns, i + 1) for i in range(len(numbers))]
-        panels = [_Panel(axes, modes, setting, n) for axes, n in zip(places, numbers, strict=True)]
-        if not moving:
-            for panel in panels:
-                panel.draw()
-            figure.savefig(draft)
-            return output
-        writer = PillowWriter(fps=RATE)
-        writer.setup(figure, str(draft), figure.dpi)
+        words, top = f"{heading(path)}{branch}, load {modes.load:.6g}", 1 - 0.1 / figure.get_figheight()
+        figure.suptitle(words, fontsize=14, y=top, va="top")
+        panels = [_Panel(figure.add_subplot(rows, columns, i), modes, setting, n) for i, n in enumerate(numbers, 1)]
+        _animate(figure, panels, draft) if moving else _draw(figure, panels, draft)
+    return output
+
+
+def _draw(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
+    for panel in panels:
+        panel.draw()
+    figure.savefig(path)
+
+
+def _animate(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
+    writer = PillowWriter(fps=RATE)
+    with writer.saving(figure, str(path), figure.dpi):
         for frame in range(FRAMES):
             for panel in panels:
                 panel.draw(frame / FRAMES)
             writer.grab_frame()
-        writer.finish()
-    return output
 
 
 def amplitude(root: complex, grows: bool, time: float) -> complex:
@@ -166,9 +167,12 @@ class _Panel:
         grown = (shape * ((high - low) / shape).max() - (high - low)) / 2
         low, high = low - grown, high + grown
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        size = 0.07 * (high - low)[0]
-        corner, names = low + 1.6 * size, dict[tuple[float, ...], list[str]]()
-        for i, way in enumerate(view[:2].T):
+        self._triad(low, 0.07 * (high - low)[0])
+
+    def _triad(self, corner: Floats, size: float) -> None:
+        """The directions e1, e2, e3, near a corner; directions that look alike share a label."""
+        corner, names = corner + 1.6 * size, dict[tuple[float, ...], list[str]]()
+        for i, way in enumerate(self.look.axes[:2].T):
             self.axes.plot(*np.stack([corner, corner + size * way], axis=1), color="0.45", lw=1.2)
             if np.linalg.norm(way) > 0.5:
                 names.setdefault(tuple(np.round(way, 0)), []).append(f"e{i + 1}")
@@ -198,7 +202,7 @@ class _Panel:
     def _rod(self, centres: Floats, frames: Floats, color: str) -> list[Solid | Glyph]:
         """Rod with a stripe along d1, and with teeth along d1 where the mode turns it only."""
         dark = to_hex(0.4 * np.array(to_rgb(color)))
-        nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1:-1] if self.combed else []
+        nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1 : -1 if self.combed else 1]
         tips = centres + 6.0 * self.radius * frames[:, :, 0]
         teeth = [between("bar", centres[i], tips[i], 0.12 * self.radius, dark) for i in nodes]
         return [*striped((self.s, centres, frames), self.setting.section, self.radius, (color, dark), 12), *teeth]

@@ -72,7 +72,7 @@ def body_of(name: str) -> tuple[Floats, NDArray[np.int64]]:
         angle = np.linspace(0, np.pi, 13)
         return _swept(np.outer(-np.cos(angle), (0, 0, 1)), np.sin(angle))
     if name == "bar":
-        return _swept(np.outer((0, 1), (0, 0, 1)), 1.0)
+        return _swept(np.outer((0.0, 1.0), (0, 0, 1)), 1.0)
     if name == "arrow":
         return _swept(np.outer((0, 0.76, 0.76, 1), (0, 0, 1)), np.array([1, 1, 2.6, 0]))
     if name == "spiral":
@@ -191,10 +191,10 @@ def striped(
     That has arclengths (n,), centreline (n, 3) and directors (n, 3, 3); ``section`` is that of :func:`profile_of`,
     ``colors`` are those of the rod, of so many ``sides``, and of the stripe.
     """
-    s, *place = pose
+    s, centres, frames = pose
     around = (1.0, np.linspace(-np.pi, np.pi, sides + 1)[:-1]), (1.02, np.linspace(-0.3, 0.3, sides // 6 + 1))
     outlines = [size * radius * profile_of(s, section, angles) for size, angles in around]
-    return [rod(*place, outline, color) for outline, color in zip(outlines, colors, strict=True)]
+    return [rod(centres, frames, outline, color) for outline, color in zip(outlines, colors, strict=True)]
 
 
 def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,15 +35,16 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> 
     known which side is, or where the locus has more than one load at a value of the second parameter.
     """
     x, y = _curve(one)
-    side, crossed = one.get("lower"), any(mark["kind"] == CROSSES for mark in one["marks"])
+    side, crossed = one.get("lower"), CROSSES in [mark["kind"] for mark in one["marks"]]
     monotone = len(x) > 1 and abs(np.sign(np.diff(x)).sum()) == len(x) - 1
-    if crossed or not side or not monotone or any(low for low, _ in one["columns"]["index"]):
+    if crossed or not side or not monotone or any(next(zip(*one["columns"]["index"], strict=True))):
         return None
     order = np.argsort(x)
     grid = np.linspace(x.min(), x.max(), COUNT)
     edge = np.interp(grid, x[order], y[order])
     end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
-    for level in (level for another in loci if another is not one for level in _levels(another, grid)):
+    others = (_levels(another, grid) for another in loci if another is not one)
+    for level in chain.from_iterable(others):
         nearer = (side * (level - edge) > 0) & (side * (level - end) < 0)
         end = np.where(nearer, level, end)
     return StableRegion(grid, edge, end)

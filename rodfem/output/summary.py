@@ -12,7 +12,7 @@ from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
-from rodfem.output.intervals import Interval, changes_at, coexisting, intervals_of, stable_ones, without_stable
+from rodfem.output.intervals import Interval, changes_at, coexisting, intervals_in, intervals_of, without_stable
 from rodfem.output.pieces import MEETS, PLANAR, STABLE, UNDECIDED
 from rodfem.output.words import is_sweep, many
 
@@ -39,19 +39,21 @@ UNRESOLVED = ", as far as this mesh tells: it does not resolve that state"
 def in_sentences(data: Mapping[str, Any]) -> list[str]:
     """Sentences on a diagram, the contents of ``diagram.json``: its branches, ranges of stability, open questions."""
     first, *others = data["branches"]
-    kinds = {branch["name"]: {interval.kind for interval in intervals_of(branch)} for branch in others}
-    told = [branch for branch in others if kinds[branch["name"]] & {STABLE, PLANAR, UNDECIDED}]
-    quiet = [branch for branch in others if branch not in told and kinds[branch["name"]]]
+    told = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
+    quiet = [branch for branch in others if branch not in told and _kinds(branch)]
     out = [_of_branch(branch, data) for branch in (first, *told[:MOST_NAMES])]
     if more := told[MOST_NAMES:]:
         out.append(f"{_names(more)} have stable states, too.")
     if quiet:
-        out.append(f"{_names(quiet)} {'is' if len(quiet) == 1 else 'are'} unstable on {_its(len(quiet))} whole range.")
+        out.append(
+            f"{_names(quiet)} {'is unstable on its' if len(quiet) == 1 else 'are unstable on their'} whole range."
+        )
     return [*out, *([] if is_sweep(data) else _ranges(data)), *_open(data)]
 
 
-def _its(count: int) -> str:
-    return "its" if count == 1 else "their"
+def _kinds(branch: Mapping[str, Any]) -> set[str]:
+    """Kinds of stability along a branch."""
+    return {interval.kind for interval in intervals_of(branch)}
 
 
 def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
@@ -126,8 +128,10 @@ def _state(interval: Interval, data: Mapping[str, Any]) -> str:
 
 def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
     """Ranges of the load without a stable state, and with several."""
-    load, stable = data["parameter"], stable_ones(data["branches"])
-    undecided = [x.covers for branch in data["branches"] for x in intervals_of(branch) if x.kind == UNDECIDED]
+    if is_sweep(data):
+        return
+    load, stable = data["parameter"], intervals_in(data["branches"], STABLE)
+    undecided = [x.covers for x in intervals_in(data["branches"], UNDECIDED)]
     for a, b in without_stable(stable, *sorted(data["range"])):
         first, last = told_apart(a, b, width=_width(data))
         doubt = any(low < b and high > a for low, high in undecided)

@@ -76,14 +76,14 @@ class Entry:
 
     def kept(self, column: Sequence[Any]) -> bool:
         """Whether a branch has this column: it is always there, or a row has something in it."""
-        empty = {"(P, ": [], "null": None, "text": ""}
+        empty: dict[str, Any] = {"(P, ": [], "null": None, "text": ""}
         nothing = next((value for part, value in empty.items() if part in self.type), 0)
         return self.always or any(value != nothing for value in column)
 
 
 def _entries(section: str, sources: Mapping[str, Source]) -> tuple[Entry, ...]:
     text = PAGE.split(f"## {section}\n")[1].split("## ")[0]
-    return tuple(Entry(*cells, sources.get(cells[0])) for cells in ROW.findall(text))
+    return tuple(Entry(a, b, c, d, e, sources.get(a)) for a, b, c, d, e in ROW.findall(text))
 
 
 COLUMNS, SPECIAL = _entries("columns", OF_POINT), _entries("special", OF_SPECIAL)
@@ -134,7 +134,7 @@ def point_values(columns: Mapping[str, Sequence[Any]], row: int) -> dict[str, An
 def soft_modes(row: Data) -> list[SoftMode]:
     """Soft modes of the row of these columns."""
     parts = [row.get(name) or [] for name in ("soft", "soft_value", "soft_uncertainty")]
-    return [SoftMode(*mode, inf if bar is None else bar) for *mode, bar in zip(*parts, strict=True)]
+    return [SoftMode(name, mu, inf if bar is None else bar) for name, mu, bar in zip(*parts, strict=True)]
 
 
 def special_values(entry: Data) -> dict[str, Any]:

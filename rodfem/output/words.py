@@ -85,10 +85,17 @@ def special_in_words(branch: Data, special: Data, scale: float = 0.0) -> tuple[s
     return load, ordinate, index_in_words(special, row_of(branch, special["row"]))
 
 
+def is_estimated(data: Data) -> bool:
+    """Whether the error of the load of any special point is estimated."""
+    return any(
+        special.get("error_estimate") is not None for branch in data["branches"] for special in branch["special"]
+    )
+
+
 def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
     """Branch, kind, load, ordinate and index of each special point, and remarks; without bars where none is known."""
     scale, every = scale_of(data), [(branch, special) for branch in data["branches"] for special in branch["special"]]
-    known = any(special.get("error_estimate") is not None for _, special in every)
+    known = is_estimated(data)
     for branch, special in every:
         load, ordinate, index = special_in_words(branch, special, scale)
         load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
@@ -161,16 +168,16 @@ def words_of(branch: Data, *, planar: bool = False) -> list[Words]:
     for special in branch["special"]:
         specials.setdefault(special["row"], []).append(special)
     doubts: dict[int, list[str]] = {}
-    for row, sentence in _warnings(branch):
-        doubts.setdefault(row, []).append(f"Warning: {sentence}.")
+    for place, sentence in _warnings(branch):
+        doubts.setdefault(place, []).append(f"Warning: {sentence}.")
     out = []
-    for number_of_row in range(len(branch["columns"]["load"])):
-        row = row_of(branch, number_of_row)
-        plain = _at_special(row, specials.get(number_of_row, [])) or _stability(row)
+    for place in range(len(branch["columns"]["load"])):
+        row = row_of(branch, place)
+        plain = _at_special(row, specials.get(place, [])) or _stability(row)
         sentence = plain.sentence
         if planar and plain.verdict == STABLE and row.get("negative_in_space") is None:
             sentence = sentence.replace("Stable", "Stable in its plane (not examined in space)", 1)
-        out.append(Words(plain.verdict, plain.index, " ".join([sentence, *doubts.get(number_of_row, [])])))
+        out.append(Words(plain.verdict, plain.index, " ".join([sentence, *doubts.get(place, [])])))
     return out
 
 

@@ -56,13 +56,12 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
 def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, stage: Stage) -> dict[str, Any]:
     """Modes of a branch by its rows, those with error bars in the file ``path``, and why others have none."""
     name, modes = branch["name"], {}
+    zeros = [0] * len(shapes.r) if "omega2" in branch["columns"] else branch["columns"]["zero"]
     typical = {each.row: each for each in recorded(group)}
     exact = {row for other, row in rows_with_modes(path) if other == name}
-    for row in sorted(row for row in {*typical, *exact} if row < len(shapes.r)):
-        nodes = group["s"][row][np.isfinite(group["s"][row])]
-        zeros = 0 if "omega2" in branch["columns"] else branch["columns"]["zero"][row]
-        few = typical[row].found if row in typical else None
-        if shown := modes_of(path if row in exact else None, (name, row), few, nodes, zeros):
+    for row in sorted({*typical, *exact} & {*range(len(shapes.r))}):
+        few, nodes = getattr(typical.get(row), "found", None), group["s"][row]
+        if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
             modes[row] = motions_of(shown, shapes, row, read_setting(group, row), stage.look)
     return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items() if each.trouble}}
 
@@ -83,7 +82,7 @@ def profiles_data(group: Any, states: int) -> dict[str, Any]:
     for place, one in zip(out, found, strict=True):
         columns = [one.points.reshape(-1, 1), *(one.fields[symbol].reshape(-1, 3) for symbol in PROFILES)]
         place[: one.points.size] = np.hstack(columns)
-    element = [one.points.shape[1] if len(kept) == most else 0 for one in found]
+    element = [one.points.shape[1] * (len(kept) == most) for one in found]
     jumps = {symbol: plain([one.jump(symbol, loaded) for one in found]) for symbol in PROFILES}
     return {"profile": packed(out[:, kept]), "element": element, "jumps": jumps}
 

@@ -26,7 +26,6 @@ def test_every_word_has_an_entry() -> None:
     words = {*KINDS, *(entry.name for entry in (*COLUMNS, *SPECIAL[1:])), *MARKERS, *STYLES, *PARTS, *COLORS}
     words |= {
         "image, not traced",
-        "stable side",
         "stable, as far as these curves tell",
         "range of flutter",
         "range of divergence",
