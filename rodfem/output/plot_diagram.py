@@ -30,6 +30,7 @@ from rodfem.output.style import (
     HALO,
     LINES,
     PALETTE,
+    RIM,
     STYLE,
     THIN,
     WARNING,
@@ -62,8 +63,8 @@ SHAPES = ("", "^", "<", "v", ">", "p", "h")
 """Marks along the curves of branches, another one whenever the hues are used up."""
 HUES = 7
 """Hues of the palette that are told apart at a glance."""
-SAME, APART = 2.0, 30.0
-"""Distance in pixels up to which two lines lie on each other, and the length for which they do, or else they cross."""
+SHORT = 15
+"""Points of a line, two pixels apart, below which its index stands beside it only if it is the only one."""
 NEAR = 0.01
 """Distance from an image, relative to the ranges of load and ordinate, up to which a branch is that image."""
 GAP = 11.0
@@ -84,9 +85,9 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
     planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
     dots, with the least and the greatest index.  Where a stable and another part lie on each other, the other one is
-    drawn inside the stable one.  A step in which the index changes without a special point that says so has a mark of
-    warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of the opposite
-    ordinate, are thin lines: they were not traced.
+    drawn upon the stable one, which is wider.  A step in which the index changes without a special point that says so
+    has a mark of warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of
+    the opposite ordinate, are thin lines: they were not traced.
 
     ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
     200 dpi.  Its suffix decides the format (.png, .pdf, .svg), and its folder is created.  Raises :class:`InputError`
@@ -114,7 +115,6 @@ def figure_of(diagram: Mapping[str, Any]) -> Figure:
         axes.set_xlabel(axis_label(diagram), fontsize=FONT + 1)
         axes.set_ylabel(tex(ordinate_in_words(diagram)))
         explain(axes, handles)
-        _uncover(axes, lines)
         _write_indices(axes, lines, [tuple(place) for handle in handles for place in handle.get_xydata()])
     return figure
 
@@ -136,8 +136,9 @@ def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Li
         handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"]))
         if shape or not new:
             axes.plot(*places.T, ls="", marker=shape or "o", ms=5.0, color=colour, markevery=0.08, zorder=3)
-    for line in sorted(lines, key=lambda line: -line.piece.negative):  # the stable ones on top: see _uncover
-        axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind])
+    for line in sorted(lines, key=lambda line: line.piece.kind != STABLE):
+        upper = {} if line.piece.kind == STABLE else {"path_effects": RIM, "zorder": 2.5}  # seen where two lines lie
+        axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind] | upper)
     return handles + _kinds(lines) + _draw_images(axes, branches) + _draw_marks(axes, branches), lines
 
 
@@ -218,29 +219,6 @@ def dense(axes: Axes, curve: Floats) -> Floats:
     return np.column_stack([np.interp(along, lengths, pixels[:, k]) for k in (0, 1)])
 
 
-def _uncover(axes: Axes, lines: Sequence[Line]) -> None:
-    """Draw what is not stable once more, within stable lines that lie on it."""
-    stable = [dense(axes, line.curve) for line in lines if line.piece.kind == STABLE]
-    for line in (line for line in lines if line.piece.kind != STABLE):
-        for part in hidden(dense(axes, line.curve), stable):
-            curve = axes.transData.inverted().transform(part)
-            axes.plot(*curve.T, color="white", linewidth=2.0, solid_capstyle="butt", zorder=2.5)
-            axes.plot(*curve.T, color=line.colour, **LINES[line.piece.kind] | {"linewidth": 1.5}, zorder=2.6)
-
-
-def hidden(upper: Floats, lower: Sequence[Floats]) -> list[Floats]:
-    """Parts of a line that lie on others, all given by pixels (k, 2) at equal distances of about two.
-
-    Lines that merely cross, or come from one point, do not lie on each other.
-    """
-    if not lower:
-        return []
-    near = KDTree(np.concatenate(lower)).query(upper)[0] <= SAME
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
-    parts = [upper[a:b] for a, b in zip(ends[::2], ends[1::2], strict=True)]
-    return [part for part in parts if np.sum(np.hypot(*np.diff(part, axis=0).T)) > APART]
-
-
 def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[float, float]]) -> None:
     """Write the index beside each line, where there is most room: a short line has none, unless it is the only one."""
     curves = [dense(axes, line.curve) for line in lines]
@@ -256,7 +234,7 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
         inside = np.all((places - half > axes.bbox.min) & (places + half < axes.bbox.max), axis=1)
         best = int(np.argmax(np.where(inside, room, -1.0)))
         name = line.colour, line.piece.label
-        if (inside[best] and room[best] > GAP / 2 and len(curve) > APART / 2) or name not in written:
+        if (inside[best] and room[best] > GAP / 2 and len(curve) > SHORT) or name not in written:
             written.add(name)
             taken.append(places[best] + corner)
             at = axes.transData.inverted().transform(places[best])

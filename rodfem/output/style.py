@@ -51,7 +51,8 @@ THIN: dict[str, Any] = {"linewidth": 0.9, "alpha": 0.75}
 WARNING: dict[str, Any] = {"ms": 9.0, "mec": LOAD, "mew": 1.8, "mfc": "#F0E442"}
 END: dict[str, Any] = {"marker": "X", "ms": 8.5, "mfc": "white", "mec": LOAD, "mew": 1.3}
 """Marks of what a diagram does not explain, and of an end before the range ends."""
-HALO = [withStroke(linewidth=3.2, foreground="white")]
+HALO, RIM = ([withStroke(linewidth=width, foreground="white")] for width in (3.2, 2.6))
+"""White around words and marks, and around lines that lie on wider ones."""
 
 
 def sheet(title: str, about: str) -> tuple[Figure, Axes]:

@@ -22,8 +22,7 @@ from rodfem.problem.setting import read as read_setting
 from rodfem.report.branches import branch_data
 from rodfem.report.motions import modes_of, motions_of
 from rodfem.report.packing import packed, plain
-from rodfem.report.shapes import BUDGET, Shapes, shapes_of, stations
-from rodfem.report.stage import Stage, stage_of
+from rodfem.report.shapes import BUDGET, Shapes, Stage, shapes_of, stage_of, stations
 
 Floats = NDArray[np.float64]
 

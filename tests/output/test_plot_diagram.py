@@ -21,7 +21,7 @@ from rodfem.fem.link import link
 from rodfem.file_format import LOCUS
 from rodfem.output import plot_diagram
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
-from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, dense, draw_branches, draw_diagram, figure_of, hidden
+from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, dense, draw_branches, draw_diagram, figure_of
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.style import PALETTE
 from rodfem.problem.scene import Ordinate
@@ -64,15 +64,6 @@ def test_nothing_unstable_is_hidden_below_something_stable(folder: Path) -> None
     here = slice(line - 8, line + 9)
     dark, blue = (pixels(path, color, here).sum() for color in PALETTE[:2])
     assert dark > 2000 and blue > 500
-
-
-def test_lines_that_cross_or_touch_hide_nothing() -> None:
-    x = np.arange(0.0, 200.0, 2.0)
-    flat, steep = np.column_stack([x, 0 * x]), np.column_stack([x, x - 100.0])
-    fork = np.column_stack([x, 3 * np.sqrt(x)])  # from the same point, across
-    assert hidden(steep, [flat]) == hidden(fork, [flat]) == []
-    (part,) = hidden(flat, [flat[40:], steep])
-    np.testing.assert_array_equal(part, flat[39:])
 
 
 def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
