@@ -102,7 +102,7 @@ def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Settin
 def _about(mode: Shown) -> dict[str, Any]:
     """Eigenvalue, in words with its error, and what the motion does: ``zero``, ``grows`` or neither."""
     exact, known = mode.motion in (SYMMETRY, RIGID), bool(np.isfinite(mode.error))
-    zero = exact or mode.zero or abs(mode.value) <= np.nan_to_num(mode.error, posinf=0.0)
+    zero = exact or mode.zero or bool(abs(mode.value) <= np.nan_to_num(mode.error, posinf=0.0))
     mu = 0j if zero and (exact or not known) else mode.value
     root = np.sqrt(-mu)
     words = EXACT if exact else eigenvalue_in_words(mu, mode.error) or COUNTED * zero
