@@ -121,7 +121,7 @@ def _beside(loads: Sequence[float], known: Members, point: Mapping[str, Any], ot
     found = {number: [(loads[row], row, complex(mean))] for number in met}
     for rows in ((row, row - 1, row - 2), (row, row + 1, row + 2)):
         values = np.array([[mean] * len(met), *(_at(at, met, i) for i in rows[1:] if i not in others)])
-        if len(met) % 2 == 0 and values.shape[0] == len(rows) and np.isfinite(values).all():
+        if len(met) in (2, 4) and len(values) == len(rows) and np.isfinite(values).all():
             for places, extra in zip(found.values(), _side(loads, rows, values), strict=True):
                 places += extra
     return {number: [(*place, known[number][-1][3]) for place in places] for number, places in found.items()}
