@@ -361,11 +361,9 @@ class Diagram:
 
     def _repr_html_(self) -> str:
         """Table of special points for notebooks."""
-        from rodfem.output.digits import in_words
+        from rodfem.output.words import table_of
 
-        scale = max([self.scene.units.ordinate, *(abs(p.ordinate) for b in self.branches for p in b.points)])
-        cells = [(branch.name, s.kind.words, *in_words(s, scale)) for branch in self.branches for s in branch.special]
-        rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in cells]
+        rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row[:5]) for row in table_of(self.data)]
         head = ("branch", "kind", self.scene.load, self.scene.ordinate.name, "index")
         title = "".join(f"<th>{escape(name)}</th>" for name in head)
         body = "".join(f"<tr>{row}</tr>" for row in rows)

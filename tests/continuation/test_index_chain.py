@@ -49,7 +49,7 @@ from rodfem.diagram.equivalence import are_images, equivalent
 from rodfem.diagram.explorer import Explorer
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.files import _branch_data
+from rodfem.output.table import branch_data
 from rodfem.stability.assessment import assess
 
 pytestmark = pytest.mark.alone
@@ -332,11 +332,11 @@ def test_what_is_not_explained_is_kept() -> None:
     branch.points, branch.special = rows, singular[1:]
     branch.renumber()
     explain(branch)
-    columns, (entry,) = _branch_data(branch)["columns"], _branch_data(branch)["unexplained"]
+    columns, (entry,) = branch_data(branch)["columns"], branch_data(branch)["unexplained"]
     assert (entry["before"], entry["after"]) == (0, 1)
     assert columns["load"][entry["row"]] == broken.a.load
     terminal = io.StringIO()
-    Report(stream=terminal).table([branch], found.solver.system)
+    Report(stream=terminal).table({"branches": [branch_data(branch)], "parameter": "P", "ordinate": "x"}, [branch])
     assert f"! {branch.name}: {broken}" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
 
 
@@ -381,7 +381,7 @@ def test_a_range_that_begins_at_a_branch_point() -> None:
     (branch,) = diagram
     assert [p.negative for p in branch.points[1:]] == [1] * (len(branch.points) - 1)
     assert any("is singular: 1 eigenvalue(s) vanish there" in sentence for sentence in diagram.warnings)
-    assert _branch_data(branch)["singular_start"] == 1
+    assert branch_data(branch)["singular_start"] == 1
 
 
 def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> None:

@@ -13,7 +13,6 @@ import pytest
 from closed_forms import column, double, flutter
 from hard.endurance import resident
 from hemitropic_cases import specials
-from matplotlib.figure import Figure
 from mpi4py import MPI
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
@@ -27,7 +26,7 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.frequency_curves import curves, ranges_of
-from rodfem.output.plot_frequencies import draw_frequencies
+from rodfem.output.plot_frequencies import draw_frequencies, figure_of
 from rodfem.problem.end import End
 from rodfem.problem.scene import Scene
 from rodfem.stability.nonsymmetric import PILE, NonsymmetricSolver
@@ -133,17 +132,8 @@ def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.alone
 def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, data, _ = swept(classics.partly_following(0.4, (0.0, 25.0)), monkeypatch)
-    drawn: list[Figure] = []
-
-    class Kept(Figure):
-        def __init__(self, *given: object, **more: object) -> None:
-            super().__init__(*given, **more)
-            drawn.append(self)
-
-    monkeypatch.setattr("rodfem.output.plot_frequencies.Figure", Kept)
     if MPI.COMM_WORLD.rank == 0:
-        draw_frequencies(data, folder / "frequencies.png")
-        (axes,) = drawn[0].axes
+        (axes,) = figure_of(data).axes
         places = [float(line.get_xdata()[0]) for line in axes.get_lines() if line.get_marker() == "v"]
         first = np.arccos(-2 / 3)
         assert places == pytest.approx([first**2, (2 * np.pi - first) ** 2])

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
+from matplotlib.transforms import offset_copy
 
 from rodfem.output.digits import with_unit
+from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE
 from rodfem.tolerances import NEGLIGIBLE
 from rodfem.whole_files import draft_of
 
@@ -29,7 +33,44 @@ GREEK = (
     *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "pi"),
     *("rho", "sigma", "tau", "phi", "chi", "psi", "omega"),
 )
-HALO = [withStroke(linewidth=3.2, foreground="white")]
+ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
+"""A rod in space, the line along d1 on it, and arrows along d1 and d2."""
+GREY, DARK, STEEL, LOAD = "#9A9A9A", "#6E6E6E", "#707C8A", "#B3123E"
+"""What holds a rod, its axles and strings, springs and rails, and loads."""
+REST, GROWS, SWINGS, FREE = "#B4B4B4", "#D55E00", "#0072B2", "#009E73"
+"""A rod at rest in a picture of its modes, and modes that grow, swing, or cost no energy."""
+LINES: dict[str, dict[str, Any]] = {
+    STABLE: {"linestyle": "-", "linewidth": 3.0, "solid_capstyle": "round"},
+    PLANAR: {"linestyle": (0, (3.2, 1.0)), "linewidth": 2.4},
+    UNDECIDED: {"linestyle": (0, (4.0, 1.2, 1.0, 1.2)), "linewidth": 2.4},
+    UNSTABLE: {"linestyle": (0, (1.0, 1.3)), "linewidth": 1.9},
+}
+"""Lines of a diagram by stability, the most stable one first."""
+THIN: dict[str, Any] = {"linewidth": 0.9, "alpha": 0.75}
+"""Line of an image of a branch."""
+WARNING: dict[str, Any] = {"ms": 9.0, "mec": LOAD, "mew": 1.8, "mfc": "#F0E442"}
+END: dict[str, Any] = {"marker": "X", "ms": 8.5, "mfc": "white", "mec": LOAD, "mew": 1.3}
+"""Marks of what a diagram does not explain, and of an end before the range ends."""
+HALO, RIM = ([withStroke(linewidth=width, foreground="white")] for width in (3.2, 2.6))
+"""White around words and marks, and around lines that lie on wider ones."""
+
+
+def sheet(title: str, about: str) -> tuple[Figure, Axes]:
+    """A figure of one picture with its title, and in small letters what it is computed with."""
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    axes = figure.add_subplot(axisbelow=True)
+    figure.suptitle(tex(title), fontsize=FONT + 2, wrap=True)
+    axes.set_title(about, color="0.4", fontsize=FONT - 3, wrap=True)
+    return figure, axes
+
+
+def explain(axes: Axes, handles: Sequence[Artist]) -> None:
+    """Write the legend below the axes, each entry once: inside there may be no room."""
+    entries = {str(handle.get_label()): handle for handle in handles}
+    columns = max(1, min(4, 150 // (12 + max(map(len, entries), default=0))))
+    place = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": offset_copy(axes.transAxes, axes.figure, 0, -36, "points")}
+    axes.legend(handles=list(entries.values()), loc="upper center", ncols=columns, fontsize=FONT - 2.5, **place)
+    axes.figure.draw_without_rendering()  # pixels are final
 
 
 def save(figure: Figure, path: Path) -> Path:
