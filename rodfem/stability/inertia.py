@@ -385,7 +385,8 @@ class Factored:
         Each is known to within its residual ``r``, and to ``r^2`` over its distance from the others (Kato 1949, Temple
         1928), or by what it was ``before`` (k,).
         """
-        wanted, others, residuals = nu[: len(before)], nu[len(before) :], residuals[: len(before)]
+        wanted, others = np.split(nu, [len(before)])
+        before, residuals = before[: len(wanted)], residuals[: len(wanted)]
         apart = abs(wanted[:, None] - others).min(axis=1, initial=np.inf)
         left = residuals * np.minimum(1.0, residuals / np.maximum(apart, TINY))
         # a wide band of round-off is that of rough vectors: it does not excuse an inexact smooth one
