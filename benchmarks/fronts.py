@@ -103,9 +103,7 @@ def main(path: Path = Path(__file__).parents[1] / "docs" / "fronts.png") -> None
     matrix = local_rows(found.inertia.at(found.start(20.0, 0.4)).matrix)
     matrix.eliminate_zeros()
     whole = local_rows(found.inertia.matrix)
-    n = whole.shape[0]
-    border = np.arange(n - found.system.fields.dense_rows, n)
-    order, begins = sequence(whole.indptr, whole.indices, border)
+    order, begins = sequence(whole.indptr, whole.indices, found.system.fields.dense_rows)
     pattern = matrix[order][:, order]
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5.0), width_ratios=(1, 1.55))
     cells = fronts(whole[order][:, order], order, begins)

@@ -29,12 +29,12 @@ from benchmarks.store import Store
 from rodfem.continuation.regular_point import RegularPoints
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
+from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.assessment import Assessor
-from rodfem.stability.blocks import Blocks
+from rodfem.stability.dependence import rank_of
 from rodfem.stability.inertia import Inertia
-from rodfem.stability.rank import rank_of
-from rodfem.stability.round_off import decide, quotient_error
+from rodfem.stability.near_zero import decide, quotient_error
 
 sys.path.append(str(ROOT / "tests"))
 
@@ -309,7 +309,7 @@ def ranks() -> str:
         row = [str(elements)]
         for name, coordinates in (("cord", "tangent"), ("hemitropic", "tangent"), ("hemitropic", "compatible")):
             solver = Solver(small_states.scene(name), Discretization("pointwise", elements, 1)).equilibria
-            pencil = Blocks(solver.system, coordinates).assemble(solver.start(20.0 if name == "cord" else 0.1))
+            pencil = Coordinates(solver.system, coordinates).assemble(solver.start(20.0 if name == "cord" else 0.1))
             h = solver.system.scene.length / elements
             sigma = rank_of(pencil)
             row += [f"{sigma:.4e}", f"{sigma / h:.5f}"]
@@ -405,7 +405,7 @@ def resolution(band: str, rank: str) -> str:
 
 The band is the half width of the interval about zero in which inertia alone decides nothing, relative to the system's
 metric: 10 eps |S| over the smallest mass. Inside it the Rayleigh quotient of the pair nearest zero decides, which
-round-off blurs by no more than the number in the next column (`rodfem/stability/round_off.py`). The band grows like n
+round-off blurs by no more than the number in the next column (`rodfem/stability/near_zero.py`). The band grows like n
 as long as the largest entries of S are those of the constraints, then like n^2; the other number like n^1.5. Few
 elements of high degree reach more digits with a narrower band.
 

@@ -14,7 +14,8 @@
 # %% [markdown]
 # ## Program
 #
-# `scene` states one rod, and `read` traces it and takes from the diagram what the map shows.
+# `scene` states one rod, which `varying` gives another coupling: equations are derived once for all of them. `read`
+# traces one and takes from its diagram what the map shows.
 
 # %%
 from math import hypot, inf
@@ -31,14 +32,14 @@ from rodfem.forms.energy import hemitropic
 from rodfem.whole_files import draft_of
 
 
-def scene(A: float, highest: float) -> Scene:
-    """The rod of demos/hemitropic.py with the coupling A."""
+def scene(highest: float) -> Scene:
+    """The rod of demos/hemitropic.py without coupling."""
     return Scene(
         name="stability map",
         interval=(-3.0, 3.0),
         rod="unshearable",
         energy=lambda v, k, c: hemitropic(v, k, stretching=10.0, coupling=c.A, twisting=1.0, bending=1.0),
-        parameters={"lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0)), "A": Parameter(A)},
+        parameters={"lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0)), "A": Parameter(0.0)},
         load="lam",
         ends=(clamped(lambda c: (0.0, 0.0, -3 * (1 - c.lam))), clamped(lambda c: (0.0, 0.0, 3 * (1 - c.lam)))),
         ordinate=Ordinate("mid-point displacement", s=0.0, of=lambda r, q: hypot(r[0], r[1])),
@@ -103,7 +104,8 @@ def main(parser: cli.Parser, couplings: np.ndarray, loads: np.ndarray, output: P
     """Compute what is missing in the folder ``output``, and draw it; ``parser`` words what is refused."""
     report = Report()
     with cli.sentences(parser):
-        rods = [scene(float(A), 0.6) for A in couplings]
+        rod = scene(0.6)
+        rods = [rod.varying(A=float(A)) for A in couplings]
         results = rodfem.many(
             rods,
             lambda rod: read(rod, loads),

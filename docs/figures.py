@@ -26,7 +26,7 @@ from panels import draw, legend_of
 from rodfem.output.plot_diagram import draw_diagram
 from rodfem.output.plot_frequencies import draw_frequencies
 from rodfem.output.render import draw_shape, view_in
-from rodfem.output.sheet import STYLE, axis_label
+from rodfem.output.style import STYLE, axis_label
 
 HOME = Path(__file__).parents[1]
 RESULTS, PICTURES = HOME / "results" / "paper", HOME / "docs" / "paper"

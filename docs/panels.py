@@ -12,12 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rodfem.output.endings import endings
-from rodfem.output.plot_diagram import END_MARKER, ENDS
+from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, endings
+from rodfem.output.plot_diagram import ENDS
 from rodfem.output.plot_frequencies import draw_into
-from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE
-from rodfem.output.sheet import HALO, PALETTE, axis_label
 from rodfem.output.smooth import between
+from rodfem.output.style import END, HALO, PALETTE, axis_label
 
 MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "mfc": "white"},
@@ -54,7 +53,7 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
             labels.append((text, colour, curve))
         for row, _ in endings(branch):
             for sign in signs if ordinate[row] else (1,):
-                style = {"ls": "none", "zorder": 5} | END_MARKER | {"ms": 2.7 * width}
+                style = {"ls": "none", "zorder": 5} | END | {"ms": 2.7 * width}
                 axes.plot(load[row], sign * ordinate[row], **style)
         for special in branch["special"]:
             for sign in signs if special["kind"] in MARKERS else ():
@@ -96,7 +95,7 @@ def legend_of(found: Mapping[str, Any]) -> list[Artist]:
         if kind in special:
             out.append(Line2D([], [], ls="none", mec="black", ms=7, label=kind, **style))
     reasons = dict.fromkeys(reason for branch in found["branches"] for _, reason in endings(branch))
-    return out + [Line2D([], [], ls="none", label=f"{ENDS}{reason}", **END_MARKER) for reason in reasons]
+    return out + [Line2D([], [], ls="none", label=f"{ENDS}{reason}", **END) for reason in reasons]
 
 
 def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float, written: list[np.ndarray]) -> None:

@@ -21,8 +21,8 @@ from matplotlib.lines import Line2D
 from panels import COUNT, IN_SPACE, draw, legend_of
 
 from rodfem import Branch, Diagram, Discretization, Plan, Ring, Scene, trace
-from rodfem.output.glyphs import glyphs_of
-from rodfem.output.sheet import STYLE, symbol_of, tex
+from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.style import STYLE, symbol_of, tex
 from rodfem.output.view import sign_of, view_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
@@ -149,7 +149,8 @@ def shape(axes: Axes, diagram: Diagram, branch: Branch, row: int) -> None:
         ties=tuple(kept[0] for kept in ties_of(scene, samples[1:])),
     )
     s = samples[1]["s"]
-    solids = glyphs_of(setting, s, lines[1], directors(samples[1]["q"]), float(np.ptp(s)) / SLENDER, view)
+    look = Look(float(np.ptp(s)) / SLENDER, view)
+    solids = glyphs_of(setting, s, (lines[1], directors(samples[1]["q"])), look)
     for solid in solids:
         corners = solid.points[solid.triangles] @ view.T
         shade = PolyCollection(

@@ -41,7 +41,8 @@ finds and classifies the points where it is lost, follows what branches off, and
   ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
   ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.save(folder)``; :func:`load` reads a saved one.  :func:`run` is
   the same with a terminal, files and pictures.
-* **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one.
+* **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one;
+  ``solver.rebind(A=-1.5)`` is that of other constants, whose equations are not derived again.
 * **Is it stable?**: each point has its index; :meth:`Diagram.assess` decides by any of six methods, and says how far to
   trust it; :meth:`Diagram.modes` finds how the rod moves in its left-most modes, and what a controller needs to know.
 * **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, and skips those that are finished.

@@ -52,10 +52,29 @@ RECORDED = "tests/modes/test_recorded.py"
 CLOSE = "tests/diagram/test_close_critical_loads.py"
 MISSED = "tests/diagram/test_missed_loads.py"
 AT_SPECIAL = "tests/diagram/test_at_special_points.py"
+OTHER_CONSTANTS = "tests/diagram/test_other_constants.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "constants-of-the-first-scene-stay": Fault(
+        "rodfem/fem/equations.py",
+        "if line is self.register.line:",
+        "if self.register.line is not None:",
+        OTHER_CONSTANTS,
+    ),
+    "forms-of-other-functions-serve": Fault(
+        "rodfem/fem/equations.py",
+        "== (discretization, comm) and f.scene.alike(scene)",
+        "== (discretization, comm)",
+        OTHER_CONSTANTS,
+    ),
+    "unknowns-of-other-constants-stay": Fault(
+        "rodfem/fem/fields.py",
+        "(out.formulation, out.unknown_scalars) == (self.formulation, self.unknown_scalars)",
+        "True",
+        OTHER_CONSTANTS,
+    ),
     "phase-conditions-do-not-move": Fault(
         "rodfem/stability/reduced_stiffness.py",
         "                out += term + term.T",
@@ -151,8 +170,8 @@ FAULTS = {
     ),
     "asked-row": Fault(
         "rodfem/diagram/finders.py",
-        "found.append(q if q is step.b else replace(q))",
-        "found.append(replace(q))",
+        "            yield arc.b\n",
+        "            yield replace(arc.b)\n",
         "tests/diagram/test_load_at_an_end.py",
     ),
     "start-anew": Fault(
@@ -188,13 +207,13 @@ FAULTS = {
     ),
     "beyond-a-corner-the-tangent-is-that-before-it": Fault(
         "rodfem/continuation/follow.py",
-        "_turn(solver, point, beside)",
-        "_turn(solver, point, -beside)",
+        "_moved(self.solver, point.x, self._beside)",
+        "_moved(self.solver, point.x, -self._beside)",
         "tests/problem/test_tables.py",
     ),
     "out-of-the-range": Fault(
         "rodfem/continuation/follow.py",
-        "(made.load - last.load) * last.slope > 0:",
+        "(beyond - last.load) * last.slope > 0:",
         "(made.load - last.load) * last.slope > 9e9:",
         "tests/diagram/test_load_at_an_end.py",
     ),
@@ -253,9 +272,9 @@ FAULTS = {
         "tests/continuation/test_degenerate_pitchforks.py",
     ),
     "reasons-of-kinks-are-lost": Fault(
-        "rodfem/report/words.py",
-        'if kink := (columns.get("kink") or {row: ""})[row]:',
-        'if kink := "":',
+        "rodfem/output/words.py",
+        'if row.get("kink"):',
+        "if False:",
         "tests/diagram/test_kinks.py",
     ),
     "kinks-are-stable": Fault(
@@ -280,15 +299,15 @@ FAULTS = {
         "tests/diagram/test_flutter_at_a_row.py",
     ),
     "slow-frequencies-are-round-off": Fault(
-        "rodfem/stability/slow_motions.py",
+        "rodfem/stability/nonsymmetric.py",
         "slow = np.flatnonzero(abs(values) < SLOW * one)",
-        "slow = np.flatnonzero(abs(found.values) < 0.0)",
+        "slow = np.flatnonzero(abs(values) < 0.0)",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "rods-that-soften-are-not-slow": Fault(
-        "rodfem/stability/slow_motions.py",
-        "not (pencil.slow or _several(values[slow]))",
-        "not pencil.slow",
+        "rodfem/stability/nonsymmetric.py",
+        "not (self.slow or several)",
+        "not self.slow",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "differences-along-a-locus-by-the-bounds-alone": Fault(
@@ -298,9 +317,9 @@ FAULTS = {
         "tests/codim2/test_locus.py",
     ),
     "zeros-of-a-mesh-make-two-branches-of-an-oval": Fault(
-        "rodfem/diagram/two_sides.py",
-        "    if (differ & ~(first.zero & second.zero & (first.values * second.values > 0))).any():\n",
-        "    if differ.any():\n",
+        "rodfem/diagram/equivalence.py",
+        "alike = (noise > 0) & (first * second > 0)",
+        "alike = (noise > 0) & False",
         "tests/hard/test_fuzz.py",
     ),
     "a-wave-that-is-even-on-its-elements-is-smooth": Fault(
@@ -310,19 +329,19 @@ FAULTS = {
         "tests/adaptivity/test_grading.py",
     ),
     "sides-on-both-sides-of-a-load-are-images": Fault(
-        "rodfem/diagram/two_sides.py",
+        "rodfem/diagram/equivalence.py",
         "LOCATED * special.located_to",
         "1e9 * special.located_to",
         "tests/hard/test_fuzz.py",
     ),
     "steps-are-short-from-where-a-branch-goes-back-to": Fault(
-        "rodfem/diagram/step_check.py",
+        "rodfem/diagram/shorter_steps.py",
         "max(piece.largest, piece.since - point.arclength)",
         "piece.largest",
         "tests/diagram/test_shorter_steps.py",
     ),
     "pieces-of-short-steps-are-forgotten": Fault(
-        "rodfem/diagram/step_check.py",
+        "rodfem/diagram/shorter_steps.py",
         "[piece for piece in self._pieces if piece not in inside] + [new]",
         "[new]",
         "tests/diagram/test_shorter_steps.py",
@@ -367,7 +386,7 @@ FAULTS = {
         "rodfem/adaptivity/error_estimate.py", "LEFT = 0.5", "LEFT = 0.0", "tests/adaptivity/test_event_bars.py"
     ),
     "curves-turn-into-another-branch": Fault(
-        f"{CONTINUATION}states_between.py",
+        f"{CONTINUATION}arc.py",
         "dot(tangent) > ALIGNED",
         "dot(tangent) > 0.0",
         "tests/diagram/test_events.py",
@@ -379,9 +398,9 @@ FAULTS = {
         "tests/diagram/test_another_rod.py",
     ),
     "convexity-is-looked-at-in-rows-alone": Fault(
-        f"{CONTINUATION}convexity_between.py",
-        "if margin(t) > 0.0 or holds(t):",
-        "if margin(t) > 0.0 or t < 1.0 or holds(t):",
+        f"{CONTINUATION}arc.py",
+        "if margin(t) <= 0.0 and not holds(t):",
+        "if margin(t) <= 0.0 and t == 1.0 and not holds(t):",
         "tests/continuation/test_convexity.py",
     ),
     "convexity-of-the-undeformed-state-alone": Fault(
@@ -397,7 +416,7 @@ FAULTS = {
         "rodfem/codim2/curve.py", "FAILURES = 2", "FAILURES = 200", "tests/codim2/test_locus.py"
     ),
     "convexity-in-units-of-one-end": Fault(
-        f"{CONTINUATION}convexity_between.py",
+        f"{CONTINUATION}arc.py",
         "convexity.scales(state(0.0), state(1.0))",
         "convexity.scales(state(0.0))",
         "tests/continuation/test_convexity.py",
@@ -432,12 +451,6 @@ FAULTS = {
         "*(",
         "tests/problem/test_scene_errors.py",
     ),
-    "no-balance-of-the-rod": Fault(
-        f"{CONTINUATION}invariants.py",
-        "return bool(total * max(largest, 1.0) <= UNBALANCED)",
-        "return bool(total * max(largest, 1.0) <= 1e6 * UNBALANCED)",
-        "tests/continuation/test_invariants.py",
-    ),
     "pitchforks-by-their-loads": Fault(
         f"{CONTINUATION}normal_form.py",
         "_pitchfork(leading(amplitudes, even, 2, origin.load_left), hidden",
@@ -446,15 +459,9 @@ FAULTS = {
     ),
     "no-index-before-zero-stretch": Fault(
         "rodfem/diagram/tracer.py",
-        "if beside is not None and beside.negative != a.negative:",
+        "if beside.negative != a.negative:",
         "if False:",
         "tests/adaptivity/test_zero_stretch.py",
-    ),
-    "sides-by-determinants-clear-of-the-least": Fault(
-        "rodfem/diagram/two_sides.py",
-        "        return False\n    widest",
-        "        pass\n    widest",
-        "tests/literature/test_postbuckling.py",
     ),
     "stable-in-space-by-frequencies": Fault(
         "rodfem/output/summary.py",
@@ -554,8 +561,8 @@ FAULTS = {
     ),
     "no-convexity-before-zero-stretch": Fault(
         "rodfem/diagram/tracer.py",
-        "if beside is not None and self._ends_not_convex(branch, a, beside):",
-        "if False:",
+        "if reason := self._lost_convexity(branch, a, beside):",
+        "if reason := '':",
         "tests/continuation/test_convexity.py",
     ),
     "symmetric-pencils-without-natural-units": Fault(
@@ -672,15 +679,8 @@ FAULTS = {
     "bar-of-another-law": Fault(
         "rodfem/adaptivity/error_estimate.py", "if again is None or not alike(again, law):", "if again is None:", ERRORS
     ),
-    "energy-is-not-compared-with-work": Fault(
-        f"{CONTINUATION}work.py", "return off <= SAFETY * expected + noise or", "return True or", WORK
-    ),
-    "energy-of-a-jump-vanishes": Fault(f"{CONTINUATION}work.py", "if off > last / SHRUNK:", "if False:", WORK),
     "potential-of-constraints-at-nodes": Fault(
         "rodfem/fem/equations.py", 'others["potential"] = potential', 'others["potential"] = L', WORK
-    ),
-    "jumps-to-another-branch": Fault(
-        f"{CONTINUATION}jumping.py", "if moved <= FAR and off <= SHARE * moved", "if True", "tests/hard/test_fuzz.py"
     ),
     "writhe-of-one-polygon": Fault(
         "rodfem/writhe.py", "(4 * polygons[-1] - polygons[-2]) / 3", "polygons[-1]", "tests/report/test_contents.py"
@@ -731,7 +731,7 @@ FAULTS = {
         "rodfem/problem/arguments.py", "with ONE_THREAD:", "with RLock():", "tests/app/test_threads.py"
     ),
     "free-rod-drifts-without-a-moment": Fault(
-        "rodfem/fem/phase.py", "SHARE = 0.3", "SHARE = 0.0", "tests/literature/test_free_rods.py"
+        "rodfem/fem/symmetries.py", "SHARE = 0.3", "SHARE = 0.0", "tests/literature/test_free_rods.py"
     ),
     "modes-without-their-parts-along-free-motions": Fault(
         f"{STABILITY}nonsymmetric.py",
@@ -746,7 +746,7 @@ FAULTS = {
         "tests/stability/test_near_zero.py",
     ),
     "a-ring-nearly-breaks-its-motion-along-itself": Fault(
-        "rodfem/fem/phase.py", "ALONG = 1e-5", "ALONG = 1e-3", "tests/fem/test_ring_along_itself.py"
+        "rodfem/fem/symmetries.py", "ALONG = 1e-5", "ALONG = 1e-3", "tests/fem/test_ring_along_itself.py"
     ),
     "a-bent-rod-breaks-a-symmetry": Fault(
         "rodfem/fem/symmetries.py",
@@ -759,23 +759,42 @@ FAULTS = {
     ),
     "pictures-draw-chords": Fault(
         "rodfem/output/smooth.py",
-        "SEEN, LARGEST = 1e-3, 0.5",
-        "SEEN, LARGEST = 1e3, 0.5",
+        "SEEN = 1e-3",
+        "SEEN = 1e3",
         "tests/output/test_smooth.py",
     ),
+    # rows
+    "rows-of-another-branch-are-kept": Fault(
+        f"{CONTINUATION}follow.py",
+        "defect(system, rows) <= UNEXPLAINED",
+        "defect(system, rows) <= 1e9 * UNEXPLAINED",
+        "tests/continuation/test_row_checks.py",
+    ),
+    "a-defect-by-one-tangent": Fault(
+        f"{CONTINUATION}row_checks.py",
+        "known = [p for p in rows[-ROWS:] if",
+        "known = [p for p in rows[-1:] if",
+        "tests/continuation/test_row_checks.py",
+    ),
+    "rows-are-no-equilibria": Fault(
+        f"{CONTINUATION}row_checks.py",
+        "if not worst <= VIOLATED and",
+        "if not worst <= 1e9 * VIOLATED and",
+        "tests/continuation/test_row_checks.py",
+    ),
     # location
-    "location-is-blunt": Fault(f"{CONTINUATION}interpolant.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
+    "location-is-blunt": Fault(f"{CONTINUATION}flutter.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
     "location-at-another-zero": Fault(
-        f"{CONTINUATION}interpolant.py", "np.argmin(abs(real - guess))", "np.argmax(abs(real - guess))", LOCATE
+        f"{CONTINUATION}flutter.py", "np.argmin(abs(real))", "np.argmax(abs(real))", LOCATE
     ),
     "unresolved-points-are-merged-with-others": Fault(
         f"{CONTINUATION}index_chain.py",
-        "(p.resolved is False or q.resolved is False)",
-        "(q.resolved is False)",
+        "s.resolved is not False for s in (p, q))",
+        "True for s in (p, q))",
         CHAIN,
     ),
     "two-passages-of-one-load-are-merged": Fault(
-        f"{CONTINUATION}index_chain.py", "for row in between)\n        ):", "for row in ())\n        ):", CHAIN
+        f"{CONTINUATION}index_chain.py", "for row in between)\n", "for row in ())\n", CHAIN
     ),
     "breaks-are-not-recorded": Fault(
         f"{CONTINUATION}index_chain.py",
@@ -794,12 +813,6 @@ FAULTS = {
         'return NormalForm("pitchfork", best /',
         'return NormalForm("pitchfork", -best /',
         f"{ERRORS}",
-    ),
-    "no-fold-next-to-a-branch-point": Fault(
-        f"{CONTINUATION}switching.py",
-        "if odd * even >= 0 or abs(odd) >= 2 * abs(even):",
-        "if True:",
-        "tests/literature/test_postbuckling.py",
     ),
     "law-of-an-ordinate-that-says-nothing": Fault(
         f"{CONTINUATION}normal_form.py",
@@ -842,9 +855,9 @@ FAULTS = {
         f"{STABILITY}inertia.py", "ZERO_BAND = 1e-7", "ZERO_BAND = 1e-2", f"{INERTIA} {CORD} {CHAIN}"
     ),
     "quotients-of-the-wrong-sign": Fault(
-        f"{STABILITY}round_off.py",
-        "negative = int((theta < -doubt).sum())",
-        "negative = int((theta > doubt).sum())",
+        f"{STABILITY}near_zero.py",
+        "(self.values < -self.uncertainty).sum()",
+        "(self.values > self.uncertainty).sum()",
         INERTIA,
     ),
     "pivots-of-two-rows": Fault(
@@ -911,7 +924,7 @@ FAULTS = {
         "tests/diagram/test_all_frequencies.py",
     ),
     "round-off-of-two-that-meet-has-no-bound": Fault(
-        f"{STABILITY}condensed.py",
+        f"{STABILITY}spectrum.py",
         "np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))",
         "rounded * np.linalg.norm(left, axis=1)",
         "tests/codim2/test_locus.py",
@@ -920,13 +933,13 @@ FAULTS = {
         f"{STABILITY}cluster.py", "FARTHER = 3.0", "FARTHER = 1.0", "tests/codim2/test_places.py"
     ),
     "slepc-sorts-all-eigenvalues": Fault(
-        f"{STABILITY}condensed.py",
+        f"{STABILITY}spectrum.py",
         "                if self.rank > ALL:",
         "                if True:",
         "tests/literature/test_joss_paper.py",
     ),
     "mass-of-a-quaternions-own-length": Fault(
-        f"{STABILITY}condensed.py", "RANK = 1e-13", "RANK = 1e-3", "tests/diagram/test_all_frequencies.py"
+        f"{STABILITY}spectrum.py", "RANK = 1e-13", "RANK = 1e-3", "tests/diagram/test_all_frequencies.py"
     ),
     "divergence-numbered-across-collisions": Fault(
         "rodfem/diagram/critical_loads.py",
@@ -988,15 +1001,15 @@ FAULTS = {
         "noise.of_discriminant) /",
         CLOSE,
     ),
-    "transposed-factors-are-not": Fault(
-        "rodfem/linalg/chain.c",
-        "down(c, WIDTH, 1, y, z);",
-        "down(c, WIDTH, 0, y, z);",
-        "tests/linalg/test_chain.py",
+    "the-cubic-is-the-branch": Fault(
+        "rodfem/continuation/crossings.py",
+        "off = None if size is None else SAFE * (b.s - a.s) ** 4 / 16 * size",
+        "off = 0 * np.eye(len(a.H))",
+        "tests/continuation/test_reduced_stiffness.py",
     ),
     "signs-that-are-the-mesh's-are-the-rod's": Fault(
         "rodfem/adaptivity/soft_states.py",
-        "return int(again.resolved and self._moved(point, found))",
+        "return int(self._moved(point, found) if again.resolved else not fixed_load)",
         "return 0",
         "tests/stability/test_soft_modes.py",
     ),
@@ -1057,7 +1070,7 @@ FAULTS = {
         f"{FILES} {KILLS} tests/output/test_foreign_files.py",
     ),
     "not-finite-numbers-in-a-file": Fault(
-        "rodfem/output/files.py",
+        "rodfem/output/table.py",
         "return float(value) if np.isfinite(value) else None",
         "return float(value)",
         f"{FILES} tests/output/test_foreign_files.py",
@@ -1069,7 +1082,7 @@ FAULTS = {
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
     ),
     "decided-zeros-without-symmetries": Fault(
-        f"{STABILITY}round_off.py", "zero=zero + known", "zero=zero", "tests/stability/test_round_off.py"
+        f"{STABILITY}near_zero.py", "zero=q.zero + found.drifts", "zero=q.zero", "tests/stability/test_round_off.py"
     ),
     "what-newton-leaves-is-nothing": Fault(
         "rodfem/adaptivity/error_estimate.py", "left = STEADY * moved + ROUND_OFF", "left = ROUND_OFF", ERRORS
@@ -1093,7 +1106,7 @@ FAULTS = {
         "tests/stability/test_missing_frequencies.py",
     ),
     "eigensolvers-leave-nothing-open": Fault(
-        "rodfem/stability/cluster_noise.py", "DRAWN = 3.0", "DRAWN = 0.0", "tests/stability/test_cluster_noise.py"
+        "rodfem/stability/cluster.py", "DRAWN = 3.0", "DRAWN = 0.0", "tests/stability/test_cluster_noise.py"
     ),
     "clusters-are-not-closed": Fault(
         "rodfem/stability/cluster.py",
@@ -1117,7 +1130,7 @@ FAULTS = {
         CLOSE,
     ),
     "round-off-is-a-rotation": Fault(
-        "rodfem/stability/mode_type.py", "LEAST = 1e-5", "LEAST = 0.0", "tests/stability/test_mode_type.py"
+        "rodfem/stability/motion_names.py", "LEAST = 1e-5", "LEAST = 0.0", "tests/stability/test_mode_type.py"
     ),
     "straight-rods-have-no-stiffness": Fault(
         "rodfem/fem/quadrature_check.py",
@@ -1173,22 +1186,10 @@ FAULTS = {
         "        if self.error_bars:",
         "tests/diagram/test_sharp_in_state.py",
     ),
-    "integrals-by-two-meshes-alone": Fault(
-        "rodfem/adaptivity/ordinate_bound.py",
-        "        if not self._integrals:",
-        "        if True:",
-        "tests/diagram/test_sharp_in_state.py",
-    ),
-    "integrals-without-their-quadrature": Fault(
-        "rodfem/adaptivity/ordinate_bound.py",
-        "        return abs(value - here.value) + here.left",
-        "        return here.left",
-        "tests/diagram/test_sharp_in_state.py",
-    ),
     "branches-that-attract-alone": Fault(
         "rodfem/continuation/reduced.py",
-        "        if max(abs(values[i : i + 2])) > felt:",
-        "        if False:",
+        "        if max(abs(values[i : i + 2])) > felt\n",
+        "        if False\n",
         "tests/continuation/test_reduced.py",
     ),
     "weak-springs-are-round-off": Fault(
@@ -1216,7 +1217,7 @@ FAULTS = {
         "tests/diagram/test_light_rods.py",
     ),
     "round-off-makes-constraints-independent": Fault(
-        f"{STABILITY}rank.py",
+        f"{STABILITY}dependence.py",
         "_equilibrated(_without_noise(pencil, C, length))",
         "_equilibrated(C)",
         "tests/stability/test_assessment.py",
@@ -1241,8 +1242,8 @@ FAULTS = {
     ),
     "distances-of-the-mesh": Fault(
         f"{STABILITY}dependence.py",
-        "steepness = float(slope.norm() * np.sqrt(change.size))",
-        "steepness = float(np.sqrt(change.size))",
+        "steepness = float(np.linalg.norm(slope) * np.sqrt(len(change)))",
+        "steepness = float(np.sqrt(len(change)))",
         "tests/stability/test_dependence.py",
     ),
     "taut-rods-are-begun-with": Fault(
@@ -1252,7 +1253,7 @@ FAULTS = {
         "tests/stability/test_dependence.py",
     ),
     "flutter-without-the-matrix-s-round-off": Fault(
-        f"{STABILITY}cluster_noise.py",
+        f"{STABILITY}cluster.py",
         "of(2 * W @ B.T), *left",
         "0.0, *left",
         "tests/stability/test_cluster_noise.py",
@@ -1289,12 +1290,6 @@ FAULTS = {
     ),
     "terminal-left-without-its-cursor": Fault(
         "rodfem/app/screen.py", "            self._progress.stop()\n", "", "tests/app/test_screen.py"
-    ),
-    "a-piece-without-a-tangent-is-no-cubic": Fault(
-        "rodfem/continuation/states_between.py",
-        "x = solve_at(solver, lambda t: between(a, b, t), s)\n    except",
-        "x = solve_at(solver, lambda t: (a.x, a.tangent + b.tangent), s)\n    except",
-        "tests/hard/test_fuzz.py",
     ),
     "locus-of-a-mean-with-the-bar-of-one": Fault(
         "rodfem/codim2/criteria.py", "split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI
@@ -1380,13 +1375,7 @@ FAULTS = {
         LOCI,
     ),
     "stable-side-beyond-a-crossing": Fault(
-        "rodfem/output/stable_region.py", "if passed(one).any() or not side", "if not side", LOCI
-    ),
-    "shade-goes-on-beyond-a-crossing": Fault(
-        "rodfem/output/plot_locus.py",
-        "np.where(crossings % 2, -1.0, 1.0)",
-        "np.ones(len(crossings))",
-        "tests/output/test_plot_diagram.py",
+        "rodfem/output/stable_region.py", "if crossed or not side", "if not side", LOCI
     ),
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/criteria.py", "curve.part > IMPERFECT", "curve.part > 1e9", LOCI

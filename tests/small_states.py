@@ -14,10 +14,9 @@ from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.linalg.matrices import first_of, gathered
+from rodfem.kumar_healey.coordinates import Coordinates
+from rodfem.kumar_healey.reduction import Reduction
 from rodfem.problem.scene import Scene
-from rodfem.stability.blocks import Blocks
-from rodfem.stability.reduction import Reduction
 
 
 def scene(name: str) -> Scene:
@@ -45,8 +44,7 @@ def plain(name: str, formulation: str, elements: int, degree: int, load: float) 
 def buckled(name: str, formulation: str, elements: int, degree: int, load: float) -> tuple[System, PETSc.Vec]:
     """State that Newton's method finds from the former, moved along its left-most mode."""
     system, x = plain(name, formulation, elements, degree, load)
-    blocks = Blocks(system)
-    mode = unit_mode(system, blocks, x)
+    mode = unit_mode(system, x)
     for amplitude in (0.6, 1.0, 1.3, 0.4):
         guess = x.copy()
         guess.axpy(amplitude, mode)
@@ -58,17 +56,16 @@ def buckled(name: str, formulation: str, elements: int, degree: int, load: float
     raise AssertionError(f"no buckled state of {name} was found at {load}")
 
 
-def unit_mode(system: System, blocks: Blocks, x: PETSc.Vec) -> PETSc.Vec:
+def unit_mode(system: System, x: PETSc.Vec) -> PETSc.Vec:
     """Left-most mode of the state ``x`` as a vector of the system, of norm 1."""
-    pencil = blocks.assemble(x)
+    coordinates = Coordinates(system)
+    pencil, rows = coordinates.assemble(x), coordinates.blocks.rows
     found = Reduction(pencil).near(2, -100.0)
     lowest = found.vectors[:, abs(found.values - found.values[0]) < 1e-6 * abs(found.values[0])]
-    every: Any = gathered(pencil.T) @ lowest
+    every: Any = pencil.T @ lowest
     # of a line or a plane of modes the one that a fixed functional likes best: the same on fine and on coarse meshes
     full = every @ np.linalg.solve(every.T @ every, every.T @ np.linspace(1.0, 1.4, len(every)))
-    first = first_of(system.comm, len(blocks.rows))
-    mode = system.new_vector()
-    mode.array[blocks.rows - system.fields.offset] = full[first : first + len(blocks.rows)]
-    mode.assemble()
+    mode, (mine, places) = system.new_vector(), coordinates.blocks.own(rows)
+    mode.array[places] = full[mine]
     mode.scale(1.0 / system.norm(mode))
     return mode

@@ -11,10 +11,9 @@ import json
 import sys
 from math import isnan
 from statistics import median
-from time import process_time
+from time import perf_counter, process_time
 from typing import Any
 
-import rodfem.timing
 from benchmarks.speed.run import PARTS
 from benchmarks.speed.scenes import loads, scene, value
 from benchmarks.targets import TARGETS
@@ -26,12 +25,12 @@ from rodfem.diagram.trace import trace
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 
-rodfem.timing.perf_counter = process_time
-"""The clock measures processor time here, so that other work on the machine does not count."""
-
 
 class Timed(Observer):
-    """Notes the processor time of the setting up, of each branch with the clock's parts of it, and of all branches."""
+    """Notes the processor time of the setting up, of each branch with the clock's parts of it, and of all branches.
+
+    The clock itself measures wall time: a call of the system for each of its parts would cost as much as some of them.
+    """
 
     def __init__(self) -> None:
         """The setting up begins."""
@@ -46,13 +45,14 @@ class Timed(Observer):
 
     def branch(self, branch: Branch) -> None:
         """A branch begins."""
-        self.before, self.begun = dict(self.clock.seconds), process_time()
+        self.before, self.begun, self.wall = dict(self.clock.seconds), process_time(), perf_counter()
 
     def complete(self, diagram: Diagram) -> None:
         """Note the processor time of the last branch, that of following it alone, and the parts of this."""
         now, clock = process_time(), self.clock
         self.run, seconds = now - self.started, now - self.begun
-        parts = {name: clock.seconds.get(name, 0.0) - self.before.get(name, 0.0) for name in (*PARTS, "location")}
+        share, before = seconds / (perf_counter() - self.wall), self.before
+        parts = {x: share * (clock.seconds.get(x, 0.0) - before.get(x, 0.0)) for x in (*PARTS, "location")}
         self.cost[diagram[-1].name] = {"seconds": seconds, "following": seconds - parts.pop("location"), **parts}
 
 

@@ -20,7 +20,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 from benchmarks.speed.run import PAPER
 from benchmarks.store import Store
 from benchmarks.targets import TARGETS, Target
-from rodfem.output.sheet import STYLE
+from rodfem.output.style import STYLE
 
 Row = dict[str, Any]
 Table = list[list[str]]

@@ -28,13 +28,13 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
+from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_piece import nearest
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
-from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, halved, richer_system

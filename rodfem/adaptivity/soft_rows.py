@@ -60,6 +60,7 @@ class SoftRows:
                 self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
         if self.error_bars and doubtful:
             self._leave_out_doubtful(branch, family=family)
+            _doubt_between(branch)
         for fold in (s for s in branch.special if s.kind == FOLD):
             self._change_at_fold(fold, branch.points)
 
@@ -115,6 +116,17 @@ class SoftRows:
             richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
             self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
         return self._states[point.mesh]
+
+
+def _doubt_between(branch: Branch) -> None:
+    """Let a row be undecided if both its neighbours are, by as much: there two meshes agree on a value by chance."""
+    special = {id(s.point) for s in branch.special}
+    for before, row, after in zip(branch.points, branch.points[1:], branch.points[2:], strict=False):
+        doubt = before.negative, before.undecided
+        if not row.undecided and doubt == (after.negative, after.undecided) and doubt[1] and id(row) not in special:
+            if row.negative_in_space is not None:
+                row.negative_in_space += doubt[0] - row.negative
+            row.negative, row.undecided, row.soft = *doubt, before.soft
 
 
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:

@@ -21,17 +21,16 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
+from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.states_between import STEADY, stepped
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL, ROUGH, Factored
 from rodfem.stability.motion_names import SHARE, MotionNames
-from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
-from rodfem.stability.round_off import SPARE, decide, quotient_error
+from rodfem.stability.near_zero import SPARE, NearZero, decide, judge, near_zero, quotients, soft_limit
 from rodfem.stability.soft_mode import Judgement, SoftMode
 
 REFINEMENTS = 2
@@ -105,7 +104,10 @@ class SoftStates:
         return 0.0 if regular is None or regular.index is None else regular.index.nearest
 
     def _differing(self, point: Point, fixed_load: bool) -> int:
-        """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one."""
+        """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one.
+
+        A row of a branch in doubt that the richer mesh does not have is in doubt, too.
+        """
         with self.solver.system.clock.scope("error bars"):
             richer = self._companion(0)
             try:
@@ -114,11 +116,11 @@ class SoftStates:
                 below = found.below(-inertia.tolerance)
                 if below == point.negative:
                     self.uncompared = "" if again.resolved else _other_state(point.load, again)
-                    return int(again.resolved and self._moved(point, found))
+                    return int(self._moved(point, found) if again.resolved else not fixed_load)
                 index = decide(found).index
             except ConvergenceError as trouble:  # no such state, or arithmetic leaves too many signs open there
                 self.uncompared = str(trouble)
-                return 0
+                return int(not fixed_load)
         own = point.zero - self.solver.system.active_drifts(point.x)
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 
@@ -172,7 +174,7 @@ class SoftStates:
         vectors = [near.vectors[i] for i in kept]
         return replace(
             near, values=near.values[kept], vectors=vectors, uncertainty=near.uncertainty[kept],
-            zero=near.zero + len(own),
+            rest=near.rest + len(own),
         )  # fmt: skip
 
     def _refined(
@@ -281,11 +283,9 @@ def _nearest(
     with solver.inertia.afresh():
         nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
     vectors = [v for v in nearest if across(solver.system.metric, [v], still)][:number]
-    values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
-    floor = TOLERANCE * solver.inertia.scale
-    rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])
+    q = quotients(found, vectors, TOLERANCE * solver.inertia.scale)
     row = solver.axis if point.tangent is None else solver.row(point.tangent)
     settled = solver.inertia.at(stepped(solver, point.x, row))
-    moved = abs(np.array([v.dot(settled.matrix * v).real for v in vectors]) - values)
-    order = np.argsort(values)
-    return values[order], (rounding + STEADY * moved)[order]
+    moved = abs(np.array([v.dot(settled.matrix * v).real for v in vectors]) - q.values)
+    order = np.argsort(q.values)
+    return q.values[order], (q.uncertainty + STEADY * moved)[order]

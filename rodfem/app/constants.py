@@ -54,7 +54,7 @@ class Statement:
             scene, self.words = of, of.title
             others = [(name, p.value) for name, p in scene.parameters.items() if name != scene.load]
             self.constants = [Constant(name, value, float, None, "") for name, value in others]
-            self._of: Callable[..., Scene] = lambda **values: scene.varying(scene.load, scene.span, **values)
+            self._of: Callable[..., Scene] = scene.varying
         else:
             self.words = cleandoc(of.__doc__ or "")
             described = descriptions(getdoc(of) or "")

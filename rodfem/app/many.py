@@ -46,6 +46,7 @@ def many(
 ) -> list[dict[str, Any]]:
     """Return ``work(scene)`` for all scenes, in order, on every rank; rods are dealt out to the ranks in turn.
 
+    Scenes that :meth:`~rodfem.Scene.varying` has made from one another share their equations: they are set up faster.
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
     :class:`InputError` or :class:`ConvergenceError`, or a numerical library or memory gives up, the result is
     ``{"error": sentence}``, and the others go on.  ``progress(done, all)`` is called on rank 0 after each of its rods.

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from rodfem.app.cli import Parser, folder
 from rodfem.errors import InputError
-from rodfem.stability.methods import AUTO, METHODS
+from rodfem.stability.registry import AUTO, METHODS
 
 if TYPE_CHECKING:
     from rodfem.diagram.plan import Plan
     from rodfem.fem.fields import Discretization
 
-STEP = 0.05
+STEP = 0.1
 """Largest step along a branch, in radian, by default."""
 
 

@@ -23,7 +23,7 @@ from rodfem.diagram.trace import PLAN, traced
 from rodfem.fem.fields import Discretization
 from rodfem.output.files import save_json
 from rodfem.output.folder import locked
-from rodfem.output.typical import typical_state
+from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
@@ -101,7 +101,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     terminal.save(diagram)
     data = diagram.data
     on_first(comm, lambda: save_json(data, output / "diagram.json"))
-    terminal.table(branches, diagram.solvers[0].system, plan.most_branches)
+    terminal.table(data, branches, plan.most_branches)
     terminal.summary(data)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from math import isfinite
 from textwrap import fill, wrap
@@ -16,8 +16,8 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem import code_cache
-from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH, Branch, NormalForm, Point, SpecialPoint, not_followed
-from rodfem.continuation.kinds import END, FLUTTER
+from rodfem.continuation.branch import ORDINATE, Branch, Point, SpecialPoint, not_followed
+from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
@@ -25,8 +25,10 @@ from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
 from rodfem.launcher import RANK
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import NO_ESTIMATE, in_decimals, in_words, index_in_words, number, rounded_up, with_unit
+from rodfem.output.digits import in_decimals, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
+from rodfem.output.table import row_data, special_data
+from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, law_in_words, many, table_of
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -36,22 +38,9 @@ from rodfem.timing import WORK, Clock
 if TYPE_CHECKING:
     from rodfem.app.screen import Screen
 
-INDEX, UNSTABLE = "index", "unstable"
-"""Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
 WIDTH, PAUSE = 110, 30.0
 """Columns of a paragraph; seconds between two lines of progress that stay."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
-
-
-def _law(law: NormalForm, resolved: bool | None) -> str:
-    """Local law of a branch point, whose state the mesh has ``resolved`` or not, in words."""
-    if law.kind == VERTICAL_BRANCH:
-        return f"{law.kind}: a family of equilibria at one and the same load"
-    sign, x = "-" if law.coefficient < 0 else "+", "x" if law.of == ORDINATE else "a"
-    x += f"^{law.power}" if law.power > 1 else ""
-    if isfinite(law.uncertainty) and law.uncertainty >= abs(law.coefficient):
-        return f"{law.kind}, load = load_b + c {x} + ..., where c is not told from zero"
-    return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty, resolved)} {x} + ..."
 
 
 def _mesh(system: System) -> str:
@@ -75,6 +64,21 @@ def _roots(point: Point, one: float) -> dict[str, str]:
             text = re if value[0] >= 0 else f"{im}i"
             words.setdefault(kind, []).append(text if value[1] == 0 else f"{re}+-{im}i")
     return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
+
+
+def _eigenvalues(found: Verdict, modes: Modes | None) -> Iterator[str]:
+    """Eigenvalues of a verdict in words, with their errors and motions if ``modes`` were computed."""
+    errors, motions = np.full(len(found.values), np.nan), ("",) * len(found.values)
+    rows = zip(found.values, found.errors, errors, motions, strict=True)
+    if modes is not None:
+        rows = zip(modes.value, modes.residual, modes.error, modes.motion, strict=True)
+    for value, residual, error, motion in rows:
+        doubt = f" ({rounded_up(error):.0e})" if isfinite(error) else ""
+        number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
+        known = f"residual {residual:.0e}" if isfinite(residual) else ""
+        yield f"mu = {number + doubt:<28} {known:<15} {motion}".rstrip()
+    if modes is not None and modes.note:
+        yield modes.note
 
 
 def broken(line: str, columns: int) -> list[str]:
@@ -171,7 +175,7 @@ class Report(Observer):
             self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         self.units, self.load = scene.units, scene.load
-        self.count = INDEX if scene.conservative else UNSTABLE
+        self.count = INDEX if scene.conservative else COUNT
         self.wide = len("0->1 (in space 2)") if scene.planar and scene.conservative else max(6, len(self.count))
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
@@ -242,16 +246,17 @@ class Report(Observer):
     def _line(self, special: SpecialPoint) -> str:
         p, units = special.point, self.units
         connects_to = f"  meets {special.connects_to[0]}" if special.connects_to else ""
+        index = index_in_words(special_data(special), row_data(p))
         return (
             f"{special.kind.code}   {in_decimals(p.load, 10, units.load):<14} "
             f"{in_decimals(p.ordinate, 9, units.ordinate):<14} {in_decimals(p.energy, 6, units.energy):<10} "
-            f"{index_in_words(special):>{self.wide}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
+            f"{index:>{self.wide}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
         )
 
     def law(self, special: SpecialPoint) -> None:
         """Print the local law of a branch point, if it has one."""
         if special.law is not None:
-            law = _law(special.law, special.resolved)
+            law = law_in_words(special_data(special))
             even = special.law.power == 1 and "pitchfork" in special.law.kind
             what = "x is the change of the ordinate" + ", of second order in the amplitude" * even
             if special.law.of != ORDINATE:
@@ -264,46 +269,49 @@ class Report(Observer):
             self.say("  " + self._line(branch.special[-1]))
         self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
 
-    def table(self, branches: Sequence[Branch], system: System, most: int = 0) -> None:
-        """Print the final table: every special point with its error bar; ``most`` is the plan's number of branches."""
-        scene = system.scene
-        load, ordinate = (with_unit(scene.load, scene.parameters[scene.load].unit),
-                          with_unit(scene.ordinate.name, scene.ordinate.unit))  # fmt: skip
-        known = any(isfinite(s.error_estimate) for b in branches for s in b.special)
-        bars = "in parentheses a bound of the error" if known else "no estimate of the errors"
-        self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
-        wide = max([len("branch point"), *(len(s.kind.words) for b in branches for s in b.special)])
-        self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
-        scale = max([self.units.ordinate, *(abs(p.ordinate) for b in branches for p in b.points)])
-        for branch in branches:
-            for s in branch.special:
-                load, ordinate, index = in_words(s, scale)
-                load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
-                zero = f", {s.point.zero} zero" if s.point.zero else ""
-                self.say(f"  {branch.name:<12} {s.kind.words:<{wide}} {load:<24} {ordinate:<24} {index}{zero}")
-                for mode in s.point.soft:
-                    self.say(f"    {mode}")
-                if s.kind == FLUTTER:
-                    self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
-                if s.note:
-                    self.say(f"    {s.note}")
-            for sentence in filter(None, (branch.start_in_words(scene.load), *map(str, branch.unexplained))):
-                self.warn(f"{branch.name}: {sentence}")
+    def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
+        """Print the final table: every special point of a diagram, with its error bar, and what is left open.
 
-        if coarse := sum(s.resolved is False for b in branches for s in b.special):
+        ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
+        """
+        load, ordinate = (with_unit(data[x], data.get(f"{x}_unit") or "") for x in ("parameter", "ordinate"))
+        special, rows = [s for branch in branches for s in branch.special], list(table_of(data))
+        bars = "in parentheses a bound of the error" if is_estimated(data) else "no estimate of the errors"
+        self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
+        wide = max([len("branch point"), *(len(row[1]) for row in rows)])
+        self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
+        for name, kind, *numbers, index, remarks in rows:
+            self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
+            self.lines(remarks)
+        for branch in branches:
+            self._doubts(branch)
+        if coarse := sum(s.resolved is False for s in special):
             self.warn(
-                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: the value in parentheses is "
-                "no bound there, and whether the rod has such a point is open; use more elements or a higher degree."
+                f"The mesh does not resolve {many(coarse, 'special point')}: the value in parentheses is no bound "
+                "there, and whether the rod has such a point is open; use more elements or a higher degree."
             )
-        missed = not_followed(branches)
-        if missed:
+        self._not_followed(branches, most)
+
+    def _doubts(self, branch: Branch) -> None:
+        """Say where the index of a branch is not explained, and whether its first state is singular."""
+        for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
+            self.warn(f"{branch.name}: {sentence}")
+
+    def _not_followed(self, branches: Sequence[Branch], most: int) -> None:
+        """Say how many branch points were not followed, why, and what would follow them."""
+        if missed := not_followed(branches):
             deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
             more = Argument("Plan", "depth", deepest + 1)
             limit = f"as the depth is {deepest} (switches from the first branch)"
             if most and len(branches) >= most:
                 more, limit = Argument("Plan", "most_branches", 2 * most), f"as there are {len(branches)} branches"
-            many = "s were" if missed > 1 else " was"
-            self.say(f"  {missed} branch point{many} not followed, {limit}: {more} follows what leaves there")
+            points = many(missed, "branch point was", "branch points were")
+            self.say(f"  {points} not followed, {limit}: {more} follows what leaves there")
+
+    def lines(self, remarks: Iterable[str]) -> None:
+        """Print lines that belong to the one before."""
+        for remark in remarks:
+            self.say(f"    {remark}")
 
     def summary(self, data: Mapping[str, Any]) -> None:
         """Print a diagram, the contents of ``diagram.json``, in sentences."""
@@ -313,75 +321,65 @@ class Report(Observer):
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""
-        rows = [(b, s) for b in branches for s in b.special if s.point.spectrum]
+        rows = [(b.name, s.kind.words, s.point) for b in branches for s in b.special if s.point.spectrum]
         if rows:
             inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
             self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out; no error bars)")
-        wide = max((len(s.kind.words) for _, s in rows), default=0)
-        for branch, s in rows:
-            self.say(
-                f"  {branch.name:<12} {s.kind.words:<{wide}} {s.point.load:<13.8g} "
-                + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum)
-            )
+        wide = max((len(kind) for _, kind, _ in rows), default=0)
+        for name, kind, point in rows:
+            values = "  ".join(f"{mu:.6g}" for mu in point.spectrum)
+            self.say(f"  {name:<12} {kind:<{wide}} {point.load:<13.8g} {values}")
 
     def frequencies(self, branches: Sequence[Branch], load: str, rows: int = 11) -> None:
         """Print the square roots of the left-most eigenvalues against the load, if the scene has them."""
         points = [p for b in branches for p in b.points if p.omega2]
-        if not points:
-            return
-        self.say(
-            f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load} (errors not estimated)"
-        )
         shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
-        columns = [_roots(p, self.units.omega2**0.5) for p in shown]
-        widths = {
-            kind: max(len(c.get(kind, "")) for c in [*columns, {kind: kind}])
-            for kind in sorted({k for c in columns for k in c})
-        }
-        self.say(f"  {load:>10}  " + "   ".join(f"{kind:<{width}}" for kind, width in widths.items()))
-        for p, column in zip(shown, columns, strict=True):
-            words = "   ".join(f"{column.get(kind, ''):<{width}}" for kind, width in widths.items())
-            self.say(f"  {in_decimals(p.load, 4, self.units.load):>10}  {words}".rstrip())
+        if points:
+            self.say(
+                f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load} "
+                "(errors not estimated)"
+            )
+            self._frequencies(shown, load)
+
+    def _frequencies(self, shown: Sequence[Point], load: str) -> None:
+        table = [_roots(p, self.units.omega2**0.5) for p in shown]
+        kinds = sorted(set().union(*table))
+        table.insert(0, dict(zip(kinds, kinds, strict=True)))
+        widths = {kind: max(len(words.get(kind, "")) for words in table) for kind in kinds}
+        heads = [load, *(in_decimals(p.load, 4, self.units.load) for p in shown)]
+        for head, words in zip(heads, table, strict=True):
+            cells = "   ".join(f"{words.get(kind, ''):<{width}}" for kind, width in widths.items())
+            self.say(f"  {head:>10}  {cells}".rstrip())
         if "torsion" not in widths:
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
         """Print the verdict on one state, with its modes if they were computed.
 
-        ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` the modes, if
-        computed.
+        ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` its modes.
         """
-        index, many = index_range(found.negative, found.undecided), "s"[: found.negative + found.undecided != 1]
-        unstable = f"unstable in {index} direction{many}"
-        if self.count == UNSTABLE:
-            unstable = f"unstable, {index} eigenvalue{many} negative or complex"
-        if found.stable is None:
-            unstable = f"undecided, {self.count} {index_range(found.negative, found.undecided, found.kink)}"
-            unstable += f" of the {found.kink}" if found.kink else ""
-        unstable = "stable" if found.stable else unstable
         zero = f", {found.zero} zero" if found.zero else ""
-        self.say(f"  {name}, {load}: {unstable}{zero}")
-        for mode in found.soft:
-            self.say(f"    {mode}")
-        motions = ("",) * len(found.values) if modes is None else modes.motion
-        errors = np.full(len(found.values), np.nan) if modes is None else modes.error
-        values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)
-        for value, residual, error, motion in zip(values, residuals, errors, motions, strict=True):
-            doubt = f" ({rounded_up(error):.0e})" if isfinite(error) else ""
-            number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
-            known = f"residual {residual:.0e}" if isfinite(residual) else ""
-            self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
-        if modes is not None and modes.note:
-            self.say(f"    {modes.note}")
+        self.say(f"  {name}, {load}: {self._stability(found)}{zero}")
+        self.lines(map(str, found.soft))
+        self.lines(_eigenvalues(found, modes))
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
-        took = f"{found.factorisations} factorisation{'s'[: found.factorisations != 1]}, {1e3 * found.seconds:.1f} ms"
+        took = f"{many(found.factorisations, 'factorisation')}, {1e3 * found.seconds:.1f} ms"
         self.say(f"    {found.method} ({found.reason}){proof}; {took}")
         if found.band:
             inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
-            self.say(
-                f"    inertia decides beyond {found.band:.1e} (in the metric of rotations)"
-                + (f"; inside: {inside}" if inside else "")
-            )
+            inside = f"; inside: {inside}" if inside else ""
+            self.say(f"    inertia decides beyond {found.band:.1e} (in the metric of rotations){inside}")
+
+    def _stability(self, found: Verdict) -> str:
+        if found.stable:
+            return "stable"
+        index, one = index_range(found.negative, found.undecided), found.negative + found.undecided == 1
+        if found.stable is None:
+            of = f" of the {found.kink}" if found.kink else ""
+            return f"undecided, {self.count} {index_range(found.negative, found.undecided, found.kink)}{of}"
+        if self.count == COUNT:
+            return f"unstable, {index} eigenvalue{'s' * (not one)} negative or complex"
+        return f"unstable in {index} direction{'s' * (not one)}"
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""

@@ -22,8 +22,7 @@ from rodfem.codim2.plane import Destroyed, Guess, LocusPoint, Plane
 from rodfem.codim2.unstable import UNSTABLE, unstable
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
-from rodfem.stability.cluster_noise import noise_of
+from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure, noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF
 

@@ -148,6 +148,10 @@ class NormalForm:
     side: int
     of: str = ORDINATE
 
+    def resolved(self, part: float) -> bool:
+        """Whether the coefficient is certain but for a ``part``."""
+        return self.uncertainty <= part * abs(self.coefficient)
+
     def classify(self, index_below: int, index_above: int) -> None:
         """Name a pitchfork by the index of the branch that it leaves at loads just below and just above.
 

@@ -14,14 +14,14 @@ from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.regular_point import RegularPoints
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import NewtonResult, correct
+from rodfem.fem.newton import STEPS, NewtonResult, correct
 from rodfem.fem.state import Energies
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
 from rodfem.stability.inertia import Index, Inertia
+from rodfem.stability.near_zero import decide
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.pencil import least_eigenvalue
-from rodfem.stability.round_off import decide
 from rodfem.stability.symmetric import SymmetricSolver
 
 ASIDE = 0.1
@@ -185,7 +185,7 @@ class BranchSolver(StaticSolver):
         the normal of the plane on which the equilibrium lies, and ``reach`` bounds how far ``x`` may move, in the
         metric.
         """
-        outcome = correct(self.system, x, row, reach, along=True)
+        outcome = correct(self.system, x, row, reach, STEPS)
         if not outcome.converged:
             return outcome, None, None
         at = self.regular.at(x)

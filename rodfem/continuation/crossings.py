@@ -13,12 +13,17 @@ index across the border, by which the piece is too long for it.
 Most pieces have none, and one test says so: in the eigenvectors of ``H(0) + H(1)`` all four control matrices of
 Bernstein have a positive definite block, and a negative definite one.  Then so has each of their means, and a matrix of
 this shape is regular.
+
+The cubic through nodes at a and b is off by ``(s - a)^2 (s - b)^2 H''''/4!``.  A third node shows the fourth
+derivative: the row before, by the cubic that is extrapolated, or a state in the piece.  If what that leaves open may
+hide a crossing, the piece is divided: the blocks are definite with that margin, and an eigenvalue that passes zero is
+faster than the margin changes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -26,17 +31,23 @@ import numpy as np
 import scipy.linalg
 from numpy.polynomial import Polynomial
 
-from rodfem.continuation.interpolant import REAL
-from rodfem.stability.dense import FINITE
 from rodfem.stability.reduced_stiffness import negative
+from rodfem.stability.spectrum import FINITE
 from rodfem.tolerances import TINY
 
 AXIS = 0.4
 """Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
+REAL = 1e-6
+"""Imaginary part below which a zero of an interpolant, in lengths of its interval, is real."""
 DEEPEST = 8
 """Divisions of a piece."""
 SHORTEST = 1e-8
 """Length of a piece, in the metric, that is not divided."""
+SAFE, NEAR = 10.0, 0.1
+"""Times the fourth derivative at one place that bounds it in a piece, and what the cubic is off that is less than the
+rate of an eigenvalue which passes zero once; distance from there, in pieces, at which it is far from zero."""
+PLACES = np.linspace(0.02, 0.98, 49)
+"""Where other eigenvalues are compared with zero, in pieces."""
 SAME, ALIKE = 1e-12, 0.9
 """Distance of crossings, in the metric, that are one; cosine of the modes of different ones, at most."""
 
@@ -82,16 +93,30 @@ def coefficients(a: Node, b: Node) -> list[np.ndarray]:
     return [a.H, h * a.slope, 3 * d - h * (2 * a.slope + b.slope), h * (a.slope + b.slope) - 2 * d]
 
 
-def clear(a: Node, b: Node) -> bool:
-    """Whether the cubic between two nodes is regular for a reason that costs little to see."""
+def fourth(a: Node, b: Node, c: Node) -> np.ndarray:
+    """Size ``|H''''|/4!`` of the fourth derivative (k, k), by what node ``c`` is off the cubic, and its slope."""
+    h, left, right = b.s - a.s, c.s - a.s, c.s - b.s
+    steep = 2 * abs(left * right) * max(abs(left + right), h / 2)  # in the middle slopes do not tell
+    value = _size(c.H - at(a, b, left / h)) / (left * right) ** 2
+    return value + _size(c.slope - rate(a, b, left / h) / h) / steep
+
+
+def _size(A: np.ndarray) -> np.ndarray:
+    """``(A^2)^(1/2)`` of a symmetric matrix."""
+    values, vectors = np.linalg.eigh(A)
+    return np.asarray(vectors * abs(values) @ vectors.T)
+
+
+def clear(a: Node, b: Node, off: np.ndarray) -> bool:
+    """Whether ``H``, from which the cubic is ``off`` at most, is regular between two nodes, by a cheap test."""
     h = (b.s - a.s) / 3
     control = np.stack([a.H, a.H + h * a.slope, b.H - h * b.slope, b.H])
     values, vectors = np.linalg.eigh(a.H + b.H)
     n = int((values < 0).sum())
-    turned = vectors.T @ control @ vectors
+    turned, margin = vectors.T @ control @ vectors, vectors.T @ off @ vectors
     return bool(
-        (n == 0 or np.linalg.eigvalsh(turned[:, :n, :n])[:, -1].max() < 0)
-        and (n == len(values) or np.linalg.eigvalsh(turned[:, n:, n:])[:, 0].min() > 0)
+        (n == 0 or np.linalg.eigvalsh(turned[:, :n, :n] + margin[:n, :n])[:, -1].max() < 0)
+        and (n == len(values) or np.linalg.eigvalsh(turned[:, n:, n:] - margin[n:, n:])[:, 0].min() > 0)
     )
 
 
@@ -123,54 +148,92 @@ def rate(a: Node, b: Node, t: float) -> np.ndarray:
     return np.asarray(A[1] + t * (2 * A[2] + 3 * t * A[3]))
 
 
-def crossings(
-    a: Node,
-    b: Node,
-    solve: Callable[[Node, Node, float], Node | None],
-    tolerance: float,
-    misses: list[Node],
-    depth: int = 0,
-) -> list[Crossing]:
-    """All crossings between two nodes ``a``, ``b``; ``solve`` makes a node between two others.
+@dataclass
+class Zeros:
+    """Finds crossings; ``solve`` makes a node between two others.
 
-    The piece is one of a larger one that was divided ``depth`` times.  Eigenvalues of several modes that are within the
-    ``tolerance`` of zero at one place pass it there.  ``misses`` gets nodes at which an eigenvalue is nearly zero, and
-    does not pass it.
+    Eigenvalues of several modes that are within the ``tolerance`` of zero at one place pass it there.  ``misses`` are
+    nodes at which an eigenvalue is nearly zero, and does not pass it.
     """
-    h = b.s - a.s
-    if a.far == b.far and clear(a, b):
-        return []
-    found = roots(a, b)
-    real = np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)])
-    near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0.02) & (found.real < 0.98)]
-    groups = together(a, b, real, tolerance)
-    ask = None
-    if a.far != b.far:
-        ask = 0.47
-    elif len(groups) > 1:
+
+    solve: Callable[[Node, Node, float], Node | None]
+    tolerance: float
+    misses: list[Node] = field(default_factory=list)
+
+    def between(self, a: Node, b: Node, size: np.ndarray | None = None, depth: int = 0) -> list[Crossing]:
+        """All crossings between two nodes ``a``, ``b``, of a piece that was divided ``depth`` times.
+
+        ``size`` is that of the :func:`fourth` derivative; None if it is not known.
+        """
+        off = None if size is None else SAFE * (b.s - a.s) ** 4 / 16 * size
+        if off is not None and a.far == b.far and clear(a, b, off):
+            return []
+        found = roots(a, b)
+        real = np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)])
+        groups = together(a, b, real, self.tolerance)
+        ask, miss = _open(a, b, found, groups, off)
+        middle = self._divided(a, b, ask) if depth < DEEPEST else None
+        if middle is None:
+            return list(_passed(a, b, groups))
+        known, size = len(self.misses), fourth(a, b, middle)
+        out = [*self.between(a, middle, size, depth + 1), *self.between(middle, b, size, depth + 1)]
+        if miss and not out and len(self.misses) == known:
+            self.misses.append(middle)
+        return out
+
+    def _divided(self, a: Node, b: Node, t: float | None) -> Node | None:
+        """Node at t, unless that is None, or the piece short."""
+        return None if t is None or b.s - a.s <= SHORTEST else self.solve(a, b, a.s + t * (b.s - a.s))
+
+
+def _passed(a: Node, b: Node, groups: list[list[float]]) -> Iterator[Crossing]:
+    """Crossings at the roots of the cubic, in ``groups``."""
+    index, h = a.index, b.s - a.s
+    for group in groups:
+        own, rates = _passing(a, b, group)
+        after = index - int(np.sign(rates).sum())
+        yield Crossing(a.s + float(np.mean(group)) * h, own, index, after, (a, b), (group[-1] - group[0]) * h)
+        index = after
+
+
+def _open(
+    a: Node, b: Node, found: np.ndarray, groups: list[list[float]], off: np.ndarray | None
+) -> tuple[float | None, bool]:
+    """Where a piece is to be divided, None if it need not, and whether that is at a near miss of zero.
+
+    All ``found`` roots of the cubic are given, the ``groups`` of real ones, and how far it may be ``off``.
+    """
+    near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0) & (found.real < 1)]
+    if a.far == b.far and len(groups) > 1:
         gaps = [q[0] - p[-1] for p, q in pairwise(groups)]
         i = int(np.argmax(gaps))
-        ask = float(np.clip((groups[i][-1] + groups[i + 1][0]) / 2, 0.01, 0.99))
-    elif len(near):
-        ask = float(near[abs(near.imag).argmin()].real)
-    if ask is not None and depth < DEEPEST and h > SHORTEST:
-        middle = solve(a, b, a.s + ask * h)
-        if middle is not None:
-            known = len(misses)
-            out = crossings(a, middle, solve, tolerance, misses, depth + 1)
-            out += crossings(middle, b, solve, tolerance, misses, depth + 1)
-            if not out and a.far == b.far and len(misses) == known:
-                misses.append(middle)
-            return out
-    out, index = [], a.index
-    for group in groups:
-        t = float(np.mean(group))
-        values, vectors = np.linalg.eigh(at(a, b, t))
-        own = vectors[:, np.argsort(abs(values))[: len(group)]]
-        change = -int(np.sign(np.linalg.eigvalsh(own.T @ rate(a, b, t) @ own)).sum())
-        out.append(Crossing(a.s + t * h, own, index, index + change, (a, b), (group[-1] - group[0]) * h))
-        index += change
-    return out
+        return float(np.clip((groups[i][-1] + groups[i + 1][0]) / 2, 0.01, 0.99)), False
+    if a.far == b.far and len(near):
+        return float(np.clip(near[abs(near.imag).argmin()].real, 0.02, 0.98)), True
+    if a.far != b.far or off is None or not groups:
+        return 0.47, False
+    if _alone(a, b, groups[0], off):
+        return None, False
+    return float(np.mean(groups[0]) + (1 if np.mean(groups[0]) < 0.5 else 0)) / 2, False
+
+
+def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
+    """Whether no other eigenvalue passes zero than those of a ``group``, which are fast enough to pass it once."""
+    own, rates = _passing(a, b, group)
+    if abs(rates).min() <= SAFE * np.linalg.norm(own.T @ off @ own, 2):
+        return False
+    values, vectors = np.linalg.eigh([at(a, b, t) for t in PLACES])
+    doubt = np.einsum("t,tki,kl,tli->ti", 16 * PLACES**2 * (1 - PLACES) ** 2, vectors, off, vectors)
+    allowed = np.where(abs(PLACES - np.mean(group)) < NEAR, len(group), 0)
+    return bool(((abs(values) <= doubt).sum(axis=1) <= allowed).all())
+
+
+def _passing(a: Node, b: Node, group: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Vectors (k, m) of the eigenvalues that pass zero in a ``group``, and their rates (m,) in t."""
+    t = float(np.mean(group))
+    values, vectors = np.linalg.eigh(at(a, b, t))
+    own = vectors[:, np.argsort(abs(values))[: len(group)]]
+    return own, np.linalg.eigvalsh(own.T @ rate(a, b, t) @ own)
 
 
 def places(a: Node, b: Node, order: int) -> list[float]:

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.arc import LEAST, STEADY, Chord, Knot, corrected, stepped
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Node, clear, places
-from rodfem.continuation.states_between import LEAST, STEADY, Chord, Knot, solve_at, stepped
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import generic
@@ -101,7 +101,7 @@ class EventPiece(Chord):
         where an equilibrium is not found.
         """
         first, last = self.first, self.last
-        known, out = [first, *([] if clear(first, last) else self.turns()), last], list[Node]()
+        known, out = [first, *([] if clear(first, last, np.zeros((1, 1))) else self.turns()), last], list[Node]()
         for zero, group in groupby(known, self.is_zero):
             if zero:
                 out.append(min(group, key=lambda node: min(node.s - first.s, last.s - node.s)))
@@ -160,7 +160,7 @@ def nearest(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec
     """
     row, both = solver.row(tangent), list[End]()
     for s in (-REACH, REACH):
-        there = solve_at(solver, lambda s: (x + tangent * s, tangent), s)
+        there = corrected(solver, x + tangent * s, row)
         both.append(end(solver, s, there, solver.tangent(row, at=there)))
     piece = EventPiece(solver, event, *both)
     nodes = piece.zeros() or piece.turns()

@@ -58,31 +58,33 @@ def merge_doubles(branch: Branch) -> None:
     """Merge neighbouring branch points that are closer than the error of the discretisation.
 
     A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
-    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.  The bar of a
-    point that the mesh does not resolve says nothing of its neighbour, and a branch that comes back to the load at
-    which it was passes two points there.
+    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.
     """
     bars = {id(s): s.error_estimate for s in branch.special}
     for p, q in list(pairwise(branch.special)):
-        apart, bar = abs(p.point.load - q.point.load), bars[id(p)] + bars[id(q)]
-        between = [x for x in branch.points if p.point.arclength < x.arclength < q.point.arclength]
-        if (
-            p.kind == q.kind == BRANCH_POINT
-            and p.test_function == q.test_function == "mu"
-            and p.point.mesh == q.point.mesh
-            and not (p.resolved is False or q.resolved is False)
-            and apart <= bar < inf
-            and all(abs(row.load - q.point.load) <= bar for row in between)
-        ):
-            beside = abs(p.point.ordinate - q.point.ordinate)
-            q.error_estimate = max(q.error_estimate, apart + p.error_estimate)
-            q.ordinate_error = max(q.ordinate_error, beside + p.ordinate_error)
-            q.null_vectors = p.null_vectors + q.null_vectors
-            q.negative_before = p.negative_before
-            q.point.zero += p.multiplicity
-            if p.negative_after > p.negative_before:  # those of p are negative at q, and count as zero now
-                q.point.negative -= p.multiplicity
-            q.note = f"{q.multiplicity} eigenvalues that this mesh does not tell apart vanish within {apart:.0e}"
-            branch.special.remove(p)
-            branch.points = [point for point in branch.points if point is not p.point]
-            branch.renumber()
+        if not _double(branch, p, q, bars[id(p)] + bars[id(q)]):
+            continue
+        apart, beside = abs(p.point.load - q.point.load), abs(p.point.ordinate - q.point.ordinate)
+        q.error_estimate = max(q.error_estimate, apart + p.error_estimate)
+        q.ordinate_error = max(q.ordinate_error, beside + p.ordinate_error)
+        q.null_vectors = p.null_vectors + q.null_vectors
+        q.negative_before = p.negative_before
+        q.point.zero += p.multiplicity
+        if p.negative_after > p.negative_before:  # those of p are negative at q, and count as zero now
+            q.point.negative -= p.multiplicity
+        q.note = f"{q.multiplicity} eigenvalues that this mesh does not tell apart vanish within {apart:.0e}"
+        branch.special.remove(p)
+        branch.points = [point for point in branch.points if point is not p.point]
+        branch.renumber()
+
+
+def _double(branch: Branch, p: SpecialPoint, q: SpecialPoint, bar: float) -> bool:
+    """Whether two neighbouring branch points are one within their ``bar``, as all rows between them are.
+
+    The bar of a point that the mesh does not resolve says nothing of its neighbour, and a branch that comes back to the
+    load at which it was passes two points there.
+    """
+    points = all(s.kind == BRANCH_POINT and s.test_function == "mu" and s.resolved is not False for s in (p, q))
+    between = [x for x in branch.points if p.point.arclength <= x.arclength < q.point.arclength]
+    same = p.point.mesh == q.point.mesh and bar < inf
+    return points and same and all(abs(row.load - q.point.load) <= bar for row in between)

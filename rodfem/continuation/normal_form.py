@@ -35,11 +35,10 @@ AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 SCALES = tuple(4.0**-i for i in range(4))
 """Factors of the amplitudes, of which the first is taken at which the series is resolved, else that of least error."""
 RESOLVED = 1e-3
-"""Uncertainty of a coefficient, relative to it, and part by which a load is no even function, of a resolved series."""
+"""Uncertainty of a coefficient, relative to it, part by which a load is no even function, and other terms of an
+ordinate, of a resolved series."""
 ODD = 0.1
 """Part of the change of the load that is odd in the amplitude, from which on a branch is transcritical."""
-OPPOSITE = 1 - 1e-9
-"""That part where the load rises on one side and falls on the other."""
 BESIDE = 1e-3
 """Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 SEEN = 100
@@ -49,8 +48,6 @@ SIZE, LINEAR, QUADRATIC = "size", "linear", "quadratic"
 BETWEEN = 1.5
 """An even part that grows by a greater power of the amplitude than this, from the least one to the next, has no
 ``|a|``."""
-SMOOTH = 1e-5
-"""Ratio of a coefficient of ``|a|`` to that of ``a`` below which it is none."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +122,8 @@ def leading_term(amplitudes: np.ndarray, ordinates: np.ndarray, left: float) -> 
         return None
     linear, quadratic = leading(amplitudes, odd, 1, left), leading(amplitudes, even, 2, left)
     size = _size(amplitudes, even, left)
-    if size is not None and size.told(max(NEGLIGIBLE, SMOOTH * abs(linear.best))):
-        differs = leading(amplitudes, odd, 1, left, step=1).told(SMOOTH * abs(size.best))
+    if size is not None and size.told(max(NEGLIGIBLE, RESOLVED * abs(linear.best))):
+        differs = leading(amplitudes, odd, 1, left, step=1).told(RESOLVED * abs(size.best))
         return None if differs else (SIZE, size, 0.0)
     turns = quadratic.told(NEGLIGIBLE)
     if linear.told(NEGLIGIBLE) and not (turns and linear.best**2 <= SEEN * left * abs(quadratic.best)):
@@ -188,14 +185,12 @@ def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -
         if found is None:
             continue
         form, odd, change = found
-        if best is not None and form.of == DISTANCE != best.of:
-            break  # what the ordinate changes by is round-off
-        if best is not None and odd * change <= seen and not alike(form, best):
-            break  # what is odd, or even, is round-off
-        if best is None or not alike(form, best) or form.uncertainty < best.uncertainty:
+        other = best is not None and not alike(form, best)
+        if other and (form.of == DISTANCE or odd * change <= seen):
+            break  # what the ordinate changes by, or what is odd, or even, is round-off
+        if best is None or other or form.uncertainty < best.uncertainty:
             best = form
-        settled = odd > OPPOSITE or odd < RESOLVED or form.kind == VERTICAL_BRANCH
-        if change <= seen or (settled and form.uncertainty <= RESOLVED * abs(form.coefficient)):
+        if change <= seen or (min(odd, 1 - odd) < RESOLVED and form.resolved(RESOLVED)):
             break
     return best
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.arc import LEAST, Chord, Knot
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Node
-from rodfem.continuation.states_between import LEAST, Chord, Knot
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
 
 

@@ -83,16 +83,6 @@ def predict_at_load(system: System, points: Sequence[Point], load: float) -> PET
     return combine([p.x for p in recent], lagrange(np.array([p.load for p in recent]), load)[0])
 
 
-def hermite(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Cubic through two points with their tangents at arclength ``s`` between them: state and direction.
-
-    Raises :class:`ValueError` for a point without a tangent.
-    """
-    if a.tangent is None or b.tangent is None:
-        raise ValueError("Both ends of a piece of a branch need a tangent.")
-    return cubic([a.x, a.tangent, b.x, b.tangent], b.arclength - a.arclength, s - a.arclength)
-
-
 def cubic(ends: list[PETSc.Vec], h: float, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """Cubic of length ``h`` at ``s``, and its derivative, by the ``ends``: value and derivative of each."""
     value, slope = cubic_weights(h, s)
@@ -108,9 +98,9 @@ def cubic_weights(h: float, s: float) -> tuple[np.ndarray, np.ndarray]:
 
 def between(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """State and direction at ``s`` on the polynomial of least degree through two states and what tangents they have."""
-    if a.tangent is not None and b.tangent is not None:
-        return hermite(a, b, s)
     h = b.arclength - a.arclength
+    if a.tangent is not None and b.tangent is not None:
+        return cubic([a.x, a.tangent, b.x, b.tangent], h, s - a.arclength)
     way = (b.x - a.x) * (1.0 / h)
     if a.tangent is not None:
         d, bend = s - a.arclength, (way - a.tangent) * (1.0 / h)

@@ -12,25 +12,24 @@ not.  Its zeros are bracketed around the circle, and each is a state on a branch
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.switching import CLOSE, FIRST
 from rodfem.fem.newton import Correction, Limits, correct, linear_step, newton
 from rodfem.linalg.orthogonal import combine
 from rodfem.roots import zero_between
 
-AWAY, REACH = 0.05, 2.0
-"""Distance at which branches are looked for, and how far from its prediction one may lie, in units of it."""
 AROUND = 12
-"""Directions that are tried in the plane of two null vectors; in a space of more of them as many for each but one."""
+"""Directions that are tried at random for each of more than two null vectors but one."""
 ALIGNED = 0.999
 """Cosine of the angle between directions above which they are those of one branch."""
 CIRCLE = 48
-"""Directions of half a circle in which the force is computed."""
+"""Directions of half a circle in which the force is computed: on no axis of a symmetry."""
 ANGLE = 1e-4
 """Uncertainty of the angle of a zero."""
 FELT = 1e-6
@@ -41,77 +40,66 @@ def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]
     """Unit directions in which branches do leave a branch point with several null vectors of different motions.
 
     Of two null vectors they are the zeros of the force that holds the rod in a direction.  Of more, Newton's method is
-    started in directions all around, and once more in that in which what it finds is seen from the branch point.
-    Nearer to that any direction is an equilibrium to round-off.  ``solver`` has the mesh; ``ways`` are the null
-    vectors, orthonormal, which are returned where nothing is found.  Of motions that a continuous symmetry turns, each
-    in its own circle, only the relative phase that the ways have is tried.
+    started in random directions.  Each is taken once more as that in which what Newton's method finds is seen from the
+    branch point.  Nearer to that any direction is an equilibrium to round-off.  ``solver`` has the mesh; ``ways`` are
+    the null vectors, orthonormal, which are returned where nothing is found.  Of motions that a continuous symmetry
+    turns, each in its own circle, only the relative phase that the ways have is tried.
     """
-    system, n = solver.system, len(ways)
+    n, found = len(ways), list[np.ndarray]()
     if n == 2:
-        angles = np.pi * np.arange(AROUND) / AROUND
-        zeros = np.array(_zeros(Held(solver, special, ways)))
-        tried = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        tried = np.concatenate([np.stack([np.cos(zeros), np.sin(zeros)], axis=1), tried])
+        zeros = np.array(_zeros(lambda angle: _force(solver, special.point.x, ways, angle)))
+        tried = np.stack([np.cos(zeros), np.sin(zeros)], axis=1)
     else:
-        rng = np.random.default_rng(n)
-        tried = np.concatenate([np.eye(n), rng.normal(size=(AROUND * (n - 1), n))])
-    weighed = [system.metric * way for way in ways]
-    found: list[np.ndarray] = []
+        tried = np.concatenate([np.eye(n), np.random.default_rng(n).normal(size=(AROUND * (n - 1), n))])
     for weights in tried:
-        seen = weights / np.linalg.norm(weights)
-        for _ in range(2):
-            direction = combine(list(ways), seen)
-            x = special.point.x + direction * AWAY
-            if not correct(system, x, solver.row(direction), reach=REACH * AWAY).converged:
-                break
-            away = x - special.point.x
-            seen = np.array([away.dot(image) for image in weighed])
-            seen /= np.linalg.norm(seen)
-        else:
-            if all(abs(seen @ known) < ALIGNED for known in found):
-                found.append(seen)
+        seen = _seen(solver, special.point.x, ways, weights / np.linalg.norm(weights))
+        seen = seen if seen is None else _seen(solver, special.point.x, ways, seen)
+        if seen is not None and all(abs(seen @ known) < ALIGNED for known in found):
+            found.append(seen)
     return [combine(list(ways), weights) for weights in found] or list(ways)
 
 
-class Held:
-    """The force that holds a rod in a direction in the plane of two null vectors ``ways`` of a ``special`` point."""
-
-    def __init__(self, solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> None:
-        """Begin at the branch point; ``solver`` has the mesh."""
-        self.solver, self.origin, self.ways = solver, special.point.x, list(ways)
-
-    def __call__(self, angle: float) -> float:
-        """Return the force at an ``angle`` from the first null vector; nan where Newton's method finds no state."""
-        system, force = self.solver.system, 0.0
-        along = combine(self.ways, np.array([np.cos(angle), np.sin(angle)]))
-        across = combine(self.ways, np.array([-np.sin(angle), np.cos(angle)]))
-        row, held, answer = self.solver.row(along), system.metric * across, system.new_vector()
-        begin = self.origin + along * AWAY
-        x = begin.copy()
-
-        def iteration(fresh: bool) -> Correction | None:
-            nonlocal force
-            system.set_phase(x)
-            step = linear_step(system, x, row)
-            if step is None or not system.solve(held, answer):
-                return None
-            # (J  M d'; d'^t M  0) by its Schur complement, of one row
-            force = held.dot(x - self.origin - step) / held.dot(answer)
-            step.axpy(force, answer)
-            x.axpy(-1.0, step)
-            return Correction(system.distance(x, begin), system.norm(step))
-
-        outcome = newton(iteration, Limits(reach=REACH * AWAY))
-        return force if outcome.converged else float("nan")
+def _seen(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], weights: np.ndarray) -> np.ndarray | None:
+    """Weights (n,) of the direction in which an equilibrium is, that is found in that of others; None without one."""
+    direction = combine(list(ways), weights)
+    x = origin + direction * FIRST
+    if not correct(solver.system, x, solver.row(direction), reach=CLOSE * FIRST).converged:
+        return None
+    away = solver.system.metric * (x - origin)
+    seen = np.array([away.dot(way) for way in ways])
+    return np.asarray(seen / np.linalg.norm(seen))
 
 
-def _zeros(force: Held) -> list[float]:
+def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], angle: float) -> float:
+    """Force that holds the rod at an ``angle`` from the first of two ``ways``; nan where there is no such state."""
+    system = solver.system
+    along, across = (combine(list(ways), np.array([np.cos(t), np.sin(t)])) for t in (angle, angle + np.pi / 2))
+    row, held, answer = solver.row(along), system.metric * across, system.new_vector()
+    begin, force = origin + along * FIRST, 0.0
+    x = begin.copy()
+
+    def iteration(fresh: bool) -> Correction | None:
+        nonlocal force
+        system.set_phase(x)
+        step = linear_step(system, x, row)
+        if step is None or not system.solve(held, answer):
+            return None
+        # (J  M d'; d'^t M  0) by its Schur complement, of one row
+        force = held.dot(x - origin - step) / held.dot(answer)
+        step.axpy(force, answer)
+        x.axpy(-1.0, step)
+        return Correction(system.distance(x, begin), system.norm(step))
+
+    return force if newton(iteration, Limits(reach=CLOSE * FIRST)).converged else float("nan")
+
+
+def _zeros(force: Callable[[float], float]) -> list[float]:
     """Angles in half a circle at which a force is zero."""
-    angles = np.pi * (np.arange(CIRCLE + 1) + (np.sqrt(5) - 1) / 2) / CIRCLE  # on no axis of a symmetry
+    angles = np.pi * (np.arange(CIRCLE + 1) + (np.sqrt(5) - 1) / 2) / CIRCLE
     values = np.array([force(angle) for angle in angles])
     felt = FELT * np.nanmax(abs(values), initial=0.0)
-    zeros = []
-    for i in np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0):
-        if max(abs(values[i : i + 2])) > felt:
-            zeros.append(zero_between(force, float(angles[i]), float(angles[i + 1]), ANGLE))
-    return zeros
+    return [
+        zero_between(force, float(angles[i]), float(angles[i + 1]), ANGLE)
+        for i in np.flatnonzero(values[1:] * values[:-1] < 0)
+        if max(abs(values[i : i + 2])) > felt
+    ]

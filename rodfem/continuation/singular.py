@@ -272,11 +272,14 @@ class SingularSystem:
             return self.system.norm(step.dx)
         return float(np.sqrt(step.dx.dot(self.inertia.metric * step.dx) + (step.share[:2] ** 2).sum()))
 
-    def _at(self, x: PETSc.Vec, t: float) -> Factored:
-        """S at a state, and at a value of the second parameter where there is one."""
+    def _at(self, x: PETSc.Vec, t: float, *, moved: bool = False) -> Factored:
+        """S at a state, and at a value of the second parameter where there is one; ``moved`` from the last state.
+
+        Phase conditions stay then: their changes are felt by no vector without drift.
+        """
         if self._section is not None:
             self.system.line = self._section.line(t)
-        return self.inertia.at(x)
+        return self.inertia.moved(x) if moved else self.inertia.at(x)
 
     def _second(self, x: PETSc.Vec, t: float) -> PETSc.Vec:
         """Derivative of the equations in the second parameter."""
@@ -350,7 +353,7 @@ class SingularSystem:
                 there, share = x + v * (sign * DIFFERENCE), sign / (2 * DIFFERENCE)
                 if self._section is not None:
                     f[1] += share * left.dot(self._second(there, t))
-                found = self._at(there, t)
+                found = self._at(there, t, moved=True)
                 f[0] += share * left.dot(found.border)
                 y.axpy(share, self._image(found.matrix, left))
         return y, f
@@ -363,7 +366,7 @@ class SingularSystem:
         (w,), h = at.w, DIFFERENCE / self.system.norm(at.w[0])
         r, bend = [self.system.new_vector() for _ in range(k)], self.system.new_vector()
         for sign in (1.0, -1.0):
-            found = self.inertia.at(x + w * (sign * h))
+            found = self.inertia.moved(x + w * (sign * h))
             for image, left in zip(r, at.left, strict=True):
                 image.axpy(sign / (2 * h), self._image(found.matrix, left))
             bend.axpy(sign / (2 * h), found.matrix * w)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.arc import STRAYED
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Crossing, Node
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.piece import Piece
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
-from rodfem.continuation.states_between import STRAYED
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize
@@ -144,7 +144,7 @@ def _unit(solver: BranchSolver, direction: PETSc.Vec) -> PETSc.Vec:
 
 def _modes(condensation: Condensation, reduced: ReducedStiffness, vectors: np.ndarray) -> list[PETSc.Vec]:
     """Modes of vectors of H, orthonormal in the metric."""
-    modes = [condensation.vector(reduced.W @ v) for v in vectors.T]
+    modes = [condensation.inertia.vector(reduced.W @ v) for v in vectors.T]
     orthonormalize(modes, condensation.inertia.metric)
     return modes
 
@@ -163,38 +163,25 @@ def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState 
 
 def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bool) -> SpecialPoint:
     """Special point, a ``fold`` or a branch point, at the state ``found`` for the candidate ``at`` in a ``piece``."""
-    place = piece.begin + piece.place(found.x)
-    special = singular_point(piece.solver, found, place, at.slope, at.change, fold=fold)
-    more = at.critical.shape[1] - len(found.vectors)
-    if more:  # opposite crossings, of which one was solved for
-        special.null_vectors += special.nearby[:more]
-        special.nearby = special.nearby[more:]
-        special.point.zero += more
-        apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
-        special.located_to += 2 * max(apart, at.width * abs(piece.solver.system.scalar(at.slope)))
-    return special
-
-
-def singular_point(
-    solver: BranchSolver, found: SingularState, arclength: float, slope: PETSc.Vec, change: Change, *, fold: bool
-) -> SpecialPoint:
-    """Special point at the singular state ``found`` on a branch of a ``solver`` that has about that ``slope``.
-
-    A ``fold`` or a branch point, at an ``arclength``, with null vectors, tangent, and the index that its ``change``
-    tells.
-    """
-    system, x, null = solver.system, found.x, found.vectors
-    tangent = _tangent(solver, slope, found, fold=fold)
+    solver, system, x, null = piece.solver, piece.solver.system, found.x, found.vectors
+    tangent = _tangent(solver, at.slope, found, fold=fold)
     system.set_phase(x)
-    index = Index(change.negative, system.phase.count + len(null) + change.still)
-    point = solver.point(x, arclength, tangent, index=index)
+    index = Index(at.change.negative, system.phase.count + len(null) + at.change.still)
+    point = solver.point(x, piece.begin + piece.place(x), tangent, index=index)
     left = (0.0 if fold else load_uncertainty(solver, found)) + round_off(point.load, solver.units.load)
     coupling = max(coupling_of(solver, x, v) for v in null)
     nearby = across(solver.inertia.metric, found.modes, null)
-    kind, changes = FOLD if fold else BRANCH_POINT, (change.before, change.after)
+    kind, changes = FOLD if fold else BRANCH_POINT, (at.change.before, at.change.after)
     special = SpecialPoint(kind, point, *changes, left, null, nearby, coupling)
     special.unfolding = float("nan") if fold else found.size
     special.test_function = "slope" if fold else "mu"
+    more = at.critical.shape[1] - len(null)
+    if more:  # opposite crossings, of which one was solved for
+        special.null_vectors = null + nearby[:more]
+        special.nearby = nearby[more:]
+        point.zero += more
+        apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
+        special.located_to += 2 * max(apart, at.width * abs(system.scalar(at.slope)))
     return special
 
 

@@ -14,13 +14,12 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import Kind
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.convexity import Convexity
-from rodfem.fem.fields import LOAD
 from rodfem.fem.newton import FAR, NewtonResult, correct, linear_step, relax
 from rodfem.fem.resultants import Resultants
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import Energies
 from rodfem.fem.system import System
-from rodfem.fem.values import NodalValues
+from rodfem.fem.values import LOAD, NodalValues
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors
 from rodfem.problem.units import Units

@@ -33,9 +33,9 @@ class StepControl:
     """
 
     first: float = 0.02
-    largest: float = 0.05
+    largest: float = 0.1
     smallest: float = 1e-5
-    aim: float = 2e-3
+    aim: float = 1e-2
     most: int = 2000
 
     def __post_init__(self) -> None:

@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
 
-import numpy as np
-from petsc4py import PETSc
-
+from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import hermite
-from rodfem.continuation.states_between import solve_at_load
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.orthogonal import combine
 from rodfem.tolerances import APART
 
 
@@ -61,19 +54,4 @@ def _along(solver: BranchSolver, points: Sequence[Point], load: float, singular:
                 )
             yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)
         if b is not None and (a.load - load) * (b.load - load) < 0:
-            yield _between(solver, a, b, load)
-
-
-def _between(solver: BranchSolver, a: Point, b: Point, load: float) -> Point:
-    """Equilibrium at ``load`` between neighbours ``a``, ``b`` on either side of it."""
-    smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
-    curve = partial(hermite, a, b) if smooth else partial(_chord, a, b)
-    p, q = (a, b) if smooth else (replace(a, arclength=0.0), replace(b, arclength=1.0))
-    x, s, outcome = solve_at_load(solver, curve, p, q, load)
-    s = s if smooth else a.arclength + s * (b.arclength - a.arclength)
-    return solver.point(x, s, solver.load_tangent(x, True), outcome)
-
-
-def _chord(a: Point, b: Point, t: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """State at a part ``t`` of the way from ``a`` to ``b``, and the direction from one to the other."""
-    return combine([a.x, b.x], np.array([1 - t, t])), b.x - a.x
+            yield Arc(solver, a, b).at_load(load)

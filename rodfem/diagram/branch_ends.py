@@ -1,75 +1,27 @@
-"""Where a branch ends: at zero stretch, at a branch point on the end of the range, where it closes or meets another."""
+"""Where a branch ends: at a branch point on the end of the range, where it closes or meets another one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from math import inf
 
-from petsc4py import PETSc
-
-from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
+from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
-from rodfem.continuation.kinds import END
-from rodfem.continuation.prediction import hermite
-from rodfem.continuation.states_between import point_between, solve_at
-from rodfem.diagram.equivalence import near
+from rodfem.diagram.equivalence import Alike, near
 from rodfem.errors import ConvergenceError
-from rodfem.roots import zero_between
-from rodfem.tolerances import INSIDE, SAME_SPECIAL, SAME_STATE
+from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
-ALONG = 1e-11
-"""Arclength, in the metric, to which a stretch vanishes."""
 SAME_END = 1e-6
 """A special point nearer to the end of the range than this, in spans, is the last state."""
-ASIDE = 1e-4
-"""Distance before an end at which the stretch vanishes, relative to the step, at which the index is counted."""
 LEAST = 12
 """Points of the shortest closed loop."""
 NEIGHBOUR = 4
 """Steps within which a closed loop passes its beginning."""
-
-Alike = Callable[[Point, Point, float], bool]
-"""Whether two points are equivalent within a tolerance, whatever meshes they are on."""
-
-
-def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
-    """The point between ``a`` and ``b`` at which the smallest stretch vanishes."""
-    states: dict[float, PETSc.Vec] = {}
-
-    def stretch(s: float) -> float:
-        states[s] = solve_at(solver, lambda t: hermite(a, b, t), s)
-        return solver.shape.stretch(states[s])
-
-    s = zero_between(stretch, a.arclength + INSIDE * (b.arclength - a.arclength), b.arclength, ALONG)
-    row = solver.row(hermite(a, b, s)[1])
-    return solver.point(states[s], s, solver.tangent(row, at=states[s]))
-
-
-def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
-    """A point right before the ``last`` admissible one after the row ``a``; None where it is not found.
-
-    A rod that is squeezed to nothing has no stiffness against some motions: at the very end their eigenvalues are zero,
-    whatever sign they had before.
-    """
-    return point_between(solver, a, last, last.arclength - ASIDE * (last.arclength - a.arclength))
-
-
-def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) -> SpecialPoint:
-    """The end at the ``last`` admissible point, on finer meshes where ``error_bars`` are asked for.
-
-    A note says where those fail.
-    """
-    located = LOCATED * solver.units.load
-    end = SpecialPoint(END, last, last.negative, last.negative, located, test_function="stretch")
-    if error_bars:
-        try:
-            with solver.system.clock.scope("error bars"):
-                return zero_stretch(solver, last)
-        except ConvergenceError as trouble:
-            end.note = f"no error estimate: {trouble}"
-    return end
+APART = 0.5
+"""Arclength beyond which two special points of one branch may be one."""
 
 
 def singular_end(
@@ -114,20 +66,18 @@ def closing(
         passed = solver.system.distance(b.x, here(branch.points[0]).x) < b.arclength - a.arclength
         return b if passed else None
     first = branch.points[0 if branch.parent is None else 1]
-    if (
-        (a.load - first.load) * (b.load - first.load) > 0
-        or not near(first, a, solver.units, NEIGHBOUR)
-        or a.slope * first.slope <= 0
-        or a.load == b.load
-    ):
+    if not (_passes(a, b, first) and near(first, a, solver.units, NEIGHBOUR)):
         return None
-    s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
-    x, outcome = solver.at_load(hermite(a, b, s)[0], first.load, reach=1.0)
-    if not outcome.converged:  # beside a fold, say: not there
+    try:
+        point = Arc(solver, a, b).at_load(first.load)
+    except ConvergenceError:  # beside a fold, say: not there
         return None
-    s = a.arclength + solver.system.distance(a.x, x)
-    point = solver.point(x, s, solver.load_tangent(x, b.load > a.load), outcome)
     return point if alike(point, first, SAME_STATE) else None
+
+
+def _passes(a: Point, b: Point, first: Point) -> bool:
+    """Whether the load passes that of the ``first`` point between two others, and in the same direction."""
+    return min(a.load, b.load) <= first.load <= max(a.load, b.load) and a.load != b.load and a.slope * first.slope > 0
 
 
 def meeting(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:
@@ -135,17 +85,28 @@ def meeting(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], a
 
     ``alike`` compares states; ``load`` is the name of the load.
     """
-    where = f"at {load} = {special.point.load:.8g}"
+    from_the_side, where = special.test_function == "slope", f"at {load} = {special.point.load:.8g}"
+    found = next(_known(branch, special, branches, alike), None)
+    if found is None:
+        return f"meets another branch {where}" if from_the_side else ""
+    other, i = found
+    special.connects_to = (other.name, i)
+    special.switched = other.special[i].switched = True
+    if branch.parent == special.connects_to:
+        return "closed loop"
+    if not from_the_side and other.special[i].test_function == "slope":
+        return ""  # the branch on which the known one ended: it goes on
+    return f"meets {other.name} {where}"
+
+
+def _known(
+    branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike
+) -> Iterator[tuple[Branch, int]]:
+    """Yield where a ``special`` point of a ``branch`` is known: a branch, and the number of the point on it."""
     for other in branches:
+        # a neighbour on this branch is another point: of a nearly double eigenvalue
+        until = special.point.arclength - APART if other is branch else inf
         for i, known in enumerate(other.special):
-            if other is branch and special.point.arclength - known.point.arclength < 0.5:
-                continue  # a neighbour on this branch: a nearly double eigenvalue
-            if known.kind.branches and alike(known.point, special.point, SAME_SPECIAL):
-                special.connects_to = (other.name, i)
-                special.switched = known.switched = True
-                if branch.parent == special.connects_to:
-                    return "closed loop"
-                if special.test_function == "mu" and known.test_function == "slope":
-                    return ""  # the branch on which the known one ended: it goes on
-                return f"meets {other.name} {where}"
-    return f"meets another branch {where}" if special.test_function == "slope" else ""
+            at = known.point
+            if known.kind.branches and at.arclength <= until and alike(at, special.point, SAME_SPECIAL):
+                yield other, i

@@ -18,8 +18,7 @@ from rodfem.continuation.kinds import FLUTTER, Kind
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.held import at_load
 from rodfem.errors import ConvergenceError
-from rodfem.stability.cluster import Cluster, Measured, measure, real_span
-from rodfem.stability.cluster_noise import ClusterNoise, noise_of
+from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
 from rodfem.stability.frequencies import ALIKE, MULTIPLE, groups
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.stability.spectrum import Spectrum, inside

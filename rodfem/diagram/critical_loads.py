@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rodfem.continuation.interpolant import SHARP
+from rodfem.continuation.flutter import SHARP
 from rodfem.continuation.kinds import DIVERGENCE
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Collisions, Critical, Measuring, Near, Side, Told, cluster_at, others_negative
@@ -25,8 +25,7 @@ from rodfem.diagram.held import at_load
 from rodfem.diagram.meetings import Meeting, meetings
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
-from rodfem.stability.cluster import measure
-from rodfem.stability.cluster_noise import noise_of
+from rodfem.stability.cluster import measure, noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, unit
 

@@ -26,6 +26,7 @@ from rodfem.output.files import as_data, save_run
 from rodfem.output.folder import PICTURES, locked, picture_at
 from rodfem.output.origin import origin
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
+from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
 from rodfem.stability.assessment import Verdict
@@ -79,7 +80,6 @@ class Diagram:
         self.asked: dict[str, Any] | None = None
         self.lacks = ""
         self.complete = False
-        self._asked: dict[int, Solver] = {}
 
     # --- what there is ---------------------------------------------------------------------------------------------
 
@@ -163,9 +163,7 @@ class Diagram:
     def solver(self, point: Point | SpecialPoint) -> Solver:
         """Return the solver of the mesh that a point belongs to."""
         mesh = point.point.mesh if isinstance(point, SpecialPoint) else point.mesh
-        if mesh not in self._asked:
-            self._asked[mesh] = Solver.of(self.solvers[mesh])
-        return self._asked[mesh]
+        return derived(self, mesh, lambda: Solver.of(self.solvers[mesh]))
 
     # --- what it can be asked ------------------------------------------------------------------------------------
 
@@ -240,28 +238,31 @@ class Diagram:
 
     @checked(discretization=MESH)
     def again(self, discretization: Discretization | None = None, **changes: Any) -> Diagram:
-        """Trace once more with another discretisation or plan: ``again(span=(60, 4))``, ``again(accuracy=1e-8)``.
+        """Trace once more with another discretisation, plan or constants: ``again(span=(60, 4))``, ``again(A=-1.5)``.
 
-        ``changes`` are fields of :class:`~rodfem.Plan`.  The mesh stays unless one is given, or an accuracy.  Raises
-        :class:`~rodfem.errors.InputError` for a change that a plan has not.
+        ``changes`` are fields of :class:`~rodfem.Plan`, or constants of the scene, which share its forms.  The mesh
+        stays unless one is given, or an accuracy.  Raises :class:`~rodfem.errors.InputError` for any other change.
         """
         from rodfem.diagram.trace import trace
 
-        known = [f.name for f in fields(Plan)]
-        if unknown := [name for name in changes if name not in known]:
+        known, constants = [f.name for f in fields(Plan)], [n for n in self.scene.parameters if n != self.scene.load]
+        if unknown := [name for name in changes if name not in [*known, *constants]]:
             raise InputError(
-                f"A plan has no {unknown[0]!r}: choose one of {', '.join(known)}, or give a Discretization first."
+                f"A plan has no {unknown[0]!r}, nor has the scene beside its load: choose one of "
+                f"{', '.join([*known, *constants])}, or give a Discretization first."
             )
+        values = {name: changes.pop(name) for name in constants if name not in known and name in changes}
         system = self.solvers[0].system
         if self.lacks and self.lacks not in changes:
             raise InputError(
                 f"The plan of this diagram had {self.lacks} of its own, which no file holds: give them, as in "
                 f"again({self.lacks}=...)."
             )
-        mesh, plan = discretization or system.fields.discretization, replace(self.plan, **changes)
+        mesh, plan = discretization or system.fields.asked, replace(self.plan, **changes)
         if discretization is None and plan.accuracy is not None and mesh.vertices is None:
             mesh = Discretization(mesh.formulation, factors=mesh.factors)
-        return trace(self.scene, mesh, plan, comm=system.comm)
+        scene = self.scene.varying(**values) if values else self.scene
+        return trace(scene, mesh, plan, comm=system.comm)
 
     def _special_at(self, point: Point | SpecialPoint) -> SpecialPoint | None:
         """The fold or branch point whose state that of a point is, where there is one."""
@@ -360,11 +361,9 @@ class Diagram:
 
     def _repr_html_(self) -> str:
         """Table of special points for notebooks."""
-        from rodfem.output.digits import in_words
+        from rodfem.output.words import table_of
 
-        scale = max([self.scene.units.ordinate, *(abs(p.ordinate) for b in self.branches for p in b.points)])
-        cells = [(branch.name, s.kind.words, *in_words(s, scale)) for branch in self.branches for s in branch.special]
-        rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in cells]
+        rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row[:5]) for row in table_of(self.data)]
         head = ("branch", "kind", self.scene.load, self.scene.ordinate.name, "index")
         title = "".join(f"<th>{escape(name)}</th>" for name in head)
         body = "".join(f"<tr>{row}</tr>" for row in rows)

@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
-from rodfem.continuation.flutter import ENOUGH
-from rodfem.continuation.interpolant import in_doubt, real_root, zero_uncertainty
+from rodfem.continuation.flutter import ENOUGH, NODES, in_doubt, interpolant, real_root, zero_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster
-from rodfem.stability.condensed import SHIFT
+from rodfem.stability.spectrum import SHIFT
 from rodfem.tolerances import round_off, unit
 
 if TYPE_CHECKING:
@@ -56,11 +54,11 @@ def interpolated_zero(mean: Mean, load: float, one: float) -> tuple[float, float
     shows in the last coefficients.  Where a collision is as near, the mean is not smooth, or there is none: then over
     a narrower one.  Raises :class:`ConvergenceError` where it does not vanish near by.
     """
-    nodes, found = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6), []
+    found = list[tuple[float, float]]()
     for half in (width * unit(load, one=one) for width in AROUND):
         try:
-            series = chebyshev.chebfit(nodes, [mean(load + half * t) for t in nodes.tolist()], 5)
-            root = real_root(series, 0.0)
+            series = interpolant([mean(load + half * t) for t in NODES.tolist()])
+            root = real_root(series)
             if root is None:
                 continue
             doubt = in_doubt(series) + mean.noise(load + half * root)

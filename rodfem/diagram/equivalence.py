@@ -1,13 +1,34 @@
-"""Whether two points of a diagram are one, or neighbours, up to a symmetry: by what no symmetry changes."""
+"""Whether two points of a diagram are one, neighbours, or mirror images: by what no symmetry of the rod changes.
+
+Two sides of a pitchfork may be mirror images in their plane, at the same loads, energies and stretches, and differ in
+what they do across it: then no symmetry of the rod carries one into the other.  The eigenvalues nearest zero tell.
+"""
 
 from __future__ import annotations
 
-from rodfem.continuation.branch import Point
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.arc import Arc
+from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.errors import ConvergenceError
 from rodfem.problem.units import Units
-from rodfem.tolerances import unit
+from rodfem.stability.inertia import NULL, Factored
+from rodfem.tolerances import LOCATED, SAME_STATE, unit
 
 STEP = 0.05
 """Change of load and energy in a step of a branch, relative to values greater than the rod's units."""
+SAME_VALUE = 1e-3
+"""Relative difference of eigenvalues of mirror images: of last iterates, and of meshes that are not symmetric."""
+LOOKED_AT = 3
+"""Eigenvalues nearest zero, beyond those that count as zero, that are compared."""
+
+Alike = Callable[[Point, Point, float], bool]
+"""Whether two points are equivalent within a tolerance, whatever meshes they are on."""
 
 
 def equivalent(a: Point, b: Point, units: Units, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
@@ -30,3 +51,49 @@ def near(a: Point, b: Point, units: Units, steps: float = 2.0) -> bool:
     reach = STEP * steps
     close = abs(a.load - b.load) <= reach * unit(a.load, one=units.load)
     return close and abs(a.energy - b.energy) <= reach * unit(a.energy, one=units.energy)
+
+
+def are_images(solver: BranchSolver, special: SpecialPoint, a: Point, b: Point, alike: Alike) -> bool:
+    """Whether the first points ``a``, ``b`` of branches that leave ``special`` in opposite ways are of mirror images.
+
+    They are compared at one load, by ``alike`` where the ``solver`` moves one to that of the other.  The metric need
+    not share the symmetry: points at one distance in it need not be mirror images themselves.
+    """
+    if not equivalent(a, b, solver.units):
+        # one that turns at a fold just beside the branch point is there as near to the other side as round-off
+        load, width = special.point.load, LOCATED * special.located_to
+        if min(a.load, b.load) < load - width and max(a.load, b.load) > load + width:
+            return False
+        a, b = sorted((a, b), key=lambda p: abs(p.load - load))
+        try:
+            there = Arc(solver, replace(special.point, arclength=0.0, tangent=None), b).at_load(a.load)
+        except ConvergenceError:  # the load is none of those between
+            return False
+        if not alike(a, there, SAME_STATE):
+            return False
+        b = there
+    if (a.negative, a.zero) != (b.negative, b.zero):
+        return False
+    if a.mesh == b.mesh and not _as_stable(solver.inertia.at, a, b):
+        return False
+    return solver.space is None or _as_stable(solver.space.at, a, b)
+
+
+def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
+    """Whether two states, whose second variations are those ``at`` them, have the same index and eigenvalues."""
+    indices = [at(point.x).count() for point in (a, b)]
+    if indices[0] != indices[1]:
+        return False
+    (first, noise), (second, _) = (_nearest(at(point.x), indices[0].zero) for point in (a, b))
+    # of a zero the mesh makes a value as it lies to the elements: two of one sign are alike
+    alike = (noise > 0) & (first * second > 0)
+    return bool((alike | (abs(first - second) <= SAME_VALUE * abs(first) + noise)).all())
+
+
+def _nearest(found: Factored, zero: int) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues that count as ``zero`` and a few more, ascending, and the round-off of those; 0 for others."""
+    found.count()
+    values, vectors = found.nearest(zero + LOOKED_AT, NULL)
+    order = np.argsort(values)
+    noise = np.array([found.noise(v) for v in vectors]) * (abs(values) <= found.inertia.tolerance)
+    return values[order], noise[order]

@@ -14,7 +14,7 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.event_piece import End, EventPiece, end
 from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.prediction import between
-from rodfem.diagram.step import Step
+from rodfem.diagram.finders import Step
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.tolerances import round_off
 
@@ -30,8 +30,6 @@ class Events:
     By the name of an event, ``_open`` has the loads at the ends of steps in which it was not located, ``_still`` those
     of steps on which it is zero.
     """
-
-    at_start = True
 
     def __init__(self, plan: Plan) -> None:
         """Nothing is known yet."""

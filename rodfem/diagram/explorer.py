@@ -20,12 +20,10 @@ from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.known import equilibria_at
 from rodfem.deflation.search import find_equilibria
-from rodfem.diagram.equivalence import equivalent, near
-from rodfem.diagram.first_name import ahead, name_of_first
-from rodfem.diagram.first_state import first_state
+from rodfem.diagram.equivalence import are_images, equivalent, near
+from rodfem.diagram.first_state import ahead, first_state, name_of_first
 from rodfem.diagram.images import other_ordinates
 from rodfem.diagram.tracer import Tracer
-from rodfem.diagram.two_sides import are_images
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.bordered import Bordered
@@ -208,31 +206,38 @@ class Explorer(Tracer):
                 if self._enough():
                     break
                 self.use(special.point.mesh)
-                name = self._name(parent)
-                origin = parent.name, i
-                branch = start_branch(
-                    special, direction * sign, name, origin, parent.depth + 1, self.solver, len(ways), self._bounds()
-                )
-                if branch is None:
-                    self.observer.warn(
-                        f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
-                    )
-                    continue
-                if not self._bounds()[0] <= branch.points[1].load <= self._bounds()[1]:
-                    self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
-                    continue
-                first = branch.points[1]
-                images = [p for p in firsts if are_images(self.solver, special, p, first, self.alike)]
-                if images:
-                    self._say_other_ordinates(self.branches[before:], special, images[0], first)
-                    continue  # the mirror image of a branch just traced
-                firsts.append(replace(first))  # as it is now: once it is traced richer meshes have decided its index
-                if special.connects_to is None and self._traced_already(branch, special):
-                    continue
-                if self._came_from(parent, special, first):
-                    continue
-                self.trace(branch)
+                branch = self._leaving_along(parent, i, direction * sign, len(ways))
+                if branch is not None and self._is_new(parent, special, branch, firsts, before):
+                    self.trace(branch)
         self._classify_from_the_side(special, self.branches[before:])
+
+    def _leaving_along(self, parent: Branch, i: int, direction: PETSc.Vec, ways: int) -> Branch | None:
+        """Branch that leaves the special point ``i`` of a parent along a direction, one of ``ways``, in the range."""
+        special, bounds, depth = parent.special[i], self._bounds(), parent.depth + 1
+        made = start_branch(self.solver, special, direction, ways, bounds, depth)
+        if made is None:
+            self.observer.warn(f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}.")
+            return None
+        points, begins = made
+        if not bounds[0] <= points[1].load <= bounds[1]:
+            self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
+            return None
+        return Branch(self._name(parent), (parent.name, i), depth, points, begins=begins)
+
+    def _is_new(self, parent: Branch, special: SpecialPoint, branch: Branch, firsts: list[Point], before: int) -> bool:
+        """Whether a branch that leaves is none that has been traced, or the mirror image of one.
+
+        ``firsts`` gets its first point: those of branches that leave there, traced since there were so many ``before``.
+        """
+        first = branch.points[1]
+        images = [p for p in firsts if are_images(self.solver, special, p, first, self.alike)]
+        if images:
+            self._say_other_ordinates(self.branches[before:], special, images[0], first)
+            return False
+        firsts.append(replace(first))  # as it is now: once it is traced richer meshes have decided its index
+        if special.connects_to is None and self._traced_already(branch, special):
+            return False
+        return not self._came_from(parent, special, first)
 
     def _say_other_ordinates(self, traced: Sequence[Branch], special: SpecialPoint, first: Point, image: Point) -> None:
         """Say where a side that is not traced, the ``image`` of one of the branches ``traced``, has other ordinates."""

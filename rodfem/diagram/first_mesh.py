@@ -27,9 +27,9 @@ from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
-from rodfem.stability.condensed import SHIFT
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.spectrum import SHIFT
 from rodfem.tolerances import unit
 
 MARGIN = 10.0

@@ -5,7 +5,7 @@ pair so does ``-D``; and a single one, ``mu``, where it passes through zero.  A 
 each is lowest.  Where that comes near zero, the sweep has a load more.
 
 Eigenvalues are known again at the neighbours of a row by their vectors: with ``Z^t Y = 1`` for the left and right ones
-at the row (:mod:`rodfem.stability.condensed`), ``|Z^t Y'|`` is greatest for the same motion.  Two real ones meet only
+at the row (:mod:`rodfem.stability.spectrum`), ``|Z^t Y'|`` is greatest for the same motion.  Two real ones meet only
 where the load couples them, and not by a potential: with ``E`` the change of ``Z^t T Y``, to first order
 
     D = ((nu_i + E_ii - nu_j - E_jj) / 2)^2 + E_ij E_ji,
@@ -23,9 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rodfem.continuation.eigenvalue_curves import assignment
-from rodfem.stability.condensed import times
 from rodfem.stability.frequencies import ALIKE, groups
-from rodfem.stability.spectrum import Spectrum
+from rodfem.stability.spectrum import Spectrum, times
 
 LOWER, CLOSE = 0.7, 0.1
 """Part of the values at both neighbours below which a lowest one is near zero, and relative distance that is close."""

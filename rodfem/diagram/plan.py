@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
@@ -12,7 +13,7 @@ from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
-from rodfem.stability import methods
+from rodfem.stability import registry
 
 MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"), Argument("Plan", "spectrum")
 FEWER = "give less in {}, or use more elements"
@@ -93,8 +94,8 @@ class Plan:
             raise InputError(f"steps is {self.steps!r}: give StepControl, as in steps=StepControl(largest=0.02).")
         if not isinstance(self.method, str):
             raise InputError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
-        if self.method not in ("", methods.AUTO):
-            methods.find(self.method)
+        if self.method not in ("", registry.AUTO):
+            registry.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, ACCURACY)
         flag("error_bars", self.error_bars)
@@ -153,7 +154,7 @@ class Plan:
                 )
             for value in (a, b):
                 try:
-                    scene.varying(scene.load, scene.span, **{name: value})
+                    scene.varying(**{name: value})
                 except InputError as trouble:
                     raise InputError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
         for argument, what in COUNTS.items():
@@ -163,7 +164,7 @@ class Plan:
             raise InputError("A search needs loads to search at", GIVE_LOADS)
         if (self.modes or self.method) and not self.at:
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
-        if self.modes and self.method in methods.METHODS and not methods.find(self.method).finds_modes:
+        if self.modes and self.method in registry.METHODS and not registry.find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
 
     @staticmethod
@@ -184,3 +185,33 @@ class Plan:
         for argument in (SPECTRUM, MODES):
             if (asked := getattr(self, argument.name)) > most:
                 raise InputError(f"The mesh has no more than {most} eigenvalues, not {asked}", Remedy(FEWER, argument))
+
+
+EQUATIONS = "equations"
+"""Entry of what a run was asked for that has the fingerprint of the equations (:mod:`rodfem.fem.fingerprint`)."""
+
+
+def entries(plan: Plan, scene: Scene) -> dict[str, Any]:
+    """What JSON can hold of a ``plan`` for a ``scene``; steps are a text, events their names."""
+    chosen = {f.name: getattr(plan, f.name) for f in fields(plan)}
+    return chosen | {
+        "span": plan.over(scene),
+        "steps": repr(plan.steps),
+        "events": [event.name for event in plan.events],
+    }
+
+
+def not_held(asked: dict[str, Any]) -> str:
+    """What of a plan that was ``asked`` for no file holds: ``events`` or ``steps``; empty if all of it is there."""
+    held = asked["plan"]
+    return "events" if held["events"] else "steps" if held["steps"] != repr(StepControl()) else ""
+
+
+def plan_without(asked: dict[str, Any]) -> Plan:
+    """Plan that was ``asked`` for, without what no file holds."""
+    known = {f.name for f in fields(Plan)} - {"steps", "events"}
+    given: dict[str, Any] = {}
+    for n in known & asked["plan"].keys():
+        x = asked["plan"][n]
+        given[n] = tuple(x) if isinstance(x, list) else x
+    return Plan(**given)

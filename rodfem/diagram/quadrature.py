@@ -1,10 +1,12 @@
-"""Whether meshes integrate the equations, asked at the first state, special points and requested loads of a branch."""
+"""Whether meshes integrate the equations, asked at the first state, and where a branch has bars, or ends."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
 from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.quadrature_check import QuadratureCheck
@@ -25,15 +27,16 @@ class Quadrature:
         """
         first = branch.points[:1] if branch.parent is None else []
         found = [(point, self._check(point)(point.x)) for point in first]
-        for special in branch.special:
+        asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
+        for special in (s for s in asked if s.resolved is not False):
             point = special.point
-            if special.resolved is False or not (words := self._check(point)(point.x)):
+            if not (words := self._check(point)(point.x)):
                 continue
             found.append((point, words))
             special.error_estimate = special.ordinate_error = point.estimate = special.omega2_error = float("nan")
             special.resolved = None
             special.note = "; ".join(filter(None, (special.note, "not estimated: see the warnings")))
-        if any(self._check(point).kink(point.x) for point in [*first, *(special.point for special in branch.special)]):
+        if any(self._check(point).kink(point.x) for point in [*first, *(special.point for special in asked)]):
             self._kinks(branch)
         for point, words in found:
             if words and not point.kink:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
-from math import inf
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.asked import EQUATIONS, not_held, plan_without
 from rodfem.diagram.diagram import Diagram
-from rodfem.diagram.plan import Plan
+from rodfem.diagram.plan import EQUATIONS, Plan, not_held, plan_without
 from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
@@ -24,16 +22,16 @@ from rodfem.fem.fingerprint import fingerprint, same
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import check_run
-from rodfem.output.files import COLUMNS, KINK, OPTIONAL, SOFT, SPECIAL, UNDECIDED, load_json, load_state
+from rodfem.output.files import load_json, load_state
+from rodfem.output.table import COLUMNS, SPECIAL, point_values, special_values
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
-from rodfem.stability.soft_mode import SoftMode
 from rodfem.tolerances import NEGLIGIBLE, unit
 
 NEEDED = ("scene", "parameter", "branches", "range", "accuracy", "constants", "discretization", "meshes")
 """Entries of a diagram, beside those that all of its readers need."""
 OF_BRANCH = ("name", "parent", "ended", "columns", "special")
-OF_SPECIAL = ("kind", "multiplicity", "meets", "law", *SPECIAL)
+OF_SPECIAL = tuple(entry.name for entry in SPECIAL if entry.name not in ("energy", "resolved", "omega2_error_estimate"))
 
 
 @checked(folder=path("results/column"), scene=SCENE, comm=RANKS)
@@ -78,7 +76,7 @@ def _check_entries(data: dict[str, Any], path: Path) -> None:
     for branch in data["branches"]:
         where = f"{path}, branch {branch.get('name')!r},"
         DIAGRAM.check(branch, where, OF_BRANCH)
-        DIAGRAM.check(branch["columns"], where, COLUMNS)
+        DIAGRAM.check(branch["columns"], where, [column.name for column in COLUMNS if column.always])
         for special in branch["special"]:
             DIAGRAM.check(special, where, OF_SPECIAL)
 
@@ -135,13 +133,7 @@ def _branch(entry: dict[str, Any], solvers: Sequence[StaticSolver], states: Path
 
 
 def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[StaticSolver], states: Path) -> Point:
-    values = {name: _number(columns[name][row]) for name in COLUMNS}
-    given = {name: columns[name][row] for name in OPTIONAL if name in columns}
-    values |= {name: value for name, value in given.items() if value is not None}
-    values[UNDECIDED] = columns[UNDECIDED][row] if UNDECIDED in columns else 0
-    values[KINK] = columns[KINK][row] if KINK in columns else ""
-    soft = zip(*(columns[name][row] if name in columns else [] for name in SOFT), strict=True)
-    values["soft"] = [SoftMode(name, mu, inf if bar is None else bar) for name, mu, bar in soft]
+    values = point_values(columns, row)
     solver = solvers[values["mesh"]]
     x, load = load_state(states, branch, row, solver), values["load"]
     if abs(solver.system.scalar(x) - load) > NEGLIGIBLE * unit(load, one=solver.units.load):
@@ -156,18 +148,7 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[S
     """Special point of a row; its null vectors are those of the eigenvalues nearest zero there."""
     point = points[entry["row"]]
     solver = solvers[point.mesh]
-    known = {attribute: _number(entry[name]) for name, attribute in SPECIAL.items()}
-    special = SpecialPoint(KINDS[entry["kind"]], point, resolved=entry.get("resolved"), **known)
-    if entry["meets"]:
-        special.connects_to = (entry["meets"][0], entry["meets"][1])
-    if entry["law"]:
-        parts = {f.name for f in fields(NormalForm)}
-        special.law = NormalForm(**{name: _number(v) for name, v in entry["law"].items() if name in parts})
+    special = SpecialPoint(KINDS[entry["kind"]], point, **special_values(entry))
     if isinstance(solver, BranchSolver) and special.kind.singular and entry["multiplicity"]:
         special.null_vectors = solver.inertia.modes_near_zero(point.x, entry["multiplicity"])
     return special
-
-
-def _number(value: Any) -> Any:
-    """Value of a file, in which null stands for what is not finite."""
-    return float("nan") if value is None else value

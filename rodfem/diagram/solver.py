@@ -124,6 +124,18 @@ class Solver:
         solver.equilibria = equilibria
         return solver
 
+    def rebind(self, **constants: float) -> Solver:
+        """Solver of the same rod with other constants: ``solver.rebind(A=-1.5)``, on the same mesh.
+
+        Mesh, forms and their compiled code are shared; what depends on the constants is evaluated anew, and this solver
+        stays what it is.  Raises :class:`~rodfem.errors.SceneError` for a constant that the scene has not, or a value
+        that it does not allow.
+        """
+        system = self.equilibria.system
+        spectrum = self.equilibria.modes if isinstance(self.equilibria, BranchSolver) else 0
+        scene = system.scene.varying(**constants)
+        return Solver(scene, system.fields.asked, system.comm, spectrum=spectrum, clock=system.clock)
+
     def __repr__(self) -> str:
         """Scene and discretisation."""
         fields = self.equilibria.system.fields
@@ -230,7 +242,7 @@ class Solver:
         point
             The equilibrium.
         method
-            ``auto``, or a name of ``rodfem.stability.methods.METHODS``.
+            ``auto``, or a name of ``rodfem.stability.registry.METHODS``.
         number
             How many eigenvalues are computed.
 
@@ -238,7 +250,7 @@ class Solver:
         than the mesh has, and :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
         x = self._state(point)
-        self._check_number(number)
+        check_number(self.scene, self.equilibria.system.fields.discretization, number)
         verdict = assess(self.equilibria, x, method, number)
         if not isinstance(self.equilibria, BranchSolver):
             return replace(verdict, kink=self._quadrature.kink(x))
@@ -253,12 +265,8 @@ class Solver:
         There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one, and for more than
         the mesh has.
         """
-        self._check_number(number)
+        check_number(self.scene, self.equilibria.system.fields.discretization, number)
         return self._finder(self._state(point), number, method)[1]
-
-    def _check_number(self, number: int) -> None:
-        fields = self.equilibria.system.fields
-        check_number(self.scene, fields.discretization, number)
 
     @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=count(0))
     def restore(self, states: Path | str, branch: str, row: int) -> Point:

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.crossings import Node, crossings
+from rodfem.continuation.crossings import Node, Zeros, fourth
 from rodfem.continuation.kinds import IMPERFECT
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.piece import Piece
@@ -27,7 +27,7 @@ from rodfem.continuation.singular_points import (
     special_point,
     taut_where_it_turns,
 )
-from rodfem.diagram.step_check import ShorterSteps, StepCheck, Unresolved
+from rodfem.diagram.shorter_steps import ShorterSteps, Unresolved
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
 DIP = 0.1
@@ -55,7 +55,9 @@ class SpecialSearch:
         self.meshes, self.gaps, self.observer = meshes, gaps, observer
         self.undecided = 0
         self._open: list[Point] = []
-        self._check, self._steps = StepCheck(observer), ShorterSteps()
+        self._before: Point | None = None
+        self._nearest = -inf
+        self._steps = ShorterSteps()
         self._condensations: dict[int, Condensation] = {}
         self._phi: np.ndarray | None = None
         self._mesh = -1
@@ -64,8 +66,8 @@ class SpecialSearch:
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
         self._steps = ShorterSteps(short or inf, until)
-        self.undecided = first.zero
-        self._forget()
+        self.undecided, self._nearest, self._before = first.zero, -inf, None
+        self._known.clear()
 
     def resume(self, history: Sequence[Point]) -> None:
         """Go on from the last row of a branch, up to which everything has been found."""
@@ -80,11 +82,10 @@ class SpecialSearch:
         """Largest step from a point: near gaps, and where a step was not explained, short ones."""
         return min(self.gaps.reach(self.meshes.solvers[point.mesh], point), self._steps.reach(point))
 
-    def after(self, a: Point, b: Point, rows: Sequence[Point] = ()) -> list[SpecialPoint]:
-        """Special points that the row ``b`` after ``a`` shows, in order of arclength.
+    def after(self, b: Point) -> list[SpecialPoint]:
+        """Special points that the row ``b`` shows, in order of arclength.
 
-        At a singular row the index is not known: it waits for the next one.  The ``rows`` are those that the step to
-        ``b`` was predicted from.
+        At a singular row the index is not known: it waits for the next one.
 
         Raises
         ------
@@ -98,12 +99,10 @@ class SpecialSearch:
             self._open = [self.meshes.here(settled, self.meshes.solvers[b.mesh])]
         try:
             self._open.append(b)
-            found = self._shown() if self._regular(b) or len(self._open) > PATIENCE else []
-            self._check(self.meshes.solvers[b.mesh], [*rows, b], self._steps)
+            return self._shown() if self._regular(b) or len(self._open) > PATIENCE else []
         except (Gap, Unresolved):
             self._open = [settled]
             raise
-        return found
 
     def rest(self) -> list[SpecialPoint]:
         """Special points among the last rows of a branch that only its end shows: those of singular rows."""
@@ -114,7 +113,7 @@ class SpecialSearch:
         return self._between(a, b, ended=True)
 
     def _forget(self) -> None:
-        self._nearest: float = -inf
+        self._nearest = -inf
         self._phi = None
         self._known.clear()
 
@@ -133,7 +132,7 @@ class SpecialSearch:
     def _shown(self, *, ended: bool = False) -> list[SpecialPoint]:
         a, b = self._open[0], self._open[-1]
         found = self._between(a, b, ended=ended)
-        self._open = [b]
+        self._open, self._before = [b], a
         return found
 
     def _reduced(self, row: Point) -> ReducedStiffness:
@@ -149,11 +148,16 @@ class SpecialSearch:
     def _nodes(self, a: Point, b: Point) -> tuple[Piece, Node, Node]:
         """The piece from ``a`` to ``b`` with its ends, and a border with all modes that pass zero between them.
 
-        Where the last one has become that of others, or lacks one, it is made anew of the modes nearest zero: those of
-        ``b``, else those where the index changes.
+        Where the last one has become that of others, a step of inverse iteration improves it, which ``W`` is.  Where
+        that does not serve, or it lacks one, it is made anew of the modes nearest zero: those of ``b``, else those
+        where the index changes.
         """
         phi = self._prepare(a)
         piece, p, q = self._ends(a, b, phi)
+        if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) >= ROTATED:
+            self._known.clear()
+            self._phi = self._on(b).improved(max((p.kept.reduced, q.kept.reduced), key=lambda found: found.rotated))
+            piece, p, q = self._ends(a, b, self._phi)
         for halvings in HALVINGS:
             if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
                 break
@@ -198,32 +202,18 @@ class SpecialSearch:
         off = ASIDE * (q.s - p.s)
         p = p if p.kept.reduced.zero <= piece.still else piece.solve(p, q, p.s + off) or p
         q = q if q.kept.reduced.zero <= piece.still or not ended else piece.solve(p, q, q.s - off) or q
-        out, words = list[SpecialPoint](), list[str]()
-        pieces = [(p, q)]
-        turn = piece.turn(p, q)
-        if turn is not None:
-            touch = self._touching(piece, p, q, turn, words, ended=ended)
-            if touch is not None:
-                out.append(touch)
-                s = piece.place(touch.point.x)
-                left = piece.solve(p, q, s - min(off, (s - p.s) / 2)) if s > p.s else None
-                right = piece.solve(p, q, s + min(off, (q.s - s) / 2)) if s < q.s else None
-                pieces = [(p, left)] if left is not None else []
-                pieces += [(right, q)] if right is not None else []
-        misses: list[Node] = []
-        for begin, end in pieces:
-            for crossing in crossings(begin, end, piece.solve, piece.solver.inertia.tolerance, misses):
-                turns = piece.turn(*crossing.piece) is not None
-                special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
-                if special is None:
-                    if not ended:
-                        self._steps.ask(a, b)
-                    words.append(missing(a.load, b.load))
-                else:
-                    out.append(special)
-        for sentence in words:
-            self.observer.warn(sentence)
-        for node in misses:
+        out, pieces = self._turning(piece, p, q, ended=ended)
+        zeros, size = Zeros(piece.solve, piece.solver.inertia.tolerance), self._fourth(piece, p, q)
+        for crossing in (each for ends in pieces for each in zeros.between(*ends, size)):
+            turns = piece.turn(*crossing.piece) is not None
+            special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
+            if special is not None:
+                out.append(special)
+                continue
+            if not ended:
+                self._steps.ask(a, b)
+            self.observer.warn(missing(a.load, b.load))
+        for node in zeros.misses:
             self._missed(piece, node, resolved=ended)
         nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
         if not out and self._nearest > nearest < ahead and nearest < DIP * piece.solver.inertia.scale:
@@ -231,20 +221,36 @@ class SpecialSearch:
         self._nearest = -inf if out else nearest
         return sorted(out, key=lambda special: special.point.arclength)
 
-    def _touching(
-        self, piece: Piece, p: Node, q: Node, s: float, words: list[str], *, ended: bool
-    ) -> SpecialPoint | None:
-        """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there.
+    def _turning(
+        self, piece: Piece, p: Node, q: Node, *, ended: bool
+    ) -> tuple[list[SpecialPoint], list[tuple[Node, Node]]]:
+        """The branch point at which the load turns back, if there is one, and the pieces on both sides of it."""
+        turn = piece.turn(p, q)
+        touch = None if turn is None else self._touching(piece, p, q, turn, ended=ended)
+        if touch is None:
+            return [], [(p, q)]
+        s, off = piece.place(touch.point.x), ASIDE * (q.s - p.s)
+        left = piece.solve(p, q, s - min(off, (s - p.s) / 2)) if s > p.s else None
+        right = piece.solve(p, q, s + min(off, (q.s - s) / 2)) if s < q.s else None
+        return [touch], [(x, y) for x, y in ((p, left), (right, q)) if x is not None and y is not None]
 
-        ``words`` gets a sentence where the load turns back for another reason.
-        """
+    def _fourth(self, piece: Piece, p: Node, q: Node) -> np.ndarray | None:
+        """Size of the fourth derivative in a piece, by the row before it; None at the begin of a branch."""
+        row = self._before
+        if row is None or row.mesh != self._mesh or row.tangent is None:
+            return None
+        before = piece.node(row.x, row.tangent, self._reduced(row))
+        return fourth(before, p, q) if before.s < p.s else None
+
+    def _touching(self, piece: Piece, p: Node, q: Node, s: float, *, ended: bool) -> SpecialPoint | None:
+        """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""
         solver, off = piece.solver, ASIDE * (q.s - p.s)
         left, right = piece.solve(p, q, max(s - off, (p.s + s) / 2)), piece.solve(p, q, min(s + off, (s + q.s) / 2))
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
         at = of_turn(piece, left, right, turn)
         if why := taut_where_it_turns(solver, at.x):
-            words.append(why)
+            self.observer.warn(why)
             return None
         if left.index != right.index and is_fold(solver, at.x, at.null):
             return None

@@ -15,17 +15,16 @@ from typing import NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.arc import lost_between
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
-from rodfem.continuation.convexity_between import lost_between
 from rodfem.continuation.eigenvalue_curves import Curves
-from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
+from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Side
 from rodfem.diagram.critical_loads import CriticalLoads
-from rodfem.diagram.first_name import name_of_first
-from rodfem.diagram.first_state import first_state
+from rodfem.diagram.first_state import first_state, name_of_first
 from rodfem.diagram.held import at_load
 from rodfem.diagram.load_steps import LoadSteps
 from rodfem.diagram.persistent_zeros import family_of
@@ -37,9 +36,7 @@ from rodfem.faults import as_failure, without
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.frequencies import REAL, Frequencies, named
-from rodfem.stability.leftmost import FREQUENCIES, differ, leftmost
-from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
-from rodfem.stability.slow_motions import begins_slowly
+from rodfem.stability.nonsymmetric import FREQUENCIES, NonsymmetricPencil, NonsymmetricSolver, begins_slowly
 from rodfem.tolerances import unit
 
 LOADS = 101
@@ -76,7 +73,7 @@ class Sweep:
         self.number = plan.spectrum or FREQUENCIES
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, observer.warn)
-        self.invariants = Invariants(solver)
+        self.check = RowCheck(solver)
         self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._still = self.number  # frequencies that are zero at all loads
         self.branches: list[Branch] = []
@@ -129,12 +126,7 @@ class Sweep:
         self.solver.require_convexity(x)
         if not (first := self.eigensolver.at(x).spectrum).complete:
             self.observer.note("  the mesh has too many unknowns to find all frequencies: those nearest zero are found")
-        self.eigensolver.slow = begins_slowly(first.values, first.one)
-        if words := differ(self.eigensolver.at(x), self.number):
-            self.observer.warn(
-                f"The eigenvalues omega^2 of the first state are not well defined ({words}): do not trust any of this "
-                "sweep. Constraints may follow from others, or sizes of the rod's numbers may be too far apart."
-            )
+        self.eigensolver.slow = begins_slowly(first)
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
@@ -204,13 +196,13 @@ class Sweep:
 
     def _named(self, pencil: NonsymmetricPencil) -> Frequencies:
         """The left-most frequencies of a state with the names of those that are recorded."""
-        return named(pencil.system, [(leftmost(pencil, self.number), pencil.turned)], self.number)[0]
+        return named(pencil.system, pencil.leftmost(self.number), pencil.turned, self.number)
 
     def _family(self, last: Point) -> None:
         """Say where frequencies are zero at all loads, without a symmetry, to which the ``last`` one belongs, too."""
         if self._still:
             pencil = self.eigensolver.at(last.x)
-            if words := family_of(pencil, leftmost(pencil, self.number), self._still):
+            if words := family_of(pencil, pencil.leftmost(self.number), self._still):
                 self.observer.warn(words)
 
     def _asymmetry(self, last: Point) -> None:
@@ -228,17 +220,17 @@ class Sweep:
         return point
 
     def _point(self, x: PETSc.Vec) -> Point:
-        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check its invariants.
+        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check it.
 
-        Beside a state whose matrix is singular Newton's method ends early by its own measure: where the invariants are
-        violated the equations are solved once more.
+        Beside a state whose matrix is singular Newton's method ends early by its own measure: where it fails
+        the check the equations are solved once more.
         """
         point = self._evaluated(x)
         try:
-            self.invariants(point)
+            self.check(point)
         except ConvergenceError:
             point = self._evaluated(at_load(self.solver, x, point.load))
-            self.invariants(point)
+            self.check(point)
         return point
 
     def _evaluated(self, x: PETSc.Vec) -> Point:

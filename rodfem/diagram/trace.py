@@ -10,21 +10,21 @@ from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.first_mesh import check_start, frequency_mesh
-from rodfem.diagram.plan import Plan
+from rodfem.diagram.plan import EQUATIONS, Plan, entries
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import Sweep
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
+from rodfem.fem.fingerprint import fingerprint
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains
 from rodfem.ranks import end_together
-from rodfem.stability.leftmost import FREQUENCIES
+from rodfem.stability.nonsymmetric import FREQUENCIES
 from rodfem.timing import Clock
 
 PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
@@ -98,7 +98,7 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None:
                 check_start(found, plan.over(scene), recorder.warn)
-        asked = as_asked(found.system, plan)
+        asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
         recorder.system(found.system, plan.accuracy)
         if unused := _not_used(discretization, plan):
             recorder.note(unused)

@@ -10,32 +10,26 @@ from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.soft_rows import SoftRows
+from rodfem.adaptivity.zero_stretch import before_the_end, end_at_zero_stretch, last_admissible
+from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.convexity_between import lost_in_step
-from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow, since_stop
+from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
-from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer
+from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.switching import FIRST
-from rodfem.diagram.branch_ends import (
-    before_the_end,
-    closing,
-    end_at_zero_stretch,
-    last_admissible,
-    meeting,
-    singular_end,
-)
+from rodfem.diagram.branch_ends import closing, meeting, singular_end
 from rodfem.diagram.equivalence import equivalent
-from rodfem.diagram.finders import FINDERS
+from rodfem.diagram.events import Events
+from rodfem.diagram.finders import Finder, RequestedLoads, Step
 from rodfem.diagram.images import image_of
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.quadrature import Quadrature
+from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
-from rodfem.diagram.step import Step
-from rodfem.diagram.step_check import Unresolved
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
 from rodfem.tolerances import DRIFT, ROUND_OFF
@@ -68,8 +62,8 @@ class Tracer:
         self.gaps = Gaps(self.meshes)
         self.zeros = PersistentZeros(observer, self.high - self.low)
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
-        self.finders = [finder(plan) for finder in FINDERS]
-        self.invariants: dict[int, Invariants] = {}
+        self.finders: list[Finder] = [RequestedLoads(plan), Events(plan)]
+        self._checks: dict[int, RowCheck] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         self.quadrature = Quadrature(self.meshes.solvers, observer, self.scene.load)
 
@@ -137,15 +131,7 @@ class Tracer:
 
     def _follow(self, branch: Branch) -> None:
         """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
-        special, begun = {id(s.point) for s in branch.special}, False
-        history = [p for p in branch.points if id(p) not in special]
-        if not history or history[-1].arclength < branch.points[-1].arclength:  # a load asked for is where it goes on
-            history.append(branch.points[-1])
-        first = history[-1].arclength
-        if branch.parent and 0 < first < FIRST / 2:  # it begins near something: see start_branch
-            self.specials.begin(history[-1], short=first, until=NEAR_START * first)
-        else:
-            self.specials.begin(history[-1])
+        history, begun = self._begin(branch), False
         while True:
             try:
                 self.control.row(history[-1], self.solver)
@@ -157,6 +143,19 @@ class Tracer:
                 return
             except TooCoarse as trouble:
                 history = self._remesh(branch, history, trouble)
+
+    def _begin(self, branch: Branch) -> list[Point]:
+        """Rows that a branch goes on from."""
+        special = {id(s.point) for s in branch.special}
+        history = [p for p in branch.points if id(p) not in special]
+        if not history or history[-1].arclength < branch.points[-1].arclength:  # a load asked for is where it goes on
+            history.append(branch.points[-1])
+        first = history[-1].arclength
+        if branch.parent and 0 < first < FIRST / 2:  # it begins near something: see start_branch
+            self.specials.begin(history[-1], short=first, until=NEAR_START * first)
+        else:
+            self.specials.begin(history[-1])
+        return history
 
     def _remesh(self, branch: Branch, history: list[Point], trouble: TooCoarse) -> list[Point]:
         """Points to go on from, carried to a mesh that resolves what was too coarse; what lies beyond is dropped.
@@ -188,27 +187,8 @@ class Tracer:
                 if branch.ended.startswith(NO_CONVERGENCE):
                     self.observer.warn(f"{branch.name} ends: {branch.ended}; use more elements or smaller steps.")
                 return True
-            previous = history[-1]
-            width = self.high - self.low
-            last = closing(self.solver, branch, previous, item, width, self.here, self.alike)
-            item = last or item
-            self._check_symmetry(item)
-            self._check_invariants(item)
-            self.control.row(item, self.solver)
-            self.zeros.check(self.solver, history, item, self.specials.undecided)
             try:
-                if item.stretch > 0 and self._ends_not_convex(branch, previous, item):
-                    return True
-                if item.stretch <= 0:
-                    self._end_at_zero_stretch(branch, previous, item)
-                    return True
-                reason = self._between(
-                    branch,
-                    previous,
-                    item,
-                    self._own(branch, since_stop(history, self.scene.stops)[-4:]),
-                    closed=bool(last),
-                )
+                reason = self._take(branch, history, item)
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
                 history[:] = [p for p in history if p.arclength <= self.specials.settled]
@@ -216,30 +196,35 @@ class Tracer:
             if reason:
                 branch.ended = reason
                 return True
-            history.append(item)
-            branch.append(item)
-            self.observer.progress(branch, item)
-            if last:
-                branch.ended = self._rest(branch) or "closed loop"
-                return True
         return True
 
-    @staticmethod
-    def _own(branch: Branch, rows: Sequence[Point]) -> list[Point]:
-        """Rows but for the branch point that a branch leaves, at which it has another tangent than its own."""
-        return [row for row in rows if branch.parent is None or row is not branch.points[0]]
+    def _take(self, branch: Branch, history: list[Point], row: Point) -> str:
+        """Append a row to a branch, with the special points before it; why the branch ends there, or before."""
+        previous, width = history[-1], self.high - self.low
+        last = closing(self.solver, branch, previous, row, width, self.here, self.alike)
+        row = last or row
+        self._check_symmetry(row)
+        self._check(row)
+        self.control.row(row, self.solver)
+        self.zeros.check(self.solver, history, row, self.specials.undecided)
+        if row.stretch <= 0:
+            return self._end_at_zero_stretch(branch, previous, row)
+        reason = self._lost_convexity(branch, previous, row)
+        if reason := reason or self._between(branch, previous, row, closed=bool(last)):
+            return reason
+        history.append(row)
+        branch.append(row)
+        self.observer.progress(branch, row)
+        return self._rest(branch) or "closed loop" if last else ""
 
-    def _between(self, branch: Branch, a: Point, b: Point, rows: Sequence[Point] = (), *, closed: bool = False) -> str:
-        """Insert special points between two points; a reason if the branch ends there.
-
-        The ``rows`` are those that the step to ``b`` was predicted from; ``closed``: ``b`` is where the branch began.
-        """
+    def _between(self, branch: Branch, a: Point, b: Point, *, closed: bool = False) -> str:
+        """Insert special points between two points, the second maybe where the branch began; a reason if it ends."""
         with self.solver.system.clock.scope("location"):
-            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b, rows)
+            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(b)
             if last := self._leaving(branch, specials, b):
                 return last
             step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
-            return self._insert(branch, specials + [s for finder in self.finders for s in finder.between(step)])
+            return self._insert(branch, specials + self._asked(step))
 
     def _leaving(self, branch: Branch, specials: list[SpecialPoint], b: Point) -> str:
         """End a branch where it leaves the range before one of its ``specials``, found up to ``b``; the reason, if so.
@@ -250,31 +235,29 @@ class Tracer:
         out = next((s for s in specials if not self.low - margin <= s.point.load <= self.high + margin), None)
         if out is None:
             return ""
-        before = [p for p in branch.points if p.arclength < out.point.arclength]
-        a = self.here(before[-1])
+        a = self.here(max((p for p in branch.points if p.arclength < out.point.arclength), key=lambda p: p.arclength))
         begins = len(branch.points) == 1  # else what is at its first point has been found
         step = Step(self.solver, a, b, specials, begins=begins).up_to((self.low, self.high))
         branch.cut(a.arclength)
         known = [s for s in specials if s.point.arclength < a.arclength]
-        found = [*known, *step.singular, *(s for finder in self.finders for s in finder.between(step))]
-        if reason := self._insert(branch, found):
+        if reason := self._insert(branch, [*known, *step.singular, *self._asked(step)]):
             return reason
-        self._check_invariants(step.b)
+        self._check(step.b)
         branch.append(step.b)
         self.observer.progress(branch, step.b)
         return END_OF_RANGE
 
+    def _asked(self, step: Step) -> list[SpecialPoint]:
+        """What the plan asks for in a step."""
+        return [special for finder in self.finders for special in finder.between(step)]
+
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
-        folds = list(branch.special)
-        if len(branch.points) != 2 + len(folds) or branch.parent is None:
+        if len(branch.points) != 2 or branch.parent is None:
             return
-        a, b = self.here(branch.points[0]), self.here(branch.points[-1])
-        for fold in folds:
-            self.control.special(fold)
-            self.observer.special(branch, fold)
-        step = Step(self.solver, a, b, folds, begins=a is branch.points[0])
-        for special in (s for finder in self.finders if finder.at_start for s in finder.between(step)):
+        a, b = map(self.here, branch.points)
+        step = Step(self.solver, a, b, begins=a is branch.points[0])
+        for special in self._asked(step):
             self.control.special(special)
             branch.insert(special)
             self.observer.special(branch, special)
@@ -289,7 +272,7 @@ class Tracer:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
             if not special.unfolding > ROUND_OFF:  # else the mesh has an equilibrium beside it only
-                self._check_invariants(special.point)
+                self._check(special.point)
             self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = ""
@@ -304,35 +287,32 @@ class Tracer:
                 return reason
         return ""
 
-    def _ends_not_convex(self, branch: Branch, a: Point, b: Point) -> bool:
-        """Whether the branch ends at the row ``a`` as the stored energy ceases to be convex between it and ``b``."""
-        why = lost_in_step(self.solver, a, b)
-        if why:
-            branch.ended = self._rest(branch) or why
-        return bool(why)
+    def _lost_convexity(self, branch: Branch, a: Point, b: Point) -> str:
+        """Why the branch ends at the row ``a`` if the stored energy ceases to be convex between it and ``b``."""
+        why = Arc(self.solver, a, b).lost_convexity()
+        return self._rest(branch) or why if why else ""
 
-    def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
-        """Add the last admissible point, where the smallest stretch vanishes, and say so."""
+    def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> str:
+        """Add the last admissible point, where the smallest stretch vanishes; why the branch ends there, or before."""
         last = last_admissible(self.solver, a, b)
         beside = before_the_end(self.solver, a, last)
-        if beside is not None and self._ends_not_convex(branch, a, beside):
-            return
-        if beside is not None and beside.negative != a.negative:  # what passes zero before is zero at the end once more
-            self._check_invariants(beside)
-            if reason := self._between(branch, a, beside):
-                branch.ended = reason
-                return
-            branch.append(beside)
-            a = beside
+        if beside is not None:
+            if reason := self._lost_convexity(branch, a, beside):
+                return reason
+            if beside.negative != a.negative:  # what passes zero before is zero at the end once more
+                self._check(beside)
+                if reason := self._between(branch, a, beside):
+                    return reason
+                branch.append(beside)
+                a = beside
         if reason := self._between(branch, a, last):
-            branch.ended = reason
-            return
-        branch.ended = "stretch reaches zero"
+            return reason
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
         if not isnan(end.error_estimate):
             self.control.check(end)
         branch.append(end.point)
         branch.special.append(end)
+        return "stretch reaches zero"
 
     def _singular_start(self, branch: Branch) -> None:
         """Record that a range begins at a singular state: a branch point there is not located, and not followed."""
@@ -375,10 +355,10 @@ class Tracer:
                 "accuracy."
             )
 
-    def _check_invariants(self, point: Point) -> None:
-        if point.mesh not in self.invariants:
-            self.invariants[point.mesh] = Invariants(self.meshes.solvers[point.mesh])
-        self.invariants[point.mesh](point)
+    def _check(self, point: Point) -> None:
+        if point.mesh not in self._checks:
+            self._checks[point.mesh] = RowCheck(self.meshes.solvers[point.mesh])
+        self._checks[point.mesh](point)
 
     def _finish(self, branch: Branch) -> None:
         for finder in self.finders:

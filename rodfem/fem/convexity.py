@@ -8,6 +8,8 @@ for all.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
 from mpi4py import MPI
@@ -16,9 +18,10 @@ from ufl.algorithms.analysis import extract_coefficients, extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
-from rodfem.fem import form_compiler
+from rodfem.fem.equations import Equations
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature, strain
+from rodfem.problem.roles import derived
 
 GRID = 25
 """Places of an element, at equal distances, at which a material that varies along it is looked at besides."""
@@ -27,6 +30,20 @@ EXPLAINED = 0.1
 
 One through a jump is not: it has lower values than the function.
 """
+
+
+def second_derivative(e: Equations) -> tuple[Any, bool, Any]:
+    """Entries of the second derivative of ``W`` as a vector in UFL; whether the state is in them; and them expanded."""
+    u, scene = e.unknowns, e.fields.scene
+    free, k = scene.free_strains, curvature(u.q, u.q.dx(0))
+    x = ufl.variable(ufl.as_vector([*e.components(u.v, len(free)), *(k[i] for i in range(3))]))
+    v = strain(free, [x[i] for i in range(len(free))])
+    W = scene.energy(v, ufl.as_vector([x[len(free) + i] for i in range(3)]), e.constants)
+    hessian, every = ufl.diff(ufl.diff(W, x), x), range(len(free) + 3)
+    vector = ufl.as_vector([hessian[i, j] for i in every for j in every])
+    expanded = apply_derivatives(apply_algebra_lowering(vector))
+    variables = extract_type(expanded, ufl.classes.Variable)
+    return vector, any(node.ufl_operands[1] == x.label() for node in variables), expanded
 
 
 class Convexity:
@@ -44,31 +61,18 @@ class Convexity:
 
     def __init__(self, system: System, *names: str) -> None:
         """Compile the second derivative; the parameters with these ``names`` change, and no other one."""
-        self.system = system
-        e, f, scene = system.equations, system.fields, system.scene
-        u, free = e.unknowns, scene.free_strains
-        values = e.components(u.v, len(free))
-        k = curvature(u.q, u.q.dx(0))
-        x = ufl.variable(ufl.as_vector([*values, *(k[i] for i in range(3))]))
-        v = strain(free, [x[i] for i in range(len(free))])
-        W = scene.energy(v, ufl.as_vector([x[len(free) + i] for i in range(3)]), e.constants)
-        hessian = ufl.diff(ufl.diff(W, x), x)
-        self.size = len(free) + 3
-        entries = [hessian[i, j] for i in range(self.size) for j in range(self.size)]
-        expression = apply_derivatives(apply_algebra_lowering(ufl.as_vector(entries)))
+        self.system, e, f = system, system.equations, system.fields
+        self.size = len(system.scene.free_strains) + 3
+        vector, of_state, known = derived(e, "second derivative", lambda: second_derivative(e))
+        self.alters = of_state or (bool(extract_coefficients(known)) and system.scene.energy_depends_on(*names))
+        self.varies = bool(extract_type(known, ufl.SpatialCoordinate))
         self.evaluate = None
-        of_state = any(node.ufl_operands[1] == x.label() for node in extract_type(expression, ufl.classes.Variable))
-        self.alters = of_state or (bool(extract_coefficients(expression)) and scene.energy_depends_on(*names))
-        self.varies = bool(extract_type(expression, ufl.SpatialCoordinate))
         if not self.alters and not self.varies:  # the same everywhere: checked with the scene
             return
         inside = (np.polynomial.legendre.leggauss(f.discretization.degree + 1)[0] + 1) / 2
-        points = np.array([0.0, *inside, 1.0])
-        if self.varies:
-            points = np.append(points, np.linspace(0.0, 1.0, GRID))
+        points = np.array([0.0, *inside, 1.0, *(np.linspace(0.0, 1.0, GRID) if self.varies else [])])
         self.places = len(points)
-        vector = e.compilable(ufl.as_vector(entries))
-        self.evaluate = form_compiler.expression(vector, points.reshape(-1, 1), f.mesh, f.owned_cells)
+        self.evaluate = derived(e, "convexity", lambda: e.evaluated(vector, points))
 
     def holds(self, x: PETSc.Vec) -> bool:
         """Whether the second derivative is positive definite along the whole rod at the state ``x``.

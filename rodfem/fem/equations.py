@@ -6,16 +6,17 @@ other number would be compiled anew.  As a constant it is a value that the compi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
+from copy import copy
 from functools import cached_property
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import dolfinx.mesh
 import numpy as np
-import scipy.sparse as sp
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from ufl.algorithms.analysis import extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.map_integrands import map_integrand_dags
@@ -24,8 +25,8 @@ from ufl.corealg.multifunction import MultiFunction
 from ufl.corealg.traversal import traverse_unique_terminals
 
 from rodfem.fem import form_compiler
-from rodfem.fem.assembly import Assembler, Cells, Places, matrix_places, vector_places
-from rodfem.fem.fields import Fields
+from rodfem.fem.assembly import Assembler, Cells, vector_places
+from rodfem.fem.fields import FEW, Discretization, Fields
 from rodfem.fem.known import Known
 from rodfem.fem.parameters import Line, load_line
 from rodfem.forms import inertia, lagrangian
@@ -33,12 +34,12 @@ from rodfem.forms.kinematics import curvature, strain
 from rodfem.forms.rotation import rotation
 from rodfem.problem.contribution import Site
 from rodfem.problem.local_state import Constants, Place, place
-from rodfem.problem.scene import Part
+from rodfem.problem.roles import derived
+from rodfem.problem.scene import Part, Scene
 from rodfem.tolerances import same_place
 
-if TYPE_CHECKING:
-    from rodfem.fem.state import Evaluation
-
+RECENT = 8
+"""Number of meshes of scenes with the same functions whose forms are kept."""
 KEPT = {sign * value for sign in (-1.0, 1.0) for value in (0.25, 0.5, 1.0, 2.0, 3.0, 4.0)}
 """Numbers that belong to formulas, as the half of an energy."""
 
@@ -120,8 +121,9 @@ class Equations:
         Ordinate of the scene where that is an integral over the rod, else None.
     line
         Parameters that the scalar unknown ``load`` stands for unless an evaluation says otherwise: the scene's load.
-    held
-        Evaluation whose values are where dolfinx reads them: see :mod:`rodfem.fem.state`.
+    register
+        What the forms read now, of whichever scene: the ``line`` taken last, and since then the ``values`` that were
+        put where dolfinx reads them (:mod:`rodfem.fem.state`).
     cells, local_places
         Cells of this rank, and the places of a vector of all their degrees of freedom.
     uniform
@@ -131,7 +133,8 @@ class Equations:
     def __init__(self, fields: Fields) -> None:
         """Derive and compile the forms."""
         forms = self._derive(fields)
-        self._taken: Line | None = None
+        self.register = SimpleNamespace(line=None, values=None)
+        self.derived: dict[Hashable, Any] = {}  # shared, as the forms are
         self.cells = Cells.of(fields)
         load = int(fields.copies[0, -1])
         compiled = form_compiler.compile_forms(list(forms.values()), fields.mesh.comm)
@@ -144,16 +147,28 @@ class Equations:
         self.loads = assemblers.get("loads")
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
 
-    @cached_property
-    def local_entries(self) -> tuple[sp.csr_matrix, Places]:
-        """Pattern of a matrix between all local degrees of freedom, and the places of a bilinear form in it."""
-        dofs, every = self.cells.dofs, np.arange(len(self.fields.number))
-        rows, columns = (
-            np.broadcast_to(x, (*dofs.shape, dofs.shape[1])).ravel() for x in (dofs[:, :, None], dofs[:, None])
-        )
-        pattern = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(every),) * 2)
-        pattern.sort_indices()
-        return pattern, matrix_places(dofs, every, every, pattern)
+    @classmethod
+    def of(cls, scene: Scene, discretization: Discretization, comm: MPI.Comm) -> Equations:
+        """Equations of a ``scene``, with mesh and forms of another one that has the same functions, where there are.
+
+        What depends on the constants is each scene's own.  Of a small system the forms live as long as the functions.
+        ``discretization`` and ``comm`` are as for :class:`~rodfem.fem.fields.Fields`.
+        """
+        recent = derived(scene.energy, "equations", list[Equations])
+        for known in recent:
+            f = known.fields
+            alike = (f.asked, f.comm) == (discretization, comm) and f.scene.alike(scene)
+            if alike and (fields := f.bound(scene)):
+                break
+        else:
+            known = cls(Fields(scene, discretization, comm))
+            fields = known.fields.bound(scene)
+            assert fields is not None
+            if fields.unknowns <= FEW:
+                recent[:] = [known, *recent[: RECENT - 1]]
+        out = copy(known)
+        out.fields, out.line = fields, load_line(scene)
+        return out
 
     def _derive(self, fields: Fields) -> dict[str, Any]:
         """Forms in UFL by the names of the attributes that they become."""
@@ -161,7 +176,6 @@ class Equations:
         mesh, k = fields.mesh, fields.discretization.degree
         self.names, self.line = list(scene.parameters), load_line(scene)
         self.base, self.direction = fem.Constant(mesh, self.line.origin), fem.Constant(mesh, self.line.direction)
-        self.held: Evaluation | None = None
         self.ends = fem.Constant(mesh, np.array(scene.interval, dtype=float))
         length = self.length = self.ends[1] - self.ends[0]
 
@@ -173,9 +187,8 @@ class Equations:
         self.known = Known(fields, self.quadrature_degree(k) // 2)
         f = self.unknowns = self._named(ufl.split(u))
         c = self.constants = self._constants(f.load)
-        v = strain(scene.free_strains, self.components(f.v, len(scene.free_strains)))
-        along = self._along(f, c, v)
-        W = scene.energy(v, along.k, c)
+        along = self.along()
+        W = scene.energy(along.v, along.k, c)
         a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
         sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
         inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
@@ -223,26 +236,32 @@ class Equations:
 
     def take(self, line: Line) -> None:
         """Let the constants of the forms be the parameters of a ``line``."""
-        if line is self._taken:
+        if line is self.register.line:
             return
         self.base.value[:], self.direction.value[:] = line.origin, line.direction
         self.known.take(line)
         for form in self._assemblers:
             form.pack_constants()
-        self._taken = line
+        self.register.line, self.register.values = line, None
 
     def compilable(self, form: Any) -> Any:
         """A form, or an expression, with what is known in the place of tables, and constants in that of numbers."""
         return with_constants(self.known.put(form), self.fields.mesh)
 
+    def evaluated(self, vector: Any, points: np.ndarray) -> Callable[[], np.ndarray]:
+        """Compile a vector in UFL at ``points`` (m,) in [0, 1] of each of this rank's elements."""
+        fields = self.fields
+        return form_compiler.expression(self.compilable(vector), points[:, None], fields.mesh, fields.owned_cells)
+
     # --- the functional --------------------------------------------------------------------------------------------
 
-    def _along(self, f: Any, c: Any, v: Any) -> Place:
-        """Place of the functions that hold all along the rod."""
-        k, R = curvature(f.q, f.q.dx(0)), rotation(f.q)
+    def along(self, wrap: Callable[[Any], Any] = lambda x: x) -> Place:
+        """Place of the functions that hold all along the rod; slope and curvatures pass through ``wrap``."""
+        f, c, free = self.unknowns, self.constants, self.fields.scene.free_strains
+        v, k = strain(free, self.components(f.v, len(free))), wrap(curvature(f.q, f.q.dx(0)))
         r = self.fields.formulation.position(self, f, c, lambda field: field, None)
-        slope = {} if r is None else {"dr": r.dx(0)}
-        return place(f.q, R, c.s, r, v=v, k=k, length=self.fields.scene.length, **slope)
+        slope = {} if r is None else {"dr": wrap(r.dx(0))}
+        return place(f.q, rotation(f.q), c.s, r, v=v, k=k, length=self.fields.scene.length, **slope)
 
     def site(self, part: Part, f: Any, variations: Any, along: Place) -> tuple[Site, Any]:
         """State where a ``part`` of the scene is, and the measure of its terms, None along the rod.

@@ -9,6 +9,7 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -23,19 +24,21 @@ from rodfem.fem import formulations
 from rodfem.fem.arclength import Arclength
 from rodfem.fem.formulation import CONTACT_FORCE, Formulation
 from rodfem.fem.rotation_field import AngleField, QuaternionField, Turning
+from rodfem.fem.values import LOAD
 from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.kinds import reals, whole
 from rodfem.problem.local_state import Constants
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import SAME_PLACE, same_place
 
-LOAD = "load"
 FACTORS = CHAIN, PETSC = "chain", "petsc"
 """What assembles and factors the matrices of a discretisation."""
 MOST = 1_000_000
 """Largest number of elements: 100000 of degree 2 take 4 GB."""
 HIGHEST = 12
 """Highest degree of elements."""
+FEW = 4000
+"""Number of unknowns up to which symmetries are sought on the mesh itself, and forms and states are kept for others."""
 
 
 @dataclass(frozen=True)
@@ -171,18 +174,19 @@ class Fields:
         Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
     copies
         Local degrees of freedom of the scalars but for drifts, one in each cell, (cells, scalars).
-    clamps
-        Values of clamped local degrees of freedom, zero for all others; (local size,).
+    clamped, clamps
+        Clamped local degrees of freedom; their values, zero for all others, (local size,).
+    asked
+        The discretisation as it was asked for.
     """
 
-    def __init__(
-        self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None
-    ) -> None:
+    def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
         """Make the mesh of a ``discretization`` on the ranks of ``comm``, and number the unknowns of the ``scene``.
 
-        A ``mesh`` of dolfinx may be given instead.  Raises :class:`InputError` for more ranks than elements.
+        Raises :class:`InputError` for more ranks than elements.
         """
         check_mesh(scene, discretization, comm.size)
+        self.asked = discretization
         self.formulation = formulations.chosen(discretization.formulation, scene)
         least = 1 if discretization.vertices else len(scene.vertices) + 1
         elements = max(discretization.elements, least)
@@ -193,7 +197,7 @@ class Fields:
         self.unknown_scalars = scalars_of(scene, self.formulation)
         self.forces = [x.component for x in self.unknown_scalars if x.group.name == CONTACT_FORCE]
         names = [x.name for x in self.unknown_scalars] + [LOAD]
-        self.mesh = mesh or self._mesh()
+        self.mesh = self._mesh()
         parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
         self.space = compat.mixed_space(self.mesh, parts)
         self.u = compat.fem.Function(self.space, dtype=compat.REAL)
@@ -202,8 +206,24 @@ class Fields:
         self.vertices = compat.cell_vertices(self.mesh, local_cells)
         self.dofs = {b.name: self._block_dofs(i, b.size, local_cells) for i, b in enumerate(self.blocks)}
         copies = self._block_dofs(len(self.blocks), len(names), local_cells)[:, 0, :]
+        self.clamped = self._clamped()
         self._number(copies, names)
         self.clamps = self._clamps()
+
+    def bound(self, scene: Scene) -> Fields | None:
+        """The same for a scene with other constants, load or range; None where its unknowns are others.
+
+        To be asked before drifts are added, and anything else.
+        """
+        out = copy(self)
+        out.scene, out.scalars = scene, dict(self.scalars)
+        out.formulation = formulations.chosen(self.asked.formulation, scene)
+        out.unknown_scalars = scalars_of(scene, out.formulation)
+        alike = (out.formulation, out.unknown_scalars) == (self.formulation, self.unknown_scalars)
+        if not all(self.comm.allgather(alike and np.array_equal(out._clamped(), self.clamped))):
+            return None
+        out.clamps = out._clamps()
+        return out
 
     def _mesh(self) -> Any:
         """Mesh with the vertices that the discretisation gives, or of elements of nearly equal size; each at joints."""
@@ -260,7 +280,7 @@ class Fields:
         index_map = self.space.dofmap.index_map
         owned, local = index_map.size_local, index_map.size_local + index_map.num_ghosts
         free = np.ones(local, dtype=bool)
-        free[self._clamped()] = False
+        free[self.clamped] = False
         free[copies.ravel()] = False
         self.free_owned = np.flatnonzero(free[:owned])
         count = len(self.free_owned)

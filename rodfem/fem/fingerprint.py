@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.fields import LOAD
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
+from rodfem.fem.values import LOAD
 from rodfem.problem.local_state import inside
 
 AMPLITUDE = 0.1

@@ -1,34 +1,36 @@
 r"""Detection of the continuous symmetries of a scene: invariance of its equations at generic states.
 
-With a potential a combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmetries` is a symmetry
-where it leaves the functional ``L`` invariant, at every state and load; without one where the equations ``F`` of
-equilibrium are equivariant, so that it carries equilibria into equilibria, for ``g(x) = A x + c`` ::
+A combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmetries` is a symmetry where the equations
+``F`` of equilibrium are equivariant, so that it carries equilibria into equilibria, for ``g(x) = A x + c`` ::
 
-    sum_j a_j dL(x)[g_j(x)] = 0,      or      dF(x)[g(x)] + A^t F(x) = 0,
+    dF(x)[g(x)] + A^t F(x) = 0
 
 for all ``x``; and where it moves nothing that an end holds.  The space of such ``a`` is the null space of a matrix with
 rows for each of a number of generic states.
 
-What acts on the rod, with a potential, has to be invariant by itself: beside a rod a thousand million times as stiff as
-the spring that holds it, the spring is round-off in ``L``.
+What acts on the rod, with a potential, has to be invariant by itself: beside a rod 1e12 times as stiff as the spring
+that holds it, the spring is round-off in ``F``.
 
 The motion of a closed rod along itself is a symmetry where no equation has the arclength in it.  Where one has, it may
-still be one together with a rotation (a ring under a dead radial load): the same condition, ``g`` with the state's
-derivative in it, is asked on a fine mesh, which has such a symmetry up to its small error.
+still be one together with a rotation (a ring under a dead radial load): ``g``, with the state's derivative in it, has
+to leave the functional ``L`` invariant, ``dL(x)[g(x)] = 0``, on a fine mesh, which has such a symmetry up to its error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from mpi4py import MPI
 
 from rodfem.errors import SceneError
-from rodfem.fem.fields import LOAD, Fields
+from rodfem.fem.fields import Fields
 from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
+from rodfem.fem.values import LOAD
 from rodfem.problem.contribution import Block, Motion
+from rodfem.problem.roles import derived
+from rodfem.problem.scene import Scene
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
@@ -62,25 +64,24 @@ SMOOTH = 0.35
 """The same of a state that a fine mesh resolves to round-off, nearly."""
 
 
-def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
+def find_symmetries(equations: Equations) -> list[Symmetry]:
     """Find a basis of all exact symmetries; raises :class:`SceneError` where the equations are no numbers anywhere."""
-    parts = elementary_generators(fields)
+    fields, parts = equations.fields, elementary_generators(equations.fields)
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved, dofs_held = np.zeros((len(parts),) * 2), _held(fields)
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
-    for seed in range(len(parts) + 6 if fields.scene.conservative else STATES):
+    for seed in range(STATES):
         state = generic_state(equations, seed)
         changes = np.array([s.change(state) for s in single])
-        asked = _change_of_functional if fields.scene.conservative else _change_of_equations
-        row, size = asked(state, single, changes)
+        row, size = _change_of_equations(state, single, changes)
         rows.append(row)
         sizes.append(size)
         # conditions on the weights a of a symmetry: invariance, and no motion of what an end holds
         changes /= fields.sizes  # conditions and motions are beside others in other units
         held.append(changes[:, dofs_held].T)
         free = changes[:, fields.number >= 0]
-        moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
-    free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
+        moved += free @ free.T
+    free = _null_space(np.vstack(held))
     greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
     if not np.isfinite(greatest).any():
         raise SceneError(
@@ -125,8 +126,7 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
         return np.eye(len(found))
     states = [generic_state(equations, seed, no_multipliers=True) for seed in range(len(found) + STATES)]
     changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
-    comm, sizes = equations.fields.comm, equations.fields.sizes
-    lengths = np.max(comm.allgather(abs(changes / sizes).max(axis=(0, 2))), axis=0)
+    lengths = abs(changes / equations.fields.sizes).max(axis=(0, 2))
     lengths = np.where(lengths > 0, lengths, 1.0)
     along = [_along(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
     size = max(largest for _, largest in along)
@@ -150,12 +150,12 @@ def _along(state: Evaluation, changes: np.ndarray) -> tuple[np.ndarray, float]:
     return values @ [1.0, -8.0, 8.0, -1.0] / (12 * STEP), float(abs(values).max())
 
 
-def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
+def find_motion_along(equations: Equations) -> Symmetry | None:
     """Find the motion of a closed rod along itself, with what has to go with it; None where that is no symmetry.
 
     For a scene whose equations have the arclength in them the mesh must be fine.
     """
-    parts = elementary_generators(fields)
+    fields, parts = equations.fields, elementary_generators(equations.fields)
     none = np.zeros(len(parts))
     if equations.uniform:
         return Symmetry(none, parts, along=1.0)
@@ -166,8 +166,9 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
     for seed in range(len(parts) + SLIDES):
         state = generic_state(equations, seed, SMOOTH)
         changes = np.array([*(s.change(state) for s in single), derivative(state)])
-        row, terms = _change_of_functional(state, single, changes)
-        rows.append(row[0] / terms.max())
+        residual = state.covector()
+        row, terms = changes @ residual, abs(changes) @ abs(residual)
+        rows.append(row / terms.max())
         held.append((changes[:-1] / fields.sizes)[:, _held(fields)].T)
     free = _null_space(np.vstack(held))
     exact, along = np.array(rows)[:, :-1] @ free, np.array(rows)[:, -1]
@@ -188,19 +189,10 @@ def _null_space(rows: np.ndarray, exact: float = EXACT) -> np.ndarray:
     return np.asarray(vectors[singular < exact * max(singular[0], 1.0)].T)
 
 
-def _change_of_functional(
-    state: Evaluation, single: list[Symmetry], changes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """``dL(x)[g]`` of the ``changes`` (m, local size) by each generator, (1, m), and the sums of magnitudes, (m,)."""
-    residual = state.covector()
-    sums = state.fields.comm.allreduce(np.array([changes @ residual, abs(changes) @ abs(residual)]), op=MPI.SUM)
-    return sums[:1], sums[1]
-
-
 def _change_of_equations(
     state: Evaluation, single: list[Symmetry], changes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,); for one rank alone.
+    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,).
 
     Across the columns of the multipliers that close a ring: what these have to change by follows from the rest.
     """
@@ -274,19 +266,27 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, no_m
     function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
     translation, say, only shows there.
     """
-    rng, fields = np.random.default_rng(seed), equations.fields
-    scene, named = fields.scene, dict[str, Any]()
-    for block in fields.blocks:
-        x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
-        named[block.name] = scene.units.of_field(block) * _generic(fields, block, x[..., None], rng, decay)
-    named |= {unknown.name: rng.normal() * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
+    fields, scene = equations.fields, equations.fields.scene
+    values, part = derived(equations, ("generic values", seed, decay), lambda: _generic_values(fields, seed, decay))
+    named = {block.name: scene.units.of_field(block) * values[block.name] for block in fields.blocks}
+    named |= {unknown.name: values[unknown.name] * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
     if no_multipliers:
         multipliers = [block.name for block in fields.blocks if block.multiplier]
         multipliers += [x.name for x in fields.unknown_scalars if x.group.motion is not Motion.POSITION]
         named |= {name: 0.0 * named[name] for name in multipliers}
     low, high = sorted(scene.span)
-    named[LOAD] = low + (high - low) * rng.uniform(0.1, 0.9)
+    named[LOAD] = low + (high - low) * part
     return Evaluation(equations, fields.filled(named), equations.line)
+
+
+def _generic_values(fields: Fields, seed: int, decay: float) -> tuple[dict[str, Any], float]:
+    """Values of a generic state by name, without units, and where in its range the load is: whatever the constants."""
+    rng, scene, named = np.random.default_rng(seed), fields.scene, dict[str, Any]()
+    for block in fields.blocks:
+        x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
+        named[block.name] = _generic(fields, block, x[..., None], rng, decay)
+    named |= {unknown.name: rng.normal() for unknown in fields.unknown_scalars}
+    return named, float(rng.uniform(0.1, 0.9))
 
 
 def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generator, decay: float) -> np.ndarray:
@@ -301,15 +301,7 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
 
     values = wave()
     if block.name == "q":
-        u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
-        clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
-        u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
-        if scene.sides[1].sign < 0:  # of one sign at the start and of the other at the end
-            half = np.pi * x
-            values = (u + 0.3 * values) * np.cos(half) + (v + 0.3 * wave()) * np.sin(half)
-        else:
-            values = u + 0.3 * values
-        values = fields.turning.normalised(values)
+        values = fields.turning.normalised(_rotated(scene, values, wave, x, rng))
     if block.name == fields.turning.name and not closed:
         values = _toward_clamps(fields, values, x)
     if block.name == "angle" and closed:
@@ -318,6 +310,22 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
     if block.name == "v":
         values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
     return values
+
+
+def _rotated(
+    scene: Scene, values: np.ndarray, wave: Callable[[], np.ndarray], x: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """Quaternions at ``x``, not of length one, that are far from zero: ``values`` about one direction.
+
+    Where a ring is closed by ``-q`` they are of one sign at its start and of the other at its end, with another
+    ``wave`` between.
+    """
+    u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
+    clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
+    u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
+    if scene.sides[1].sign >= 0:
+        return np.asarray(u + 0.3 * values)
+    return np.asarray((u + 0.3 * values) * np.cos(np.pi * x) + (v + 0.3 * wave()) * np.sin(np.pi * x))
 
 
 def _toward_clamps(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -54,13 +54,13 @@ Iteration = Callable[[bool], Correction | None]
 class Limits:
     """At most ``most`` iterations, over a distance of ``reach`` in the metric.
 
-    An error below ``tolerance``, by the observed rate of convergence, is small enough; a correction that no longer
-    shrinks is round-off below ``still``, and where the unknowns are ``lost`` in the round-off of the equations.
+    A correction below ``small`` is small enough; one that no longer shrinks is round-off below ``still``, and where the
+    unknowns are ``lost`` in the round-off of the equations.
     """
 
     most: int = ITERATIONS
     reach: float = FAR
-    tolerance: float = 0.0
+    small: float = TOLERANCE
     still: float = STALLED
     lost: Callable[[], bool] = lambda: False
 
@@ -83,9 +83,9 @@ def newton(iteration: Iteration, limits: Limits) -> NewtonResult:
     """Newton's method with chord steps.
 
     A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next: near a
-    solution the old factors cost one solve where new ones cost five.  It has converged if a correction, or what the
-    observed rate of convergence leaves after it, is small enough.  It has failed, and leaves the unknowns where they
-    got to, after too many iterations, where there is no correction, or no number, and too far away.
+    solution the old factors cost one solve where new ones cost five.  It has converged if a correction is small enough.
+    It has failed, and leaves the unknowns where they got to, after too many iterations, where there is no correction,
+    or no number, and too far away.
     """
     previous, size, fresh, number = inf, inf, True, 0
     for number in range(1, limits.most + 1):
@@ -98,7 +98,7 @@ def newton(iteration: Iteration, limits: Limits) -> NewtonResult:
         # chord steps converge linearly: their rate, doubled for safety, says what the next correction would be
         left = size if fresh else min(2.0 * size / previous, 1.0) * size
         stalled = fresh and size > 0.5 * previous and (size < limits.still or limits.lost())
-        if size < TOLERANCE or left < limits.tolerance or stalled:
+        if size < limits.small or stalled:
             return NewtonResult(True, number, left, distance)
         # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
         fresh = size > KEPT or size > SHRUNK * previous
@@ -106,7 +106,7 @@ def newton(iteration: Iteration, limits: Limits) -> NewtonResult:
     return NewtonResult(False, number, size, inf)
 
 
-def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, *, along: bool = False) -> NewtonResult:
+def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, most: int = ITERATIONS) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
     The phase conditions are those of the guess ``x``.  A singular matrix is a failure.
@@ -122,13 +122,12 @@ def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, *,
         Last row of the bordered matrix, (n,).
     reach
         Largest distance, in the metric.
-    along
-        Whether this is a step along a branch, which may fail, and needs no more than the tolerance.
+    most
+        Iterations, at most.
     """
     system.set_phase(x)
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
-    limits = Limits(STEPS, reach, TOLERANCE, still) if along else Limits(ITERATIONS, reach, 0.0, still)
-    return newton(OnPlane(system, x, row), limits)
+    return newton(OnPlane(system, x, row), Limits(most, reach, still=still))
 
 
 class OnPlane:

@@ -25,8 +25,10 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.fem.assembly import Assembler, Cells, Places, vector_places
+from rodfem.fem.equations import Equations
 from rodfem.fem.state import Evaluation
 from rodfem.fem.system import System
+from rodfem.problem.roles import derived
 from rodfem.tolerances import TINY
 
 POINTS, LEAST = 4096, 4
@@ -46,7 +48,7 @@ REMEDY = "no error is estimated; use breaks=(...) where a function jumps or has 
 
 
 class Pieces:
-    """Forms of a ``system`` on its own cells, each cut into equal pieces: values are (pieces, cells, n).
+    """Forms of some ``equations`` on their own cells, each cut into equal pieces: values are (pieces, cells, n).
 
     Attributes
     ----------
@@ -56,9 +58,9 @@ class Pieces:
         Points of the rule of an element, and number of pieces that make a rule of :data:`POINTS`.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, equations: Equations) -> None:
         """Keep the cells of this rank."""
-        self.fields, self.equations = system.fields, system.equations
+        self.fields, self.equations = equations.fields, equations
         own = slice(0, self.fields.owned_cells)
         self.dofs, self._x = self.equations.cells.dofs[own], self.equations.cells.x[own]
         numbers = {int(dof): i for i, dof in enumerate(self.dofs[0])}
@@ -120,7 +122,7 @@ class QuadratureCheck:
 
     def __init__(self, system: System) -> None:
         """Choose the rows that are compared: of rotations, strains and positions."""
-        self.system, self._pieces = system, Pieces(system)
+        self.system, self._pieces = system, derived(system.equations, Pieces, lambda: Pieces(system.equations))
         names = (system.fields.turning.name, "v", "r")
         self._rows = {name: self._pieces.rows[name].ravel() for name in names if name in system.fields.dofs}
 

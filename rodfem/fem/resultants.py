@@ -18,12 +18,9 @@ import numpy as np
 import ufl
 from petsc4py import PETSc
 
-from rodfem.fem import form_compiler
 from rodfem.fem.shape import Shape
-from rodfem.forms.kinematics import curvature, strain
-from rodfem.forms.rotation import rotation
 from rodfem.problem.constraint import Constraint
-from rodfem.problem.local_state import place
+from rodfem.problem.roles import derived
 
 NAMES = ("strain", "curvature", "force", "moment")
 """Of the fields, as files have them."""
@@ -34,13 +31,10 @@ class Resultants:
 
     def __init__(self, shape: Shape) -> None:
         """Derive and compile them for the system of a ``shape``."""
-        self.shape, fields = shape, shape.system.fields
-        count, mesh = fields.discretization.degree, fields.mesh
+        self.shape, count = shape, shape.system.fields.discretization.degree
         self.places = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
-        vector = ufl.as_vector(self._components())
-        self._evaluate = form_compiler.expression(
-            shape.system.equations.compilable(vector), self.places.reshape(-1, 1), mesh, fields.owned_cells
-        )
+        e = shape.system.equations
+        self._evaluate = derived(e, "resultants", lambda: e.evaluated(ufl.as_vector(self._components()), self.places))
 
     def at(self, x: PETSc.Vec) -> dict[str, np.ndarray]:
         """Components along the directors by their :data:`NAMES` at the state ``x``, (elements, points, 3) each.
@@ -58,19 +52,14 @@ class Resultants:
     def _components(self) -> list[Any]:
         """Strain, curvature, force and moment as expressions of the state, one after the other."""
         e, fields, scene = self.shape.system.equations, self.shape.system.fields, self.shape.system.scene
-        f, c, R = e.unknowns, e.constants, rotation(e.unknowns.q)
-        v = strain(scene.free_strains, e.components(f.v, len(scene.free_strains)))
-        k = ufl.variable(curvature(f.q, f.q.dx(0)))
-        r = fields.formulation.position(e, f, c, lambda field: field, None)
-        slope = {} if r is None else {"dr": ufl.variable(r.dx(0))}
-        along = place(f.q, R, c.s, r, v=v, k=k, length=scene.length, **slope)
-        density = scene.energy(v, k, c)
+        f, c, along = e.unknowns, e.constants, e.along(ufl.variable)
+        density = scene.energy(along.v, along.k, c)
         for part in scene.parts:
             if isinstance(part.of, Constraint) and part.s is None:
                 site, _ = e.site(part, f, (f, f), along)
                 density += sum(part.of.lagrangian(site))
         force = ufl.as_vector(fields.formulation.contact_force(e, f, c))
-        if slope:
-            force += ufl.diff(density, slope["dr"])
-        force, moment = ufl.dot(ufl.transpose(R), force), ufl.diff(density, k)
-        return [vector[i] for vector in (v, k, force, moment) for i in range(3)]
+        if "dr" in vars(along):
+            force += ufl.diff(density, along.dr)
+        force, moment = ufl.dot(ufl.transpose(along.R), force), ufl.diff(density, along.k)
+        return [vector[i] for vector in (along.v, along.k, force, moment) for i in range(3)]

@@ -11,9 +11,8 @@ from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.fem.fields import LOAD
 from rodfem.fem.system import System
-from rodfem.fem.values import NodalValues
+from rodfem.fem.values import LOAD, NodalValues
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.quaternions import directors
 

@@ -24,7 +24,7 @@ from rodfem.linalg.matrices import shared
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
     from rodfem.fem.parameters import Line
-    from rodfem.fem.phase import Phase
+    from rodfem.fem.symmetries import Phase
     from rodfem.fem.system import System
 
 
@@ -59,13 +59,11 @@ class Evaluation(NodalValues):
     def _register(self) -> None:
         """Put these values where the compiled forms read them."""
         equations = self.equations
-        held = equations.held
-        if held is self:
-            return
-        self.fields.u.x.array[:] = self.local
         equations.take(self.line)
-        equations.known.lay(self.load)
-        equations.held = self
+        if equations.register.values is not self.local:
+            self.fields.u.x.array[:] = self.local
+            equations.known.lay(self.load)
+            equations.register.values = self.local
 
     def _add(self, form: Assembler, places: Places | None, out: np.ndarray) -> None:
         self.equations.take(self.line)
@@ -79,13 +77,8 @@ class Evaluation(NodalValues):
 
     def tangent(self) -> sp.csr_matrix:
         """Their derivative in all local degrees of freedom, clamped ones included."""
-        if not self.fields.compiled:
-            self._register()
-            return compat.local_table(self.equations.jacobian.form)
-        pattern, places = self.equations.local_entries
-        values = np.zeros(pattern.nnz)
-        self._add(self.equations.jacobian, places, values)
-        return sp.csr_matrix((values, pattern.indices, pattern.indptr), shape=pattern.shape)
+        self._register()
+        return compat.local_table(self.equations.jacobian.form)
 
     def integral(self, form: Assembler) -> float:
         """Integral over the rod; collective."""

@@ -1,23 +1,39 @@
-r"""The continuous symmetries of a scene: infinitesimal motions of its state.
+r"""The continuous symmetries of a scene: infinitesimal motions of its state, and phase conditions.
 
 A rigid motion of space or of the cross-sections changes each field and group of scalars by one of a few elementary
 generators ``g_j`` (:mod:`rodfem.forms.symmetry`), linear or constant in its values; the motion of a closed rod along
 itself changes each field by its derivative in arclength.  A symmetry is a combination of them that carries equilibria
 into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, :mod:`rodfem.fem.verification` verifies them at
 each state).
+
+The symmetries form a linear space.  Those combinations ``g`` of their generators that vanish at a reference state
+``x0`` are its own symmetries and have no phase condition.  The others, orthonormal in the metric ``M``, have one each,
+
+    g . M (x - x0) = 0,
+
+and a drift scalar as its multiplier (Doedel, in: Numerical Continuation Methods for Dynamical Systems, 2007, ch. 1).
+
+Its force is ``M g``, but for a rod that nothing holds under loads without a potential.  There ``S`` is not symmetric,
+its left null vectors are others than the generators, and the bordered matrix is singular where ``M g`` is in the range
+of ``S``: under a thrust that follows its end, against dead loads, a tilted rod is at rest but for a force across it,
+``S v = -d M g``.  Forces of drifts are ``M (g + sum_j w_j m_j)`` there, with generic weights ``w`` of all rigid
+motions ``m``, of metric norm one: the drifts vanish at an equilibrium, whatever the forces are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
+from petsc4py import PETSc
 
-from rodfem.fem.values import NodalValues
+from rodfem.fem.values import LOAD, NodalValues
 from rodfem.forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.linalg.matrices import times
 from rodfem.problem.contribution import Motion
@@ -25,6 +41,9 @@ from rodfem.problem.scene import Scene
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
+    from rodfem.fem.parameters import Line
+    from rodfem.fem.state import State
+    from rodfem.fem.system import System
 
 SYMMETRIC_STATE = 1e-4
 """A generator smaller than this (in the metric) is zero: the state has the symmetry itself.
@@ -36,6 +55,12 @@ it is counted as it is down to 1e-8/SYMMETRIC_STATE.  At states that it moves fa
 """
 NAMED = 1e-3
 """Weight of a part, relative to the greatest, above which it is named."""
+ALONG = 1e-5
+"""As :data:`SYMMETRIC_STATE`, of the part of a ring's motion along itself that exact symmetries leave over."""
+MESH = 10.0
+"""Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
+SHARE = 0.3
+"""Largest weight of a rigid motion of metric norm one in a drift's force, beside the symmetry of the same norm."""
 
 
 @dataclass(frozen=True)
@@ -112,61 +137,48 @@ class Symmetry:
         return out
 
 
-# --- the motion of a closed rod along itself ------------------------------------------------------------------------
-
-
-def derivative(state: NodalValues) -> np.ndarray:
-    """Derivative in arclength of a state, local values, the mean of elements at nodes; zero for scalars."""
-    return np.asarray(state.fields.scattered(state.fields.arclength.derivative @ state.local))
-
-
-def mismatch(state: NodalValues) -> float:
-    """Greatest jump between elements of the derivative of rotation or centreline.
-
-    It measures how far the mesh is from the invariance under the motion along itself.
-    """
-    worst = float(abs(times(state.fields.arclength.jumps, state.local)).max(initial=0.0))
-    comm = state.fields.comm
-    return worst if comm.size == 1 else float(comm.allreduce(worst, op=MPI.MAX))
-
-
-def may_slide(scene: Scene) -> bool:
-    """Whether nothing but functions of the arclength can keep a closed rod from moving along itself."""
-    at_points = scene.attachments or any(x.s is not None for x in scene.constraints)
-    return scene.closed and not at_points
-
-
-# --- elementary generators ------------------------------------------------------------------------------------------
-
-
 def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     """All elementary generators of a scene's fields and groups of scalars; translations are by its natural length."""
-    groups = {group.name: group for group in fields.groups}
-    vectors = [name for name, group in groups.items() if group.motion in (Motion.VECTOR, Motion.POSITION)]
-    moved = ["r", *(name for name, group in groups.items() if group.motion is Motion.POSITION)]
-    out, length = [], fields.scene.units.length
+    counts = {motion: {g.name: len(fields.groups[g]) for g in fields.groups if g.motion is motion} for motion in Motion}
+    positions = {"r", *counts[Motion.POSITION]}
+    vectors = [
+        *(b.name for b in fields.blocks if b.name in ("r", "n")),
+        *counts[Motion.VECTOR],
+        *counts[Motion.POSITION],
+    ]
+    none, still, length = ((0.0,) * 3,) * 3, (0.0,) * 3, fields.scene.units.length
+    out = list[Elementary]()
     for i, axis in enumerate(AXES, start=1):
-        turn = f"rotation about e{i}"
-        if fields.scene.normal is None:
-            out.append(Elementary("q", left(axis), (0.0,) * 4, turn))
-            out.append(Elementary("q", right(axis), (0.0,) * 4, f"turning of the cross-sections about d{i}"))
-        elif axis == AXES[fields.scene.normal]:
-            out.append(Elementary("angle", ((0.0,),), (1.0,), turn))
-        for target in sorted([*vectors, *(b.name for b in fields.blocks if b.name in ("r", "n"))]):
-            out.append(Elementary(target, cross(axis), (0.0,) * 3, ""))
-            if target in moved:
-                out.append(
-                    Elementary(target, ((0.0,) * 3,) * 3, tuple(x * length for x in axis), f"translation along e{i}")
-                )
+        out += _turning(fields, i)
+        along = tuple(x * length for x in axis)
+        for target in sorted(vectors):
+            out.append(Elementary(target, cross(axis), still, ""))
+            if target in positions:
+                out.append(Elementary(target, none, along, f"translation along e{i}"))
     out += _of_strains(fields)
-    for name in sorted(name for name, group in groups.items() if group.motion is Motion.MIXED):
-        count = len(fields.groups[groups[name]])
-        for i in range(count):
-            for j in range(i):
-                turned = np.zeros((count, count))
-                turned[i, j], turned[j, i] = 1.0, -1.0
-                out.append(Elementary(name, tuple(map(tuple, turned)), (0.0,) * count, ""))
+    for name, count in sorted(counts[Motion.MIXED].items()):
+        out += _mixing(name, count)
     return tuple(out)
+
+
+def _turning(fields: Fields, i: int) -> list[Elementary]:
+    """Changes of the rotation by turning about axis ``i`` = 1, 2, 3 of space and of the cross-sections."""
+    axis, turn, none = AXES[i - 1], f"rotation about e{i}", (0.0,) * 4
+    if fields.scene.normal is None:
+        own = Elementary("q", right(axis), none, f"turning of the cross-sections about d{i}")
+        return [Elementary("q", left(axis), none, turn), own]
+    return [Elementary("angle", ((0.0,),), (1.0,), turn)] if fields.scene.normal == i - 1 else []
+
+
+def _mixing(name: str, count: int) -> list[Elementary]:
+    """Rotations in all planes of a group of ``count`` scalars."""
+    out = []
+    for i in range(count):
+        for j in range(i):
+            turned = np.zeros((count, count))
+            turned[i, j], turned[j, i] = 1.0, -1.0
+            out.append(Elementary(name, tuple(map(tuple, turned)), (0.0,) * count, ""))
+    return out
 
 
 def _of_strains(fields: Fields) -> list[Elementary]:
@@ -216,12 +228,271 @@ def add_change(state: NodalValues, target: str, matrix: np.ndarray, constant: np
             values = values + fields.lift(fields.coordinates(fields.discretization.degree), state.constants())
         out[dofs] += values @ matrix.T + constant  # of dofs that cells share, once: the sum is buffered
         return
-    members = [(i, x) for i, x in enumerate(fields.unknown_scalars) if x.group.name == target]
-    values = np.zeros(len(constant))
-    if len(members) != len(constant) and (known := members[0][1].group.known):
+    members = {x.component: i for i, x in enumerate(fields.unknown_scalars) if x.group.name == target}
+    change = matrix @ _scalars(state, members, len(constant)) + constant
+    for component, i in members.items():
+        out[fields.copies[:, i]] += change[component]
+
+
+def _scalars(state: NodalValues, members: dict[int, int], count: int) -> np.ndarray:
+    """Values (count,) of a group of scalars, of which the ``members`` are unknown: component and number of each."""
+    fields, values = state.fields, np.zeros(count)
+    known = fields.unknown_scalars[next(iter(members.values()))].group.known
+    if len(members) != count and known:
         values[:] = [0.0 if x is None else float(x) for x in known(state.constants())]
-    for i, x in members:
-        values[x.component] = state.local[fields.copies[0, i]]
-    change = matrix @ values + constant
-    for i, x in members:
-        out[fields.copies[:, i]] += change[x.component]
+    for component, i in members.items():
+        values[component] = state.local[fields.copies[0, i]]
+    return values
+
+
+def derivative(state: NodalValues) -> np.ndarray:
+    """Derivative in arclength of a state, local values, the mean of elements at nodes; zero for scalars."""
+    return np.asarray(state.fields.scattered(state.fields.arclength.derivative @ state.local))
+
+
+def mismatch(state: NodalValues) -> float:
+    """Greatest jump between elements of the derivative of rotation or centreline.
+
+    It measures how far the mesh is from the invariance under the motion along itself.
+    """
+    worst = float(abs(times(state.fields.arclength.jumps, state.local)).max(initial=0.0))
+    comm = state.fields.comm
+    return worst if comm.size == 1 else float(comm.allreduce(worst, op=MPI.MAX))
+
+
+def may_slide(scene: Scene) -> bool:
+    """Whether nothing but functions of the arclength can keep a closed rod from moving along itself."""
+    at_points = scene.attachments or any(x.s is not None for x in scene.constraints)
+    return scene.closed and not at_points
+
+
+class Generators:
+    """Changes of states of one :class:`~rodfem.fem.system.System` by its symmetries, in the order of those.
+
+    Of any other motions where they are given: ``g(x) = A x + c``, by one sparse matrix.
+    """
+
+    def __init__(self, system: System, motions: Sequence[Symmetry] | None = None) -> None:
+        """Make the matrices."""
+        fields = system.fields
+        self.motions = system.symmetries if motions is None else list(motions)
+        self.system, self.count = system, len(self.motions)
+        scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
+        self._rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
+        self._linear = [symmetry.linear(fields) for symmetry in self.motions]
+        self._forth = self._stacked(self._linear)
+        self._line: Line | None = None
+
+    def _stacked(self, every: list[sp.csr_matrix]) -> sp.csr_matrix:
+        """Own rows and free columns of matrices between all local degrees of freedom, one below the other."""
+        if not every:
+            return sp.csr_matrix((0, len(self._columns)))
+        size = every[0].shape[0]
+        rows = (np.arange(len(every))[:, None] * size + self._rows).ravel()
+        return sp.vstack(every, format="csr")[rows][:, self._columns]
+
+    @cached_property
+    def _back(self) -> sp.csr_matrix:
+        """``A^t`` of all generators, one below the other."""
+        return self._stacked([A.T.tocsr() for A in self._linear])
+
+    def _constant(self, state: State) -> np.ndarray:
+        """``c`` of all generators: with ends that are held, and forces that are known, they vary with the load."""
+        fixed = self.fixed(state.line)
+        return self._constant_at(state.line, state.load) if fixed is None else fixed
+
+    def fixed(self, line: Line) -> np.ndarray | None:
+        """``c`` of all generators along a ``line``, (count, own rows), unless it varies with the load."""
+        if line is not self._line:
+            low, high = self.system.scene.span
+            found = [self._constant_at(line, load) for load in (low, 0.62 * low + 0.38 * high, high)]
+            varies = any(np.any(c != found[0]) for c in found)
+            self._varies = bool(self.system.comm.allreduce(varies, op=MPI.LOR))
+            self._line, self._fixed = line, found[0]
+        return None if self._varies else self._fixed
+
+    def in_unknowns(self) -> sp.csr_matrix:
+        """``A`` of all generators, one below the other, for vectors of the system on one rank."""
+        fields, n = self.system.fields, self.system.fields.unknowns
+        columns = fields.number[self._columns]
+        place = sp.csr_matrix((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))
+        return (self._forth @ place).tocsr()
+
+    def _constant_at(self, line: Line, load: float) -> np.ndarray:
+        fields = self.system.fields
+        at_load = NodalValues(fields, fields.filled({LOAD: load}), line)
+        return np.array([symmetry.change(at_load)[self._rows] for symmetry in self.motions])
+
+    def at(self, state: State) -> np.ndarray:
+        """All generators at a state, (count, own rows): see :meth:`vector`."""
+        if not self.count:
+            return np.zeros((0, len(self._rows)))
+        return times(self._forth, state.local[self._columns]).reshape(self.count, -1) + self._constant(state)
+
+    def linear(self, d: PETSc.Vec) -> np.ndarray:
+        """``A d`` of all generators for a change of state, (count, own rows)."""
+        return times(self._forth, self._gathered(d)).reshape(self.count, -1)
+
+    def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
+        """``A^t y`` of all generators, (count, own rows)."""
+        return times(self._back, self._gathered(covector)).reshape(self.count, -1)
+
+    def _gathered(self, vector: PETSc.Vec) -> np.ndarray:
+        return self.system.gathered(vector)[: len(self._columns)]
+
+    def vector(self, own: np.ndarray) -> PETSc.Vec:
+        """Vector of the system with these own rows, without component along drifts."""
+        out = self.system.new_vector()
+        out.array[: len(own)] = own
+        return out
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Phase conditions of one reference state, by the number of their drift scalars.
+
+    Attributes
+    ----------
+    rows
+        ``M g`` of each active condition by its drift scalar, this rank's rows.
+    forces
+        What one of each drift scalar of an active condition adds to the equations, this rank's rows.
+    offsets
+        ``g . M x0`` for each drift scalar.
+    broken
+        Weights of the generators in each ``g``.
+    kept
+        Weights of those combinations that the reference has itself, a row each.
+    reference
+        ``x0``, None where no condition is active.
+    vector
+        Makes a vector of own rows.
+    """
+
+    rows: dict[int, np.ndarray]
+    forces: dict[int, np.ndarray]
+    offsets: np.ndarray
+    broken: dict[int, np.ndarray]
+    kept: np.ndarray
+    reference: PETSc.Vec | None
+    vector: Callable[[np.ndarray], PETSc.Vec]
+
+    @cached_property
+    def conditions(self) -> tuple[PETSc.Vec | None, ...]:
+        """``M g`` for each drift scalar as vectors, None where none is active."""
+        return tuple(self.vector(self.rows[i]) if i in self.rows else None for i in range(len(self.offsets)))
+
+    @cached_property
+    def pushes(self) -> tuple[PETSc.Vec | None, ...]:
+        """Forces of the drift scalars as vectors, None where no condition is active."""
+        if self.forces is self.rows:
+            return self.conditions
+        return tuple(self.vector(self.forces[i]) if i in self.rows else None for i in range(len(self.offsets)))
+
+    @property
+    def count(self) -> int:
+        """Number of symmetries that the reference state breaks: as many zero eigenvalues belong to it."""
+        return len(self.broken)
+
+    def belongs_to(self, x: PETSc.Vec) -> bool:
+        """Whether ``x`` is the reference state, or no state can have a phase condition."""
+        return not len(self.offsets) or (self.reference is not None and bool(self.reference.equal(x)))
+
+    def motions(self, symmetries: list[Symmetry]) -> list[str]:
+        """In words the motions that carry the reference state through equivalent ones, one for each condition."""
+        out = []
+        for weights in self.broken.values():
+            sums = sum((w * s.weights for w, s in zip(weights, symmetries, strict=True)), 0.0 * weights[:1])
+            along = sum(w * s.along for w, s in zip(weights, symmetries, strict=True))
+            out.append(str(Symmetry(sums, symmetries[0].parts, along)))
+        return out
+
+
+class DriftForces:
+    """What is added to ``M g`` for each drift scalar of one :class:`~rodfem.fem.system.System`."""
+
+    def __init__(self, system: System, rigid: Generators) -> None:
+        """Take the ``rigid`` motions of which the rod of the ``system`` is capable."""
+        self.system, self._rigid = system, rigid
+
+    def __call__(self, state: State, numbers: Sequence[int]) -> np.ndarray:
+        """``M sum_j w_j m_j`` at a ``state`` for the drift scalars of these ``numbers``, (count, own rows).
+
+        The weights ``w`` are at most :data:`SHARE` and differ from number to number, ``m`` are the rigid motions of
+        which the rod is capable, of metric norm one.
+        """
+        motions, system = self._rigid.at(state), self.system
+        images = system.weighed(motions)
+        squares = _summed(system, np.einsum("ij,ij->i", motions, images))
+        sizes = np.sqrt(np.maximum(squares, 0.0))
+        moving = sizes > 0.0
+        generic = np.random.default_rng(0).uniform(-SHARE, SHARE, (len(system.drifts), len(sizes)))
+        return np.asarray((generic[list(numbers)][:, moving] / sizes[moving]) @ images[moving])
+
+
+def no_phase(system: System, reference: PETSc.Vec | None = None) -> Phase:
+    """No active condition for any drift scalar of the ``system``."""
+    count, reference = len(system.drifts), None if reference is None else reference.copy()
+    return Phase({}, {}, np.zeros(count), {}, np.eye(count), reference, system.generators.vector)
+
+
+def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
+    """Phase conditions at ``reference`` for the symmetries of the ``system``, but for those ``dropped``."""
+    count = len(system.symmetries)
+    if count == len(dropped):
+        return no_phase(system, reference)
+    state: State = system.at(reference)
+    generators = state.generators
+    images = system.weighed(generators)
+    gram = _summed(system, generators @ images.T)
+    combinations, sizes, least = _orthogonal(system, state, gram, dropped)
+    numbers = [i for i, (size, bound) in enumerate(zip(sizes, least, strict=True)) if size >= bound]
+    kept = combinations[[i for i in range(len(sizes)) if i not in numbers]]
+    if not numbers:  # a straight rod has all of them itself
+        return Phase({}, {}, np.zeros(count), {}, kept, reference.copy(), system.generators.vector)
+    weights = combinations[numbers] / np.array([sizes[i] for i in numbers])[:, None]
+    rows, offsets, own = weights @ images, np.zeros(count), system.fields.free_owned
+    offsets[numbers] = rows[:, : len(own)] @ state.local[own]
+    conditions, more = dict(zip(numbers, rows, strict=True)), system.drift_forces
+    return Phase(
+        conditions,
+        dict(zip(numbers, rows + more(state, numbers), strict=True)) if more else conditions,
+        _summed(system, offsets),
+        dict(zip(numbers, weights, strict=True)),
+        kept,
+        reference.copy(),
+        system.generators.vector,
+    )
+
+
+def _orthogonal(
+    system: System, state: State, gram: np.ndarray, dropped: set[int]
+) -> tuple[np.ndarray, list[float], list[float]]:
+    """Weights of combinations of the generators at a ``state`` that are orthogonal in the metric, sizes, and bounds.
+
+    ``gram`` (count, count) are the products of the generators; one that is smaller than its bound is zero.
+    """
+    symmetries, count = system.symmetries, len(system.symmetries)
+    exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
+    squares, combinations = gram.diagonal()[exact], np.eye(count)[exact]
+    if len(exact) > 1:
+        squares, turn = np.linalg.eigh(gram[np.ix_(exact, exact)])
+        combinations[:, exact] = turn.T
+    sizes, least = [sqrt(max(x, 0.0)) for x in squares.tolist()], [SYMMETRIC_STATE] * len(exact)
+    if symmetries[-1].along and count - 1 not in dropped:
+        # of the motion along itself only what the exact symmetries do not do as well
+        rest = np.eye(count)[-1]
+        for weights, size in zip(combinations, sizes, strict=True):
+            if size >= SYMMETRIC_STATE:
+                rest = rest - weights / size**2 * (weights @ gram[:, -1])
+        rest = rest / np.linalg.norm(rest)
+        # by the difference of the vectors: in the Gram matrix half of the digits cancel
+        sizes.append(system.norm(system.generators.vector(rest @ state.generators)))
+        combinations = np.vstack([combinations, rest])
+        least.append(max(MESH * mismatch(state), ALONG))
+    return combinations, sizes, least
+
+
+def _summed(system: System, own: np.ndarray) -> np.ndarray:
+    """Sum over the ranks."""
+    return own if system.comm.size == 1 else np.asarray(system.comm.allreduce(own, op=MPI.SUM))

@@ -6,7 +6,7 @@ the load, and one drift scalar for each symmetry.  The last two kinds are border
 * the row of the load is the linear equation ``row . (x - x0) = 0`` (an arclength or "fixed load" equation);
 * a drift scalar ``d`` adds ``d g`` to the equations, ``g`` the metric times the symmetry's generator at a reference
   state, and its row is the phase condition ``g . (x - x0) = 0``.  By the symmetry ``d`` vanishes at an equilibrium.
-  Its force is another one for a rod that floats under loads without a potential (:mod:`rodfem.fem.phase`).
+  Its force is another one for a rod that floats under loads without a potential (:mod:`rodfem.fem.symmetries`).
   At a state that the symmetry leaves alone the generator is zero, and the row is ``d = 0`` instead.
 """
 
@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,25 +25,22 @@ from rodfem import compat
 from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_pattern, new_matrix, vector_places
 from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
-from rodfem.fem.fields import LOAD, Discretization, Fields
-from rodfem.fem.generators import Generators
+from rodfem.fem.fields import FEW, Discretization
 from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.parameters import Line
-from rodfem.fem.phase import DriftForces, no_phase, phase_at
 from rodfem.fem.state import State
-from rodfem.fem.symmetries import Symmetry, capable, may_slide
-from rodfem.fem.values import NodalValues
+from rodfem.fem.symmetries import DriftForces, Generators, Symmetry, capable, may_slide, no_phase, phase_at
+from rodfem.fem.values import LOAD, NodalValues
 from rodfem.fem.verification import Verification
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
+from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
 
-FEW = 4000
-"""Number of unknowns up to which symmetries are sought on the mesh itself."""
 FINE = 128
 """Number of elements of a mesh on which a rod may move along itself as well as in truth."""
 RECENT = 4
@@ -85,18 +81,17 @@ class System:
         discretization: Discretization,
         comm: MPI.Comm = MPI.COMM_WORLD,
         clock: Clock | None = None,
-        mesh: Any = None,
         symmetries: Sequence[Symmetry] | None = None,
     ) -> None:
-        """Compile the forms and allocate all matrices once; on a given mesh, with known symmetries if they are.
+        """Allocate all matrices, with the forms that scenes of the same functions share; with known symmetries if any.
 
         The ``scene`` on the mesh of ``discretization`` is shared among the ranks of ``comm``; ``clock`` measures times;
-        ``mesh`` and ``symmetries`` are those of another system of the scene.
+        ``symmetries`` are those of another system of the scene.
         """
         self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
-        self.fields = Fields(scene, discretization, comm, mesh)
-        self.equations = Equations(self.fields)
+        self.equations = Equations.of(scene, discretization, comm)
+        self.fields = self.equations.fields
         self.line = self.equations.line
         self.symmetries = self._symmetries() if symmetries is None else list(symmetries)
         self.fields.add_drifts(len(self.symmetries))
@@ -115,8 +110,9 @@ class System:
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
         dofs = self.equations.cells.dofs
         self.equation_places = vector_places(dofs, number) if self.fields.compiled else None
-        self._places: dict[tuple[int, bool], Places] = {}
-        self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
+        self._pattern, self._metric_pattern = derived(  # where scenes have as many symmetries, they have the same ones
+            self.equations, len(self.drifts), lambda: (bordered_pattern(self.fields), metric_pattern(self.fields))
+        )
         self.matrix = self.state_matrix(load=True)
         self._numbered = np.flatnonzero(number >= 0)
         self._sources = np.append(number[self._numbered], self.drifts).astype(PETSc.IntType)
@@ -143,23 +139,18 @@ class System:
 
         The motion of a closed rod along itself comes last.
         """
-        scene, d = self.scene, self.fields.discretization
-        fields, equations = self.fields, self.equations
-        if fields.unknowns > FEW or (self.comm.size > 1 and not scene.conservative):  # each rank asks all equations
-            fields, equations = self._elsewhere(replace(d, elements=max(6, 2 * len(scene.joints) + 2), vertices=None))
-        found = find_symmetries(fields, equations)
+        scene, equations, few = self.scene, self.equations, max(6, 2 * len(self.scene.joints) + 2)
+        d = replace(self.fields.discretization, vertices=None)
+        if self.fields.unknowns > FEW or self.comm.size > 1:
+            equations = Equations.of(scene, replace(d, elements=few), MPI.COMM_SELF)  # each rank asks all equations
+        found = find_symmetries(equations)
         if not may_slide(scene):
             return found
         if not equations.uniform:
-            elements = FINE + len(scene.joints)
-            fields, equations = self._elsewhere(replace(d, elements=elements, degree=max(d.degree, 6), vertices=None))
-        along = find_motion_along(fields, equations)
+            fine = replace(d, elements=FINE + len(scene.joints), degree=max(d.degree, 6))
+            equations = Equations.of(scene, fine, MPI.COMM_SELF)
+        along = find_motion_along(equations)
         return found if along is None else [*found, along]
-
-    def _elsewhere(self, discretization: Discretization) -> tuple[Fields, Equations]:
-        """The scene on another mesh, all of it on each rank."""
-        fields = Fields(self.scene, discretization, MPI.COMM_SELF)
-        return fields, Equations(fields)
 
     # --- vectors -----------------------------------------------------------------------------------------------
 
@@ -274,10 +265,8 @@ class System:
 
     def matrix_places(self, pattern: sp.csr_matrix, load: bool) -> Places:
         """Places of bilinear forms in a matrix of a ``pattern`` of this system, with the column of the ``load``."""
-        key = (id(pattern), load)
-        if key not in self._places:
-            self._places[key] = matrix_places(self.equations.cells.dofs, *self.maps(load), pattern)
-        return self._places[key]
+        dofs = self.equations.cells.dofs
+        return derived(self.equations, (id(pattern), load), lambda: matrix_places(dofs, *self.maps(load), pattern))
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: conditions and forces, or a one where a drift is switched off."""
@@ -346,7 +335,7 @@ class System:
     # --- symmetry ----------------------------------------------------------------------------------------------
 
     def set_phase(self, reference: PETSc.Vec | None) -> None:
-        """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.phase`); None: none active."""
+        """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.symmetries`); None: none active."""
         if reference is None:
             self.phase = no_phase(self)
         elif not self.phase.belongs_to(reference):

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from rodfem.fem.parameters import Line
     from rodfem.problem.ends import Constants
 
+LOAD = "load"
+"""Name of the load among the scalars."""
+
 
 class NodalValues:
     """Values of fields and scalars, of a state or of a change of one; they never change.

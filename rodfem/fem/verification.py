@@ -83,20 +83,18 @@ class Verification:
 
     def _failing(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None) -> list[int]:
         """Symmetries, by number, whose generators are no null vectors of ``S`` at the state."""
-        candidates = [i for i in range(len(self.system.symmetries)) if i not in self.dropped]
-        if not candidates:
+        exact, suspects = (self._candidates(along=along) for along in (False, True))
+        if not exact and not suspects:
             return []
         self.norm = self.norm or self.system.matrix_in_units(matrix).norm(PETSc.NormType.INFINITY)
-        generators = state.generators
-
-        def holds(chosen: list[int]) -> bool:
-            return self._holds(matrix, generators, chosen, state, equations)
-
-        exact = [i for i in candidates if not self.system.symmetries[i].along]
-        suspects = [i for i in candidates if i not in exact]
-        if exact and not holds(exact):
+        if exact and not self._holds(matrix, exact, state, equations):
             suspects += exact
-        return [i for i in suspects if not holds([i])]
+        return [i for i in suspects if not self._holds(matrix, [i], state, equations)]
+
+    def _candidates(self, *, along: bool) -> list[int]:
+        """Symmetries, by number, that are not dropped: those with the motion along itself, or without it."""
+        every = enumerate(self.system.symmetries)
+        return [i for i, symmetry in every if i not in self.dropped and bool(symmetry.along) == along]
 
     def drop(self, i: int, at: float) -> None:
         """Drop a symmetry that failed at a load, in words."""
@@ -112,15 +110,12 @@ class Verification:
         out, self.notices = self.notices, []
         return out
 
-    def _holds(
-        self, matrix: PETSc.Mat, generators: np.ndarray, chosen: list[int], state: State, equations: PETSc.Vec | None
-    ) -> bool:
+    def _holds(self, matrix: PETSc.Mat, chosen: list[int], state: State, equations: PETSc.Vec | None) -> bool:
         """Whether a generic combination of the ``chosen`` generators is a null vector of ``S`` at the ``state``.
 
-        ``matrix`` is ``S``, ``generators`` (count, own rows) are all of them there, ``equations`` those there, zero at
-        an equilibrium (None).
+        ``matrix`` is ``S``, ``equations`` those there, zero at an equilibrium (None).
         """
-        system, left = self.system, self._left
+        system, left, generators = self.system, self._left, state.generators
         weights = generic_weights(len(chosen))
         g, own = self._generator, generators.shape[1]
         g.array[:own] = weights @ generators[chosen]
@@ -132,7 +127,10 @@ class Verification:
         quotient = float(np.real(left.dot(g)))
         if system.symmetries[chosen[0]].along:
             zero = ALONG * system.stiffness_scale * max(size, TINY) + EPS * self.norm * length**2
-            return abs(quotient) <= zero or self._of_the_mesh(chosen[0], g, quotient, zero, state, equations)
+            if abs(quotient) <= zero:
+                return True
+            part, error = self._of_the_mesh(g, state, equations)
+            return abs(quotient + part) <= zero + error
         small = RESIDUAL * self.norm * (length + TINY)
         if equations is not None:
             pulled = system.generators.pulled_back(self._unloaded(state, equations))
@@ -145,20 +143,18 @@ class Verification:
         excess = abs(quotient) - ZERO * system.stiffness_scale * max(size, SYMMETRIC_STATE**2)
         return left.norm() <= small and (excess <= 0 or excess <= ROUND_OFF * rounding(matrix, g, g))
 
-    def _of_the_mesh(
-        self, symmetry: int, g: PETSc.Vec, quotient: float, zero: float, state: State, equations: PETSc.Vec | None
-    ) -> bool:
-        """Whether a ``quotient`` that is not zero is the error of the mesh, or of a state that is no equilibrium.
+    def _of_the_mesh(self, g: PETSc.Vec, state: State, equations: PETSc.Vec | None) -> tuple[float, float]:
+        """What ``equations`` that are not zero add to the quotient of the motion along itself, and the mesh's error.
 
-        ``zero`` is its round-off, ``g`` the change of the ``state`` by the ``symmetry`` of that number.
+        ``g`` is the change of the ``state`` by it; it is the last symmetry.
         """
-        system = self.system
-        zero += OF_THE_MESH * system.stiffness_scale * mismatch(state) * system.norm(g)
+        system, part = self.system, 0.0
+        error = OF_THE_MESH * system.stiffness_scale * mismatch(state) * system.norm(g)
         if equations is not None:
-            change = system.generators.vector(system.generators.linear(g)[symmetry])  # A g
-            quotient += float(np.real(equations.dot(change)))
-            zero += FAR * equations.norm() * change.norm()
-        return abs(quotient) <= zero
+            change = system.generators.vector(system.generators.linear(g)[-1])  # A g
+            part = float(np.real(equations.dot(change)))
+            error += FAR * equations.norm() * change.norm()
+        return part, error
 
     def _unloaded(self, state: State, equations: PETSc.Vec) -> PETSc.Vec:
         """The equations without the forces of the drift scalars."""

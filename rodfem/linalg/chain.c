@@ -542,19 +542,17 @@ PUBLIC int chain_factor(chain *c, const double *values)
 /* Number of columns that are solved for next: those for which there is code.  */
 static int strip(int left) { return left >= WIDTH ? WIDTH : left >= 4 ? 4 : left; }
 
-/* L z = y for w columns, interleaved: those of one unknown are next to each other.  Of the transposed matrix that is
-   U^t z = y: U has its pivots on its diagonal, and its right-hand sides belong to columns.  */
-static inline void down(const chain *c, const int w, const int transposed, double *restrict y, double *restrict z)
+/* L z = y for w columns, interleaved: those of one unknown are next to each other.  */
+static inline void down(const chain *c, const int w, double *restrict y, double *restrict z)
 {
     for (int index = 0; index < c->fronts; index++) {
         const Front *f = &c->front[index];
-        const int *rows = (const int *)c->order.data + (transposed ? f->columns : f->rows);
+        const int *rows = (const int *)c->order.data + f->rows;
         int m = f->size;
-        const double *restrict l = (const double *)c->panel.data + f->values + (transposed ? (size_t)m * f->pivots : 0);
+        const double *restrict l = (const double *)c->panel.data + f->values;
         for (int i = 0; i < m; i++) ALL(q) z[i * w + q] = y[(size_t)rows[i] * w + q];
         for (int j = 0; j < f->pivots; j++, l += m) {
             double t[WIDTH];
-            if (transposed) ALL(q) z[j * w + q] /= l[j];
             ALL(q) t[q] = z[j * w + q];
             for (int i = j + 1; i < m; i++) ALL(q) z[i * w + q] -= l[i] * t[q];
         }
@@ -576,15 +574,14 @@ static inline void down(const chain *c, const int w, const int transposed, doubl
     }
 }
 
-/* L^t x = y or U x = y.  Solutions belong to columns, right-hand sides to rows: x may be y if they are the same.  Of a
-   transposed matrix without symmetry it is L^t x = y, and solutions belong to rows.  */
-static inline void up(const chain *c, const int w, const int transposed, const double *y, double *x, double *restrict z)
+/* L^t x = y or U x = y.  Solutions belong to columns, right-hand sides to rows: x may be y if they are the same.  */
+static inline void up(const chain *c, const int w, const double *y, double *x, double *restrict z)
 {
-    const int unit = c->symmetric || transposed; /* the diagonal of L is one */
+    const int unit = c->symmetric; /* the diagonal of L is one */
     for (int index = c->fronts - 1; index >= 0; index--) {
         const Front *f = &c->front[index];
         const int *order = (const int *)c->order.data, m = f->size;
-        const int *rows = order + (transposed ? f->columns : f->rows), *columns = order + (transposed ? f->rows : f->columns);
+        const int *rows = order + f->rows, *columns = order + f->columns;
         const double *restrict u = (const double *)c->panel.data + f->values + (unit ? 0 : (size_t)m * f->pivots);
         for (int i = f->pivots; i < m; i++) ALL(q) z[i * w + q] = x[(size_t)columns[i] * w + q];
         for (int j = f->pivots - 1; j >= 0; j--) {
@@ -601,22 +598,22 @@ static inline void up(const chain *c, const int w, const int transposed, const d
 static void down_by(const chain *c, int w, double *y, double *z)
 {
     switch (w) {
-    case 1: down(c, 1, 0, y, z); break;
-    case 2: down(c, 2, 0, y, z); break;
-    case 3: down(c, 3, 0, y, z); break;
-    case 4: down(c, 4, 0, y, z); break;
-    default: down(c, WIDTH, 0, y, z);
+    case 1: down(c, 1, y, z); break;
+    case 2: down(c, 2, y, z); break;
+    case 3: down(c, 3, y, z); break;
+    case 4: down(c, 4, y, z); break;
+    default: down(c, WIDTH, y, z);
     }
 }
 
 static void up_by(const chain *c, int w, const double *y, double *x, double *z)
 {
     switch (w) {
-    case 1: up(c, 1, 0, y, x, z); break;
-    case 2: up(c, 2, 0, y, x, z); break;
-    case 3: up(c, 3, 0, y, x, z); break;
-    case 4: up(c, 4, 0, y, x, z); break;
-    default: up(c, WIDTH, 0, y, x, z);
+    case 1: up(c, 1, y, x, z); break;
+    case 2: up(c, 2, y, x, z); break;
+    case 3: up(c, 3, y, x, z); break;
+    case 4: up(c, 4, y, x, z); break;
+    default: up(c, WIDTH, y, x, z);
     }
 }
 
@@ -648,28 +645,6 @@ PUBLIC int chain_solve(chain *c, int k, const double *b, double *x)
         down_by(c, w, y, c->back);
         up_by(c, w, y, solved, z);
         for (int i = 0; i < c->n; i++) ALL(q) out[(size_t)q * c->n + i] = solved[(size_t)i * w + q] * c->scale[i];
-    }
-    return 0;
-}
-
-/* Solutions x of a matrix without symmetry, transposed, for k columns of b.  Columns that are missing in the last
-   strip, of four or of WIDTH, are zero.  2: out of memory.  */
-PUBLIC int chain_solve_transposed(chain *c, int k, const double *b, double *x)
-{
-    solved_columns += k;
-    if (!room_for_columns(c)) return 2;
-    double *y = c->forward, *solved = c->back, *z = c->back + (size_t)c->n * WIDTH;
-    for (int column = 0, w; column < k; column += w) {
-        const double *right = b + (size_t)column * c->n;
-        double *out = x + (size_t)column * c->n;
-        w = k - column > 4 ? WIDTH : 4;
-        int here = k - column < w ? k - column : w;
-        for (int i = 0; i < c->n; i++)
-            ALL(q) y[(size_t)i * w + q] = q < here ? right[(size_t)q * c->n + i] * c->scale[i] : 0.0;
-        if (w == WIDTH) { down(c, WIDTH, 1, y, z); up(c, WIDTH, 1, y, solved, z); }
-        else { down(c, 4, 1, y, z); up(c, 4, 1, y, solved, z); }
-        for (int i = 0; i < c->n; i++)
-            for (int q = 0; q < here; q++) out[(size_t)q * c->n + i] = solved[(size_t)i * w + q] * c->scale[i];
     }
     return 0;
 }

@@ -8,6 +8,7 @@ times as long, most of it for finding its way.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import inf
 from typing import Any
 
@@ -27,14 +28,23 @@ SINGULAR, TOO_LARGE = 1, 2
 """What ``chain_factor`` returns for a matrix that is exactly singular, and where it gives up."""
 
 
-def sequence(starts: np.ndarray, columns: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Order of elimination along a chain, (n,), and where its groups begin, (groups + 1,).
+def sequence(starts: np.ndarray, columns: np.ndarray, border: int) -> tuple[np.ndarray, np.ndarray]:
+    """Order of elimination along a chain, (n,), and where its groups begin, (groups + 1,): see :func:`_sequence`."""
+    order, begins = _sequence(*(np.ascontiguousarray(x, dtype=np.int64).tobytes() for x in (starts, columns)), border)
+    return order.copy(), begins.copy()
+
+
+@lru_cache(maxsize=64)
+def _sequence(starts_of_rows: bytes, numbers_of_columns: bytes, last: int) -> tuple[np.ndarray, np.ndarray]:
+    """Order of elimination along a chain, (n,), and where its groups begin, (groups + 1,), of many equal patterns once.
 
     Unknowns with the same couplings form a group (a supervariable): the interior of a cell, or a vertex.  The last
-    group is the ``border``.  Of the two directions that is chosen in which fewer fronts have unknowns of the border:
-    towards them.  The pattern, (``starts``, ``columns``), is symmetric.
+    group is the border, the ``last`` unknowns.  Of the two directions that is chosen in which fewer fronts have
+    unknowns of the border: towards them.  The pattern is symmetric.
     """
+    starts, columns = (np.frombuffer(x, dtype=np.int64) for x in (starts_of_rows, numbers_of_columns))
     n = len(starts) - 1
+    border = np.arange(n - last, n)
     numbers = np.setdiff1d(np.arange(n), border)
     inner = len(numbers)
     if not inner:
@@ -135,16 +145,9 @@ class Elimination:
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
-        return self._solved(self.lib.chain_solve, right)
-
-    def solve_transposed(self, right: np.ndarray) -> np.ndarray:
-        """The same of a matrix without symmetry, transposed."""
-        return self._solved(self.lib.chain_solve_transposed, right)
-
-    def _solved(self, solve: Any, right: np.ndarray) -> np.ndarray:
         right = np.asarray(right, dtype=float, order="F")
         out = np.empty_like(right)
-        if solve(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
+        if self.lib.chain_solve(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
             raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
         return out
 
@@ -212,9 +215,9 @@ class Chain:
     def prepare(self, matrix: PETSc.Mat) -> None:
         """Find the fronts of a ``matrix``, unless they are known."""
         if self._matrix is None or matrix.handle != self._matrix.handle:
-            entries, n = Entries(matrix), matrix.size[0]
+            entries = Entries(matrix)
             pattern = entries.starts, entries.columns
-            self.elimination = Elimination(self.kind, *pattern, sequence(*pattern, np.arange(n - self.border, n)))
+            self.elimination = Elimination(self.kind, *pattern, sequence(*pattern, self.border))
             if self.sizes is not None:
                 self.elimination.measure(self.sizes().array_r.real)
             self._matrix, self._entries = matrix, entries  # last: there may be no memory for the fronts
@@ -231,8 +234,8 @@ class Chain:
             out.array[:] = self.elimination.solve(right.array_r.real[:, None])[:, 0]
 
     def solve_all(self, right: np.ndarray) -> np.ndarray:
-        """Solutions for all columns, (n, k), at once."""
-        return self.resort.solve_all(right) if self.resort and self.resorted else self.elimination.solve(right)
+        """Solutions for all columns of ``right`` (own rows, k) at once."""
+        return (self.resort.solve_all if self.resort and self.resorted else self.elimination.solve)(right)
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""

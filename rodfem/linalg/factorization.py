@@ -67,7 +67,7 @@ class Factors(Protocol):
         """Solve with the last factors."""
 
     def solve_all(self, right: np.ndarray) -> np.ndarray:
-        """Solutions for all columns, (own rows, k), at once: the cost is that of the call, hardly of a column."""
+        """Solutions for all columns of ``right`` (own rows, k) at once: a column costs much less than a call."""
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
@@ -146,19 +146,20 @@ class Mumps:
             out.pointwiseMult(out, sizes)
 
     def solve_all(self, right: np.ndarray) -> np.ndarray:
-        """Solutions for all columns, (own rows, k), at once: the cost is that of the call, hardly of a column."""
-        factor = self.ksp.getPC().getFactorMatrix()
-        sizes = 1.0 if self.sizes is None else self.sizes().array_r.real[:, None]
-        given = PETSc.Mat().createDense((factor.getSizes()[0], (None, right.shape[1])), comm=factor.comm)
-        given.setUp()
-        given.assemble()
-        out = given.duplicate()
-        given.getDenseArray()[:] = right * sizes
-        factor.matSolve(given, out)
-        solved = sizes * np.array(out.getDenseArray().real)
-        given.destroy()
-        out.destroy()
-        return solved
+        """Solutions for all columns of ``right`` (own rows, k) at once: a column costs much less than a call."""
+        sizes = np.ones(len(right)) if self.sizes is None else self.sizes().array_r.real
+        columns, out = (self._dense(right.shape[1]) for _ in range(2))
+        columns.getDenseArray()[:] = right * sizes[:, None]
+        self.ksp.getPC().getFactorMatrix().matSolve(columns, out)
+        return np.asarray(out.getDenseArray().real * sizes[:, None])
+
+    def _dense(self, count: int) -> PETSc.Mat:
+        """Zero matrix of ``count`` columns, each a vector of the matrix that is factored."""
+        matrix = self.ksp.getOperators()[0]
+        out = PETSc.Mat().createDense((matrix.getSizes()[0], (None, count)), comm=matrix.comm)
+        out.setUp()
+        out.assemble()
+        return out
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""

@@ -15,11 +15,6 @@ from scipy.sparse import _sparsetools
 EPS = float(np.finfo(float).eps)
 
 
-def first_of(comm: MPI.Comm, count: int) -> int:
-    """Number of things on the ranks before this one, of which it has ``count``."""
-    return sum(comm.allgather(count)[: comm.rank])
-
-
 def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
     """Sparse matrix of a ``shape`` with dense ``blocks`` (b, r, c) at ``rows`` (b, r) and ``columns`` (b, c)."""
     i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
@@ -35,16 +30,6 @@ def times(matrix: sp.csr_matrix, vector: np.ndarray) -> np.ndarray:
     out = np.zeros(rows)
     _sparsetools.csr_matvec(rows, columns, matrix.indptr, matrix.indices, matrix.data, vector, out)
     return out
-
-
-def petsc_matrix(comm: MPI.Comm, local: sp.spmatrix) -> PETSc.Mat:
-    """Block diagonal PETSc matrix, one block a rank."""
-    local = local.tocsr()
-    local.sort_indices()
-    n = local.shape[1]
-    size = ((local.shape[0], PETSc.DETERMINE), (n, PETSc.DETERMINE))
-    columns = (local.indices + first_of(comm, n)).astype(PETSc.IntType)
-    return PETSc.Mat().createAIJ(size, csr=(local.indptr.astype(PETSc.IntType), columns, local.data), comm=comm)
 
 
 def local_rows(matrix: PETSc.Mat) -> sp.csr_matrix:

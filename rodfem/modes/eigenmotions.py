@@ -13,7 +13,7 @@ from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import SYMMETRY
 from rodfem.modes.perturbation import Motion, Motions
 from rodfem.modes.recorded import Few
-from rodfem.stability import mode_type
+from rodfem.stability import motion_names
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.left_right import alone, upper
@@ -89,7 +89,7 @@ class Eigenmotions:
 
     def _name(self, x: PETSc.Vec, v: PETSc.Vec) -> str:
         """Name of the motion."""
-        return mode_type.name(mode_type.shares(self.system, self.system.at(x).turned, [v.array_r]))
+        return motion_names.name_of(motion_names.turning_shares(self.system, self.system.at(x).turned, [v.array_r]))
 
     def _weights(self, values: np.ndarray, responses: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
         """Each new mode as a combination: places of those combined, and weights; ``responses`` are (K, 36)."""
@@ -122,7 +122,7 @@ class Eigenmotions:
         values, same = found.values, np.flatnonzero(abs(found.values - double) <= DOUBLE * abs(double))
         left_out = same[np.lexsort((values[same].real, -values[same].imag))][(len(same) + 1) // 2 :]
         nearest = [i for i in upper(values, len(values)) if i not in left_out]
-        rigid = [i for i in nearest if found.kinds[i] == mode_type.RIGID]
+        rigid = [i for i in nearest if found.kinds[i] == motion_names.RIGID]
         moving = [i for i in nearest if i not in rigid][:number]
         chosen = [*sorted(moving, key=lambda i: values[i].real), *rigid]
         if len(chosen) and (worst := found.errors[chosen].max()) > CONVERGED:

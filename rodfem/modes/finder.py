@@ -16,7 +16,7 @@ from rodfem.linalg.matrices import rounding
 from rodfem.modes.eigenmotions import Eigenmotions, stack
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.stability.assessment import Assessor, Verdict
-from rodfem.stability.cluster_noise import DRAWN
+from rodfem.stability.cluster import DRAWN
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.left_right import moving, two_sided
 from rodfem.stability.symmetric import SymmetricPencil

@@ -1,133 +1,74 @@
-"""Contents of ``diagram.json`` as its readers rely on them: the kind of each entry, declared once.
+"""Contents of ``diagram.json`` as its readers rely on them.
 
 Rows and special points have what all readers need; other entries that are missing are the matter of each reader.  Those
-that are there are of their kind, columns have one length, and rows and meshes that are named exist.
+that are there are of their type, columns have one length, and rows and meshes that are named exist.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from math import isfinite
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, STATES, read_json
+from rodfem.output.table import COLUMNS, SPECIAL, Test, test_of
 from rodfem.problem.arguments import SHORT
 
-Test = Callable[[Any], bool]
 ROW, POINT = ("load", "ordinate"), ("kind", "load", "ordinate", "negative_before", "negative_after", "zero", "row")
 """Entries of every row and of every special point."""
-
-
-def _is_number(x: Any) -> bool:
-    return isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) < 1e300 and isfinite(x)
-
-
-def _is_count(x: Any) -> bool:
-    return isinstance(x, int) and not isinstance(x, bool) and 0 <= x < 2**31
-
-
-def _is_text(x: Any) -> bool:
-    return isinstance(x, str)
-
-
-def _is_flag(x: Any) -> bool:
-    return isinstance(x, bool)
-
-
-def _or_none(test: Test) -> Test:
-    return lambda x: x is None or test(x)
-
-
-def _all(test: Test, size: int | None = None) -> Test:
-    return lambda x: isinstance(x, list) and (size is None or len(x) == size) and all(map(test, x))
-
-
-def _named(test: Test) -> Test:
-    return lambda x: isinstance(x, dict) and all(map(test, x.values()))
-
-
-def _is_object(x: Any) -> bool:
-    return isinstance(x, dict)
-
-
-def _is_name(x: Any) -> bool:
-    return isinstance(x, str) and x not in ("", ".", "..") and "/" not in x and "\0" not in x
-
-
-def _is_place(x: Any) -> bool:
-    return isinstance(x, list) and len(x) == 2 and isinstance(x[0], str) and _is_count(x[1])
-
-
-NUMBER, MAYBE = (_is_number, "a finite number"), (_or_none(_is_number), "a finite number or null")
-COUNT, TEXT, FLAG = (_is_count, "a whole number"), (_is_text, "a text"), (_or_none(_is_flag), "true, false or null")
-OBJECT, OBJECTS = (_is_object, "an object"), (_all(_is_object), "a list of objects")
-PLACE = (_or_none(_is_place), "a name and a number, or null")
-LENGTHS = (_or_none(_all(_is_number)), "a list of numbers, or null")
 Kinds = Mapping[str, tuple[Test, str]]
-OF_PARAMETER = ("parameter", "parameter_label", "parameter_words", "parameter_unit")
-WORDS = ("scene", "title", *OF_PARAMETER, "ordinate", "ordinate_label", "ordinate_unit")
+
+
+def _named(kind: str, words: str) -> tuple[Test, str]:
+    return lambda x: isinstance(x, dict) and all(map(test_of(kind)[0], x.values())), words
+
+
+WORDS = ("scene", "title", "parameter", "ordinate", *(f"parameter_{x}" for x in ("label", "words", "unit")))
+MORE = (lambda x: x != [] and test_of("object (k)")[0](x), "a list of objects, one or more")
 TOP: Kinds = {
-    **dict.fromkeys(WORDS, TEXT),
-    **dict.fromkeys(("constants", "natural"), (_named(_is_number), "numbers by name")),
-    "range": (_all(_is_number, 2), "two finite numbers"),
-    "accuracy": MAYBE,
-    "discretization": OBJECT,
-    "origin": OBJECT,
-    **dict.fromkeys(("meshes", "branches"), (lambda x: x != [] and OBJECTS[0](x), "a list of objects, one or more")),
+    **dict.fromkeys((*WORDS, "ordinate_label", "ordinate_unit"), test_of("text")),
+    **dict.fromkeys(("constants", "natural"), _named("number", "numbers by name")),
+    "range": (test_of("number (2)")[0], "two finite numbers"),
+    "accuracy": test_of("number or null"),
+    **dict.fromkeys(("discretization", "origin"), test_of("object")),
+    **dict.fromkeys(("meshes", "branches"), MORE),
 }
-MESH: Kinds = {"formulation": TEXT, "elements": COUNT, "degree": COUNT, "unknowns": COUNT, "vertices": LENGTHS}
+MESH: Kinds = {
+    "formulation": test_of("text"),
+    **dict.fromkeys(("elements", "degree", "unknowns"), test_of("integer")),
+    "vertices": (lambda x: x is None or test_of("number (k)")[0](x), "a list of numbers, or null"),
+}
 BRANCH: Kinds = {
-    "name": (_is_name, "a name without slashes"),
-    "parent": PLACE,
-    "ended": TEXT,
-    "columns": (_named(lambda x: isinstance(x, list)), "lists by name"),
-    "special": OBJECTS,
-    "singular_start": COUNT,
-    "image": TEXT,
-    "unexplained": OBJECTS,
+    "name": test_of("name"),
+    "parent": test_of("place or null"),
+    **dict.fromkeys(("ended", "image"), test_of("text")),
+    "columns": (lambda x: isinstance(x, dict) and all(isinstance(y, list) for y in x.values()), "lists by name"),
+    **dict.fromkeys(("special", "unexplained"), test_of("object (k)")),
+    "singular_start": test_of("integer"),
 }
-COLUMN: Kinds = {
-    **dict.fromkeys(("negative", "zero", "mesh", "unstable"), COUNT),
-    "load": NUMBER,
-    "undecided": COUNT,
-    "kink": TEXT,
-    "soft": (_all(_is_text), "a list of texts"),
-    "soft_value": (_all(_is_number), "a list of numbers"),
-    "soft_uncertainty": (_all(_or_none(_is_number)), "a list of numbers or null"),
-    "negative_in_space": (_or_none(_is_count), "a whole number or null"),
-    "spectrum": (_all(_is_number), "a list of numbers"),
-    "omega2": (_all(_all(_is_number, 2)), "a list of pairs of numbers"),
-    "motion": (_all(_is_text), "a list of texts"),
-    "curve": (_all(_is_count), "a list of whole numbers"),
-    **dict.fromkeys(("ordinate", "energy", "potential", "conjugate", "stretch", "slope"), MAYBE),
-    **dict.fromkeys(("drift", "arclength", "error", "estimate"), MAYBE),
+COLUMN: Kinds = {entry.name: test_of(entry.type) for entry in COLUMNS}
+OF_SPECIAL: Kinds = {entry.name: test_of(entry.type) for entry in SPECIAL} | {
+    "kind": test_of("kind"),
+    "followed": test_of("boolean or null"),
 }
-SPECIAL: Kinds = {
-    "kind": (lambda x: isinstance(x, str) and x in KINDS, f"one of {', '.join(KINDS)}"),
-    **dict.fromkeys(("row", "negative_before", "negative_after", "multiplicity", "zero"), COUNT),
-    "load": NUMBER,
-    **dict.fromkeys(("ordinate", "energy", "located_to", "error_estimate", "ordinate_error_estimate"), MAYBE),
-    **dict.fromkeys(("coupling", "unfolding", "omega2"), MAYBE),
-    **dict.fromkeys(("resolved", "followed"), FLAG),
-    "meets": PLACE,
-    "law": (_or_none(_is_object), "an object or null"),
-    "note": (_or_none(_is_text), "a text or null"),
+LAW: Kinds = {
+    **dict.fromkeys(("kind", "of"), test_of("text")),
+    **dict.fromkeys(("coefficient", "uncertainty"), test_of("number or null")),
+    "power": test_of("integer"),
+    "side": test_of("number"),
 }
-LAW: Kinds = {"kind": TEXT, "coefficient": MAYBE, "power": COUNT, "uncertainty": MAYBE, "side": NUMBER, "of": TEXT}
 
 
 def read_diagram(path: Path, needs: tuple[str, ...]) -> dict[str, Any]:
-    """Read a diagram; raises :class:`InputError` where there is none, or where an entry is not of its kind."""
+    """Read a diagram; raises :class:`InputError` where there is none, or where an entry is not of its type."""
     data = read_json(path, DIAGRAM, needs)
     check_diagram(data, path)
     return data
 
 
 def check_diagram(data: Mapping[str, Any], where: Path | str) -> None:
-    """Raise :class:`InputError` where an entry of a diagram is not of its kind; ``where`` names the file."""
+    """Raise :class:`InputError` where an entry of a diagram is not of its type; ``where`` names the file."""
     _check(data, TOP, where)
     meshes = data.get("meshes", [])
     for mesh in [*meshes, data.get("discretization", {})]:
@@ -135,21 +76,25 @@ def check_diagram(data: Mapping[str, Any], where: Path | str) -> None:
     for branch in data.get("branches", []):
         here = f"{where}, branch {SHORT.repr(branch.get('name'))},"
         _check(branch, BRANCH, here)
-        if "columns" not in branch:
-            continue
-        rows = _rows(branch["columns"], len(meshes), here)
-        if rows:
-            _require(branch["columns"], ROW, here)
-        for i, special in enumerate(branch.get("special", [])):
-            _require(special, POINT, f"{here} special point {i},")
-            _check(special, SPECIAL, f"{here} special point {i},")
-            _check(special.get("law") or {}, LAW, f"{here} special point {i},")
-            if special.get("row", 0) >= rows:
-                raise InputError(f"{here} has a special point in row {special['row']} of {rows}: run the scene again.")
-        for change in branch.get("unexplained", []):
-            _check(change, {"row": COUNT}, here)
-            if change.get("row", 0) + 1 >= rows:
-                raise InputError(f"{here} has an unexplained change in row {change['row']} of {rows}: run it again.")
+        if "columns" in branch:
+            _check_rows(branch, _rows(branch["columns"], len(meshes), here), here)
+
+
+def _check_rows(branch: Mapping[str, Any], rows: int, where: str) -> None:
+    """Check what is in each of so many ``rows`` of a branch."""
+    if rows:
+        _require(branch["columns"], ROW, where)
+    for i, special in enumerate(branch.get("special", [])):
+        here = f"{where} special point {i},"
+        _require(special, POINT, here)
+        _check(special, OF_SPECIAL, here)
+        _check(special.get("law") or {}, LAW, here)
+        if special.get("row", 0) >= rows:
+            raise InputError(f"{where} has a special point in row {special['row']} of {rows}: run the scene again.")
+    for change in branch.get("unexplained", []):
+        _check(change, {"row": test_of("integer")}, where)
+        if change.get("row", 0) + 1 >= rows:
+            raise InputError(f"{where} has an unexplained change in row {change['row']} of {rows}: run it again.")
 
 
 def _require(data: Mapping[str, Any], names: Sequence[str], where: str) -> None:

@@ -17,6 +17,7 @@ from rodfem.file_format import STATES, UNREADABLE
 from rodfem.modes.modes import load_modes, rows_with_modes
 from rodfem.output.contents import read_diagram
 from rodfem.output.profiles import POINTS, PROFILES, profiles_of
+from rodfem.output.words import row_of
 from rodfem.problem.quaternions import directors
 from rodfem.whole_files import with_added, write_whole
 
@@ -80,10 +81,9 @@ def _columns(columns: Mapping[str, list[Any]], stored: Mapping[str, Floats]) -> 
 
 def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
     """Nodal values of each row, without the nodes that only rows of finer meshes have."""
-    s = stored["s"]
+    s, out = stored["s"], dict[str, list[Floats]]()
     others = {POINTS, *PROFILES, *PROFILES.values()}
-    nodal = {name: x for name, x in stored.items() if x.ndim > 1 and x.shape[:2] == s.shape and name not in others}
-    out: dict[str, list[Floats]] = {}
+    nodal = {name: x for name, x in stored.items() if x.shape[:2] == s.shape and name not in others}
     for row, there in enumerate(np.isfinite(s)):
         here = {name: x[row, there] for name, x in nodal.items()}
         frames = directors(here["q"])
@@ -132,18 +132,9 @@ def write_curves(
     own: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html, version 2.0, ``PolyData`` with
     steps.
 
-    Parameters
-    ----------
-    path
-        File, by custom ``*.vtkhdf``.
-    curves
-        Points (m, 3) of each step; m may differ from step to step.
-    fields
-        By name, values (m,) or (m, k) at the points of each step.
-    numbers
-        By name, one number for each step, (steps,).
-
-    Raises :class:`~rodfem.errors.InputError` where the file cannot be written.
+    ``path`` is the file, by custom ``*.vtkhdf``; ``curves`` are the points (m, 3) of each step, where m may differ from
+    step to step, ``fields`` by name values (m,) or (m, k) at the points of each step, and ``numbers`` by name one
+    number for each step, (steps,).  Raises :class:`~rodfem.errors.InputError` where the file cannot be written.
     """
     sizes = np.array([len(curve) for curve in curves])
     steps = len(sizes)
@@ -191,23 +182,20 @@ def to_csv(folder: Path, target: Path) -> list[Path]:
     Raises :class:`InputError` for a folder without a run.
     """
     data = read_diagram(folder / "diagram.json", ("branches", "parameter"))
-    every = [(branch["name"], branch) for branch in data["branches"]]
-    names = list(dict.fromkeys(name for _, branch in every for name in branch["columns"]))
-    lines = [["branch", "row", *names]]
-    for name, branch in every:
-        columns = [branch["columns"].get(column) for column in names]
-        for row in range(len(branch["columns"]["load"])):
-            lines.append([name, row, *(None if column is None else column[row] for column in columns)])
-    entries = list(dict.fromkeys(entry for _, branch in every for s in branch["special"] for entry in s))
-    special = [["branch", *entries]]
-    special += [[name, *(s.get(entry) for entry in entries)] for name, branch in every for s in branch["special"]]
-    contents = {target / "rows.csv": _table(lines), target / "special.csv": _table(special)}
+    rows, special = list[dict[str, Any]](), list[dict[str, Any]]()
+    for branch in data["branches"]:
+        about = {"branch": branch["name"]}
+        rows += [about | {"row": row} | row_of(branch, row) for row in range(len(branch["columns"]["load"]))]
+        special += [about | one for one in branch["special"]]
+    contents = {target / "rows.csv": _table(rows), target / "special.csv": _table(special)}
     write_whole(contents)
     return list(contents)
 
 
-def _table(lines: list[list[Any]]) -> bytes:
-    """Lines as text, numbers with all their digits, nothing where there is none."""
+def _table(rows: list[dict[str, Any]]) -> bytes:
+    """Rows as text, numbers with all their digits, nothing where there is none."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    lines: list[list[Any]] = [names, *([row.get(name) for name in names] for row in rows)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([["" if x is None else repr(x) if isinstance(x, float) else x for x in line] for line in lines])

@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 from math import ceil, floor, isfinite, log10
-from typing import TYPE_CHECKING
 
-from rodfem.stability.soft_mode import ONE_SIDE, index_range
 from rodfem.tolerances import NEGLIGIBLE
-
-if TYPE_CHECKING:
-    from rodfem.continuation.branch import SpecialPoint
 
 FINEST, LARGEST = 9e-15, 1e12
 """Least error, and greatest number, that are written without an exponent."""
@@ -53,27 +48,16 @@ def in_decimals(value: float, decimals: int, one: float) -> str:
     return "0" if abs(value) < 10.0**-decimals * one else f"{value:.{max(decimals - 4, 3)}e}"
 
 
-def in_words(special: SpecialPoint, scale: float = 0.0) -> tuple[str, str, str]:
-    """Load, ordinate and index of a special point, as tables have them; a load that is given is exact.
-
-    ``scale`` is the size of ordinates of the diagram.
-    """
-    point = special.point
-    exact = special.kind.given and special.test_function != "stretch"
-    load = f"{point.load:.10g}" if exact else number(point.load, special.error_estimate, special.resolved)
-    return load, number(point.ordinate, special.ordinate_error, special.resolved, scale), index_in_words(special)
-
-
-def index_in_words(special: SpecialPoint) -> str:
-    """Index at a special point in words: before and after if it changes."""
-    before, after = special.negative_before, special.negative_after
-    point = special.point
-    index = f"{before}->{after}" if before != after else index_range(point.negative, point.undecided)
-    index += f" {ONE_SIDE}" if point.kink else ""
-    space = point.negative_in_space
-    return index if space is None else f"{index} (in space {space})"
-
-
 def with_unit(text: str, unit: str) -> str:
     """A number in words, with the name of its unit if it has one."""
     return f"{text} [{unit.replace('$', '')}]" if unit else text
+
+
+def eigenvalue_in_words(mu: complex, error: float) -> str:
+    """An eigenvalue with the bound of its error, once; empty where that is not known."""
+    if not isfinite(error):
+        return ""
+    (real, bar), (imaginary, other) = (number(x, error).split(" ", 1) for x in (mu.real, abs(mu.imag)))
+    if not mu.imag:
+        return f"{real} {bar}"
+    return f"{real} {'+' if mu.imag > 0 else '-'} {imaginary} i {max(bar, other, key=lambda x: float(x.strip('()')))}"

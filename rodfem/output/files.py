@@ -10,22 +10,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rodfem.continuation.branch import Branch, SpecialPoint, not_followed
+from rodfem.continuation.branch import Branch, not_followed
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
-from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
 from rodfem.modes.perturbation import Motion, Motions
 from rodfem.modes.recorded import Typical
 from rodfem.modes.recorded import write as write_typical
 from rodfem.output.contents import read_diagram
+from rodfem.output.table import COLUMNS, branch_data
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.supports import write as write_supports
@@ -38,43 +37,11 @@ if TYPE_CHECKING:
     import h5py
     from petsc4py import PETSc
 
-COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
-
-MEANING = {
-    "load": "value of the parameter",
-    "ordinate": "the scene's ordinate",
-    "energy": "stored energy int W ds of the rod, without the potential of the loads, springs and foundations",
-    "potential": "total potential energy V of rod, loads, springs and foundations",
-    "conjugate": "-dV/dload, what the load does work on: along a branch dV = -conjugate dload",
-    "negative": "number of negative eigenvalues of the constrained second variation (the index): 0 is stable",
-    "zero": "number of eigenvalues that vanish, those of symmetries included",
-    "stretch": "least stretch v3 along the rod",
-    "slope": "the load's component of the unit tangent",
-    "drift": "largest drift scalar: the error with which the mesh has the symmetries",
-    "arclength": "length along the branch, in the metric of rotations and load",
-    "error": "size of the last Newton correction",
-    "mesh": "number of the discretisation in meshes",
-    "undecided": "number of eigenvalues whose sign is not decided: the index is negative, or greater by up to so many",
-    "kink": "what has a kink at the very state (equations): the index is that of one side, stability is undecided",
-    "soft": "eigenvalues near zero by name: what moves",
-    "soft_value": "their values, in the metric",
-    "soft_uncertainty": "bounds of the errors of these by round-off, and by the mesh where there are error bars",
-}
-"""Columns in words, as they stand in the file."""
-OPTIONAL = ("potential", "conjugate", "estimate", "spectrum", "negative_in_space", "omega2", "motion", "curve")
-"""Columns that a branch has where one of its rows has an entry."""
-UNDECIDED = "undecided"
-"""Column that a branch has where one of its rows has undecided eigenvalues."""
-KINK = "kink"
-"""Column that a branch has where one of its rows is on a kink."""
-SOFT = {"soft": "name", "soft_value": "value", "soft_uncertainty": "uncertainty"}
-"""Columns that a branch has where one of its rows has soft modes, and what they hold of each of them."""
-ALIKE = ("row", "negative_before", "negative_after", "located_to", "error_estimate", "coupling", "omega2", "unfolding")
-SPECIAL = {"ordinate_error_estimate": "ordinate_error", "followed": "switched", "note": "note"}
-SPECIAL |= {name: name for name in ALIKE}
-"""Entries of a special point, and the attributes that they hold, most of which have the same name."""
 NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")
 """Numbers whose natural sizes stand in the file."""
+PARTS = ("assembly", "solve", "stability", "location", "error bars", "modes", "setup")
+"""Parts of a run whose times stand in the file."""
+MEANING = {column.name: column.words for column in COLUMNS}
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
 """Meaning of ``negative`` where loads have no potential."""
 
@@ -94,19 +61,18 @@ def as_data(
     """
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
-    s = clock.seconds
-    points = sum(len(b.points) for b in branches)
+    load, ordinate = scene.parameters[scene.load], scene.ordinate
     return {
         "format": DIAGRAM.mark(),
         "scene": scene.name,
         "title": scene.title or scene.name,
         "parameter": scene.load,
-        "parameter_label": scene.parameters[scene.load].label or scene.load,
-        "parameter_words": scene.parameters[scene.load].words,
-        "parameter_unit": scene.parameters[scene.load].unit,
-        "ordinate": scene.ordinate.name,
-        "ordinate_label": scene.ordinate.label or scene.ordinate.name,
-        "ordinate_unit": scene.ordinate.unit,
+        "parameter_label": load.label or scene.load,
+        "parameter_words": load.words,
+        "parameter_unit": load.unit,
+        "ordinate": ordinate.name,
+        "ordinate_label": ordinate.label or ordinate.name,
+        "ordinate_unit": ordinate.unit,
         "natural": {name: getattr(scene.units, name) for name in NATURAL},
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
@@ -116,82 +82,26 @@ def as_data(
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
         "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
         "branch_points_not_followed": not_followed(branches),
-        "meshes": [_mesh_data(s.fields) for s in systems],
-        "branches": [_branch_data(b) for b in branches],
-        "timing": {
-            "assembly_s": s.get("assembly", 0.0),
-            "solve_s": s.get("solve", 0.0),
-            "stability_s": s.get("stability", 0.0),
-            "location_s": s.get("location", 0.0),
-            "error_bars_s": s.get("error bars", 0.0),
-            "modes_s": s.get("modes", 0.0),
-            "setup_s": s.get("setup", 0.0),
-            "total_s": clock.total(),
-            "points": points,
-            "ms_per_point": clock.each(points),
-            "ranks": system.comm.size,
-        },
+        "meshes": list(map(_mesh_data, systems)),
+        "branches": list(map(branch_data, branches)),
+        "timing": _timing(clock, sum(len(b.points) for b in branches)) | {"ranks": system.comm.size},
     }
 
 
-def _mesh_data(fields: Fields) -> dict[str, Any]:
-    d = fields.discretization
+def _timing(clock: Clock, points: int) -> dict[str, Any]:
+    """Times of the parts of a run, of all of it, and of each of so many points."""
+    parts = {f"{name.replace(' ', '_')}_s": clock.seconds.get(name, 0.0) for name in PARTS}
+    return parts | {"total_s": clock.total(), "points": points, "ms_per_point": clock.each(points)}
+
+
+def _mesh_data(system: System) -> dict[str, Any]:
+    fields, d = system.fields, system.fields.discretization
     return {
         "elements": d.elements,
         "degree": d.degree,
         "unknowns": fields.unknowns,
         "vertices": None if d.vertices is None else list(d.vertices),
     }
-
-
-def _branch_data(branch: Branch) -> dict[str, Any]:
-    rows = {id(p): i for i, p in enumerate(branch.points)}
-    columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
-    for name in OPTIONAL:
-        column = [_plain(getattr(p, name)) for p in branch.points]
-        if any(value not in (None, []) for value in column):
-            columns[name] = column
-    if any(p.undecided for p in branch.points):
-        columns[UNDECIDED] = [p.undecided for p in branch.points]
-    if any(p.kink for p in branch.points):
-        columns[KINK] = [p.kink for p in branch.points]
-    if any(p.soft for p in branch.points):
-        for name, attribute in SOFT.items():
-            columns[name] = [[_plain(getattr(mode, attribute)) for mode in p.soft] for p in branch.points]
-    if "omega2" in columns:
-        columns["unstable"] = columns["negative"]
-    return {
-        "name": branch.name,
-        "parent": list(branch.parent) if branch.parent else None,
-        "ended": branch.ended,
-        "columns": columns,
-        "special": [_special_data(s) for s in branch.special],
-        "singular_start": branch.singular_start,
-        "image": branch.image,
-        "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
-    }
-
-
-def _special_data(s: SpecialPoint) -> dict[str, Any]:
-    return {
-        "kind": s.kind,
-        "load": s.point.load,
-        "ordinate": s.point.ordinate,
-        "energy": s.point.energy,
-        "zero": s.point.zero,
-        "multiplicity": s.multiplicity,
-        "resolved": s.resolved,
-        "meets": list(s.connects_to) if s.connects_to else None,
-        "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
-        **{entry: _plain(getattr(s, attribute)) for entry, attribute in SPECIAL.items()},
-    }
-
-
-def _plain(value: Any) -> Any:
-    """What JSON can hold: numbers that are not finite become null."""
-    if value is None or isinstance(value, (int, str, list)):
-        return value
-    return float(value) if np.isfinite(value) else None
 
 
 def as_json(data: dict[str, Any]) -> bytes:
@@ -225,20 +135,9 @@ def save_run(
     that it has all branches of a ``diagram.json`` of the same run.  Raises :class:`InputError` on every rank where the
     folder cannot be written.
 
-    Parameters
-    ----------
-    data
-        Contents of ``diagram.json``.
-    branches
-        Branches that ``states.h5`` has not yet.
-    solvers
-        Solvers of the meshes that points name.
-    folder
-        Where the files are, which there is.
-    first
-        Whether ``states.h5`` is a new one.
-    modes
-        Modes of the typical states of each of the branches.
+    ``data`` are the contents of ``diagram.json``, ``branches`` those that ``states.h5`` has not yet, ``solvers`` those
+    of the meshes that points name, and ``modes`` those of the typical states of each of the branches.  ``first`` says
+    that ``states.h5`` is a new one.
     """
     states = folder / "states.h5"
     image = states_of(branches, solvers, states, run=data["run"], first=first, modes=modes)
@@ -337,41 +236,40 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
     formulation, or lacks an unknown of the scene.  ``path`` is that of ``states.h5``, ``row`` the number of the row of
     ``branch``; the state is one of ``solver``.
     """
+    system = solver.system
+    sample = _sample(path, branch, row, system.fields.discretization.formulation)
+    names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
+    if missing := [name for name in ("s", "elements", *names) if name not in sample]:
+        raise InputError(
+            f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
+            "another scene, or by another version of rodfem; run the scene again."
+        )
+    _check_sound(sample, path)
+    try:
+        return solver.shape.restore(sample)
+    except UNREADABLE as trouble:
+        raise InputError(
+            f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
+            "run the scene again."
+        ) from trouble
+
+
+def _sample(path: Path, branch: str, row: int, formulation: str) -> dict[str, Any]:
+    """Arrays of a row of a file, whose states have to be of a formulation."""
     import h5py
 
-    wanted = solver.system.fields.discretization.formulation
     try:
         with h5py.File(path, "r") as file:
             STATES.check_hdf5(file, ("formulation", "branches"))
-            if file.attrs["formulation"] != wanted:
-                raise InputError(
-                    f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
-                )
-            group = file[f"branches/{branch}"]
-            sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
+            found, group = file.attrs["formulation"], file[f"branches/{branch}"]
+            if found != formulation:
+                raise InputError(f"{path} holds states of the {found} formulation: choose that, not {formulation}.")
+            return {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
     except UNREADABLE as trouble:
         if isinstance(trouble, InputError):
             raise
         raise InputError(
             f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
-        ) from trouble
-    system = solver.system
-    wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
-    missing = [name for name in ("s", "elements", *wanted_names) if name not in sample]
-    if missing:
-        raise InputError(
-            f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
-            "another scene, or by another version of rodfem; run the scene again."
-        )
-    try:
-        _check_sound(sample, path)
-        return solver.shape.restore(sample)
-    except UNREADABLE as trouble:
-        if isinstance(trouble, InputError):
-            raise
-        raise InputError(
-            f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
-            "run the scene again."
         ) from trouble
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rodfem.output.plot_pieces import STABLE, STYLES, UNDECIDED, pieces_of
+from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE, Piece, pieces_of
 from rodfem.stability.soft_mode import on_kink
 from rodfem.tolerances import SAME_SPECIAL
 
@@ -51,8 +51,7 @@ class Interval:
         It is the less stable one, or one that is undecided by an eigenvalue near zero: between a row of known and one
         of undecided index that is undecided, too.
         """
-        styles = list(STYLES)
-        return len(styles) if self.kind == UNDECIDED and self.soft else styles.index(self.kind)
+        return 4 if self.kind == UNDECIDED and self.soft else (STABLE, PLANAR, UNDECIDED, UNSTABLE).index(self.kind)
 
     @property
     def loads(self) -> tuple[float, float]:
@@ -76,17 +75,16 @@ class Interval:
 
 def intervals_of(branch: Mapping[str, Any]) -> list[Interval]:
     """Intervals of a branch in the order of its rows; none for a branch of one row."""
-    out, row = [], 0
-    for kind, group in groupby(pieces_of(branch, ""), lambda piece: piece.kind):
-        pieces = list(group)
-        last = row + sum(len(piece.curve) - 1 for piece in pieces)
-        indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
-        known = None if None in space else max(i for i in space if i is not None)
-        kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
-        soft = any(piece.undecided for piece in pieces)
-        out.append(Interval(branch, kind, row, last, min(indices), max(indices), known, kink, soft))
-        row = last
-    return out
+    groups = groupby(pieces_of(branch), lambda piece: piece.kind)
+    return [_joined(branch, kind, list(group)) for kind, group in groups]
+
+
+def _joined(branch: Mapping[str, Any], kind: str, pieces: Sequence[Piece]) -> Interval:
+    indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
+    known = None if None in space else max(i for i in space if i is not None)
+    kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
+    soft, ends = any(piece.undecided for piece in pieces), (pieces[0].first, pieces[-1].last)
+    return Interval(branch, kind, *ends, min(indices), max(indices), known, kink, soft)
 
 
 def changes_at(branch: Mapping[str, Any], row: int) -> list[Mapping[str, Any]]:
@@ -120,6 +118,6 @@ def coexisting(stable: Sequence[Interval]) -> Iterator[tuple[Interval, Interval,
                 yield one, other, low, high
 
 
-def stable_ones(branches: Sequence[Mapping[str, Any]]) -> list[Interval]:
-    """All stable intervals of a diagram."""
-    return [x for branch in branches for x in intervals_of(branch) if x.kind == STABLE]
+def intervals_in(branches: Sequence[Mapping[str, Any]], kind: str) -> list[Interval]:
+    """All intervals of one ``kind`` of a diagram."""
+    return [x for branch in branches for x in intervals_of(branch) if x.kind == kind]

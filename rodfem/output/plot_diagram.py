@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Mapping, Sequence
-from itertools import cycle
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle, pairwise, product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -16,55 +16,67 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import read_diagram
-from rodfem.output.endings import endings
-from rodfem.output.placement import dense, place_words
-from rodfem.output.plot_images import draw_images
-from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, Piece, hidden
+from rodfem.output.pieces import COUNTED, STABLE, Piece, endings
 from rodfem.output.program import status_of, terse
-from rodfem.output.sheet import (
-    DPI,
+from rodfem.output.smooth import drawn
+from rodfem.output.style import (
+    END,
     FONT,
     HALO,
+    LINES,
     PALETTE,
-    SIZE,
+    RIM,
     STYLE,
+    THIN,
+    WARNING,
     at_most,
     axis_label,
+    explain,
     mesh_in_words,
     ordinate_in_words,
     save,
+    sheet,
     tex,
 )
-from rodfem.output.smooth import drawn_pieces
 from rodfem.output.view import POINT
 
 __all__ = ["draw_diagram", "main"]
 
 Floats = NDArray[np.float64]
+Branches = Sequence[Mapping[str, Any]]
 
 UNEXPLAINED = "index change unexplained"
 SINGULAR = "singular first state, not located"
 MARKERS: dict[str, Mapping[str, Any]] = {
     **{name: kind.marker for name, kind in KINDS.items() if kind.marker},
-    UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
-    SINGULAR: {"marker": "s", "ms": 8.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
+    UNEXPLAINED: {"marker": "^", **WARNING},
+    SINGULAR: {"marker": "s", **WARNING},
 }
-
-ENDS = "ends: "
-"""Beginning of the words for the end of a branch before the range ends."""
-END_MARKER = {"marker": "X", "ms": 8.5, "mfc": "white", "mec": "#B3123E", "mew": 1.3}
+ENDS, IMAGE = "ends: ", "image, not traced: "
+"""Beginnings of the words for the end of a branch before the range ends, and for an image."""
 SHAPES = ("", "^", "<", "v", ">", "p", "h")
 """Marks along the curves of branches, another one whenever the hues are used up."""
-HUES, APART, TINY_MARK = 7, 0.08, 5.0
-"""Hues of the palette that are told apart at a glance; distance of marks over the diagonal of the axes; their size."""
+HUES = 7
+"""Hues of the palette that are told apart at a glance."""
+SHORT = 15
+"""Points of a line, two pixels apart, below which its index stands beside it only if it is the only one."""
+NEAR = 0.01
+"""Distance from an image, relative to the ranges of load and ordinate, up to which a branch is that image."""
+GAP = 11.0
+"""Pixels between an index and lines."""
 
 
-NOTE: dict[str, Any] = {"ha": "center", "color": "0.4", "fontsize": FONT - 1}
-"""Style of a remark inside the axes."""
+class Line(NamedTuple):
+    """A piece of a branch in its colour, with its ``curve`` (k, 2) of loads and ordinates."""
+
+    piece: Piece
+    colour: str
+    curve: Floats
 
 
 def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
@@ -72,31 +84,15 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
 
     Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
     planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
-    dots, with the least and the greatest index.  Where a stable and another part lie on each
-    other, the other one is drawn inside the stable one.  A segment in which the index changes without a special point
-    that says so has a mark of warning, and so has a first state that is singular.  Images of branches by a symmetry of
-    the scene, of the opposite ordinate, are thin lines: they were not traced.
+    dots, with the least and the greatest index.  Where a stable and another part lie on each other, the other one is
+    drawn upon the stable one, which is wider.  A step in which the index changes without a special point that says so
+    has a mark of warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of
+    the opposite ordinate, are thin lines: they were not traced.
 
-    Parameters
-    ----------
-    diagram
-        Contents of ``diagram.json``; loads and ordinates are nondimensional.
-    path
-        Picture to write, 7.5 in by 5 in at 200 dpi; the suffix decides the format (.png, .pdf, .svg).
-
-    Returns
-    -------
-    path
-        The picture written; its folder is created where it is missing.
-
-    Raises
-    ------
-    InputError
-        If these are contents of another or a newer format.
-    ValueError
-        If there are no branches, if columns of one differ in length, or if the format is unknown.
-    KeyError
-        If an entry of ``diagram.json`` is missing.
+    ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
+    200 dpi.  Its suffix decides the format (.png, .pdf, .svg), and its folder is created.  Raises :class:`InputError`
+    for contents of another or a newer format, :class:`ValueError` where there are no branches, columns of one differ in
+    length, or the format is unknown, and :class:`KeyError` where an entry is missing.
     """
     return save(figure_of(diagram), path)
 
@@ -108,132 +104,172 @@ def figure_of(diagram: Mapping[str, Any]) -> Figure:
     if not branches:
         raise ValueError("the diagram has no branches: expected those of a diagram.json; try that of a scene")
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, dpi=DPI)
-        figure.set_layout_engine("constrained", rect=(0.006, 0.04, 0.984, 0.95))
-        axes = figure.add_subplot(axisbelow=True)
-        handles, pieces, points = _draw_branches(axes, branches)
+        figure, axes = sheet(diagram["title"], _about(diagram))
+        handles, lines = draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
         if _is_flat(branches):
             axes.set_ylim(-1.0, 1.0)
             if len(branches) > 1:
-                axes.text(
-                    0.5,
-                    0.25,
-                    "the ordinate is zero all over: another one tells branches apart",
-                    transform=axes.transAxes,
-                    **NOTE,
-                )
+                words = "the ordinate is zero all over: another one tells branches apart"
+                axes.annotate(words, (0.5, 0.25), xycoords="axes fraction", ha="center", color="0.4")
         axes.set_xlabel(axis_label(diagram), fontsize=FONT + 1)
         axes.set_ylabel(tex(ordinate_in_words(diagram)))
-        title = figure.suptitle(tex(diagram["title"]), fontsize=FONT + 2)
-        footer = figure.text(0.012, 0.013, _footer(diagram), color="0.4", fontsize=FONT - 3)
-        for text in (title, footer):  # one line each: shrink what is too long
-            width = text.get_window_extent().width / figure.bbox.width
-            text.set_fontsize(text.get_fontsize() * min(1.0, 0.97 / max(width, POINT)))
-        axes.autoscale_view()  # otherwise done when it is drawn: until then pixels are those of other limits
-        _uncover(axes, pieces)
-        place_words(axes, handles[: len(branches)], handles[len(branches) :], pieces, points)
+        explain(axes, handles)
+        _write_indices(axes, lines, [tuple(place) for handle in handles for place in handle.get_xydata()])
     return figure
 
 
-def _is_flat(branches: Sequence[Mapping[str, Any]]) -> bool:
+def _is_flat(branches: Branches) -> bool:
     """Whether the ordinate is zero all over, to the error bars that special points have of it: as of a straight rod."""
     bars = [point.get("ordinate_error_estimate") for branch in branches for point in branch.get("special", [])]
     error = max((bar for bar in bars if bar is not None), default=0.0)
     return all(abs(x) <= error for branch in branches for x in branch["columns"]["ordinate"])
 
 
-def _draw_branches(
-    axes: Axes, branches: Sequence[Mapping[str, Any]]
-) -> tuple[list[Line2D], list[Piece], dict[str, Floats]]:
-    """Draw all curves and special points; return the legend's handles, the pieces and the points per kind."""
-    handles: list[Line2D] = []
-    pieces: list[Piece] = []
-    found: dict[str, list[tuple[float, float]]] = {}
+def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Line]]:
+    """Draw all curves and special points; return the legend's handles and the lines."""
+    handles, lines = list[Line2D](), list[Line]()
     for number, (branch, colour) in enumerate(zip(branches, cycle(PALETTE), strict=False)):
-        new = list(drawn_pieces(branch, colour))
-        pieces += new
-        shape = SHAPES[number // HUES % len(SHAPES)]
+        new = [Line(piece, colour, curve) for piece, curve in drawn(branch)]
+        lines += new
+        shape, places = SHAPES[number // HUES % len(SHAPES)], _places(branch)
         handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"]))
-        if shape:
-            places = (branch["columns"][key] for key in ("load", "ordinate"))
-            axes.plot(*places, ls="", marker=shape, ms=TINY_MARK, color=colour, markevery=APART, zorder=3)
-        if not new:
-            axes.plot(branch["columns"]["load"], branch["columns"]["ordinate"], ".", color=colour, markersize=9)
-        for point in branch.get("special", []):
-            found.setdefault(point["kind"], []).append((point["load"], point["ordinate"]))
-        found.setdefault(UNEXPLAINED, []).extend(_unexplained(branch))
-        for row, reason in endings(branch):
-            place = tuple(branch["columns"][key][row] for key in ("load", "ordinate"))
-            found.setdefault(f"{ENDS}{reason}", []).append(place)
-        if branch.get("singular_start"):
-            found.setdefault(SINGULAR, []).append(tuple(branch["columns"][key][0] for key in ("load", "ordinate")))
-    for piece in sorted(pieces, key=lambda piece: -piece.negative):  # the stable ones on top: see _uncover
-        axes.plot(*piece.curve.T, color=piece.colour, **STYLES[piece.kind])
-    drawn = {piece.kind for piece in pieces}
-    handles += [Line2D([], [], color="0.45", label=kind, **style) for kind, style in STYLES.items() if kind in drawn]
-    in_space = any(piece.in_space is not None for piece in pieces)
-    text = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
-    if pieces:
-        handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
-    handles += draw_images(axes, branches, [PALETTE[i % len(PALETTE)] for i in range(len(branches))])
-    kinds = [*MARKERS, *(kind for kind in found if kind.startswith(ENDS))]
-    points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in kinds if found.get(kind)}
-    for kind, places in points.items():
-        marker = MARKERS.get(kind, END_MARKER)
-        style = {"linestyle": "none", "zorder": 5, "label": _kind_label(kind, branches), **marker}
-        handles += axes.plot(*places.T, path_effects=HALO, **style)
-    return handles, pieces, points
+        if shape or not new:
+            axes.plot(*places.T, ls="", marker=shape or "o", ms=5.0, color=colour, markevery=0.08, zorder=3)
+    for line in sorted(lines, key=lambda line: line.piece.kind != STABLE):
+        upper = {} if line.piece.kind == STABLE else {"path_effects": RIM, "zorder": 2.5}  # seen where two lines lie
+        axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind] | upper)
+    return handles + _kinds(lines) + _draw_images(axes, branches) + _draw_marks(axes, branches), lines
 
 
-def _unexplained(branch: Mapping[str, Any]) -> list[tuple[float, float]]:
-    """Middles of the segments in which the index changes without a special point that says so."""
-    load, ordinate = (branch["columns"][key] for key in ("load", "ordinate"))
-    rows = [int(change["row"]) for change in branch.get("unexplained") or ()]
-    return [((load[i] + load[i + 1]) / 2, (ordinate[i] + ordinate[i + 1]) / 2) for i in rows]
+def _kinds(lines: Sequence[Line]) -> list[Line2D]:
+    """Handles of the legend for the kinds of lines, and for the indices beside them."""
+    kinds = {line.piece.kind for line in lines}
+    out = [Line2D([], [], color="0.45", label=kind, **style) for kind, style in LINES.items() if kind in kinds]
+    in_space = any(line.piece.in_space is not None for line in lines)
+    words = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
+    return out + [Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words)] * bool(lines)
 
 
-def _kind_label(kind: str, branches: Sequence[Mapping[str, Any]]) -> str:
-    """Return the legend's words for a kind of special point; of imperfect bifurcations with their unfolding."""
-    values = [
-        abs(point["unfolding"])
-        for branch in branches
-        for point in branch.get("special", [])
-        if point["kind"] == kind == IMPERFECT and point.get("unfolding") is not None
-    ]
-    if not values:
-        return str(MARKERS.get(kind, END_MARKER).get("label", kind))
-    words = dict.fromkeys(f"{value:.0e}" for value in (min(values), max(values)))
-    return f"{kind}, unfolding {' to '.join(words)}"
+def _draw_images(axes: Axes, branches: Branches) -> list[Line2D]:
+    """Draw the images of branches by a symmetry, of the opposite ordinate, that are no branches themselves."""
+    out = []
+    for branch, colour in zip(branches, cycle(PALETTE), strict=False):
+        if branch.get("image") and not is_traced(branch, branches):
+            for piece, curve in drawn(branch):
+                axes.plot(*(curve * [1.0, -1.0]).T, color=colour, **LINES[piece.kind] | THIN)
+            out.append(Line2D([], [], color="0.45", label=f"{IMAGE}{branch['image']}", **THIN))
+    return out
 
 
-def _uncover(axes: Axes, pieces: Sequence[Piece]) -> None:
-    """Draw what is not stable once more, within stable lines that lie on it."""
-    stable = [dense(axes, piece.curve)[0] for piece in pieces if piece.kind == STABLE]
-    for piece in pieces:
-        for part in hidden(dense(axes, piece.curve)[0], stable) if piece.kind != STABLE else ():
-            line = axes.transData.inverted().transform(part)
-            axes.plot(*line.T, color="white", linewidth=2.0, solid_capstyle="butt", zorder=2.5)
-            axes.plot(*line.T, color=piece.colour, **STYLES[piece.kind] | {"linewidth": 1.5}, zorder=2.6)
+def is_traced(branch: Mapping[str, Any], branches: Branches) -> bool:
+    """Whether a branch passes where the image of this one has its middle."""
+    curves = [_places(each) for each in branches]
+    size = np.ptp(np.concatenate(curves), axis=0)
+    middle = _places(branch)[len(branch["columns"]["load"]) // 2] * [1.0, -1.0]
+    share = np.linspace(0.0, 1.0, 50)[:, None]
+    lines = [(a + share * (b - a)).reshape(-1, 2) for c in curves for a, b in pairwise(c)]
+    off = (np.concatenate([middle[None] + size, *lines]) - middle) / np.where(size > 0, size, 1.0)
+    return bool(np.hypot(*off.T).min() < NEAR)
 
 
-def _footer(diagram: Mapping[str, Any]) -> str:
+def _places(branch: Mapping[str, Any]) -> Floats:
+    """Loads and ordinates (rows, 2)."""
+    return np.column_stack([np.asarray(branch["columns"][key], dtype=float) for key in ("load", "ordinate")])
+
+
+def _draw_marks(axes: Axes, branches: Branches) -> list[Line2D]:
+    """Draw special points, warnings and ends, each place of a kind once; return the handles."""
+    found: dict[str, list[tuple[float, float]]] = {kind: [] for kind in MARKERS}
+    for kind, place in (mark for branch in branches for mark in _marks(branch)):
+        found.setdefault(kind, []).append(place)
+    handles = list[Line2D]()
+    for kind, places in found.items():
+        if places and (kind in MARKERS or kind.startswith(ENDS)):
+            style = {"linestyle": "none", "zorder": 5, "label": _words(kind, branches), **MARKERS.get(kind, END)}
+            handles += axes.plot(*np.unique(places, axis=0).T, path_effects=HALO, **style)
+    return handles
+
+
+def _marks(branch: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Kind and place of all marks of a branch; those of steps that nothing explains are in their middle."""
+    places = _places(branch)
+    yield from ((point["kind"], (point["load"], point["ordinate"])) for point in branch.get("special", []))
+    for row in (int(change["row"]) for change in branch.get("unexplained") or ()):
+        yield UNEXPLAINED, tuple(places[row : row + 2].mean(axis=0))
+    yield from ((f"{ENDS}{reason}", tuple(places[row])) for row, reason in endings(branch))
+    if branch.get("singular_start"):
+        yield SINGULAR, tuple(places[0])
+
+
+def _words(kind: str, branches: Branches) -> str:
+    """Return the legend's words for a kind of mark; of imperfect bifurcations with their unfolding."""
+    words = str(MARKERS.get(kind, END).get("label", kind))
+    points = [point for branch in branches for point in branch.get("special", []) if kind == IMPERFECT == point["kind"]]
+    values = [abs(point["unfolding"]) for point in points if point.get("unfolding") is not None]
+    sizes = dict.fromkeys(f"{value:.0e}" for value in (min(values), max(values))) if values else ()
+    return f"{words}, unfolding {' to '.join(sizes)}" if sizes else words
+
+
+def dense(axes: Axes, curve: Floats) -> Floats:
+    """Points (k, 2) on a curve, in pixels, at equal distances of about two."""
+    pixels = axes.transData.transform(curve)
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
+    along = np.linspace(0.0, lengths[-1], max(2, int(lengths[-1] / 2.0) + 1))
+    return np.column_stack([np.interp(along, lengths, pixels[:, k]) for k in (0, 1)])
+
+
+def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[float, float]]) -> None:
+    """Write the index beside each line, where there is most room: a short line has none, unless it is the only one."""
+    curves = [dense(axes, line.curve) for line in lines]
+    corners = [axes.transData.transform(marks)] if marks else []
+    taken, written = [*curves, *corners], set[tuple[str, str]]()
+    for number in sorted(range(len(lines)), key=lambda number: -len(curves[number])):
+        line, curve = lines[number], curves[number]
+        half = np.array([0.33 * len(line.piece.label) + 0.1, 0.45]) * FONT * axes.figure.dpi / 72
+        places = _beside(curve, half)
+        tree = KDTree(np.concatenate(taken))
+        corner = np.array([*product((-1, 0, 1), repeat=2)]) * half
+        room = np.array([min(tree.query(place + corner)[0].min(), GAP) for place in places])
+        inside = np.all((places - half > axes.bbox.min) & (places + half < axes.bbox.max), axis=1)
+        best = int(np.argmax(np.where(inside, room, -1.0)))
+        name = line.colour, line.piece.label
+        if (inside[best] and room[best] > GAP / 2 and len(curve) > SHORT) or name not in written:
+            written.add(name)
+            taken.append(places[best] + corner)
+            at = axes.transData.inverted().transform(places[best])
+            style = {"ha": "center", "va": "center", "weight": "bold", "zorder": 6, "path_effects": HALO}
+            axes.annotate(line.piece.label, tuple(at), color=line.colour, in_layout=False, **style)
+
+
+def _beside(curve: Floats, half: Floats) -> Floats:
+    """Places (k, 2) for a word of ``half`` (2,) pixels beside a curve (n, 2), those in its middle first."""
+    rows = ((0.5 + np.array([0, 0.15, -0.15, 0.3, -0.3, 0.4, -0.4])) * (len(curve) - 1)).round().astype(int)
+    tangent = curve[np.minimum(rows + 4, len(curve) - 1)] - curve[np.maximum(rows - 4, 0)]
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(*tangent.T), POINT)[:, None]
+    normal *= np.where(normal[:, 1] < 0, -1.0, 1.0)[:, None]
+    away = normal * (abs(normal) @ half + GAP)[:, None]
+    return np.stack([curve[rows] + away, curve[rows] - away], axis=1).reshape(-1, 2)
+
+
+def _about(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
     d = diagram.get("discretization")
     parts = [mesh_in_words(d)] if d else []
     if d and diagram.get("accuracy"):
         parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
     special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
-    counted = [point for point in special if point["kind"] in COUNTED]
     coarse = sum(point.get("resolved") is False for point in special)
-    errors = [None if point.get("resolved") is False else point.get("error_estimate") for point in counted]
-    known = [abs(error) for error in errors if error is not None and math.isfinite(error)]
-    if known:
-        share = f" (of {len(known)} out of {len(errors)})" if len(known) < len(errors) else ""
-        parts.append(f"error of the loads of special points at most {at_most(max(known))}{share}")
-    if coarse:
-        parts.append(f"{coarse} of {len(special)} special points not resolved by the mesh")
-    return "; ".join(parts)
+    parts += [f"{coarse} of {len(special)} special points not resolved by the mesh"] * bool(coarse)
+    return "; ".join([*parts[:1], *_accuracy([point for point in special if point["kind"] in COUNTED]), *parts[1:]])
+
+
+def _accuracy(special: Branches) -> list[str]:
+    """Greatest bound of the errors of special points in words; nothing where none is known."""
+    bars = [point.get("error_estimate") for point in special if point.get("resolved") is not False]
+    known = [abs(bar) for bar in bars if bar is not None and math.isfinite(bar)]
+    share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
+    return [f"error of the loads of special points at most {at_most(max(known))}{share}"] if known else []
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -17,12 +17,12 @@ from matplotlib.patches import Patch
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.frequency_curves import DIVERGED, GROWTH, PAIR, FrequencyCurve, curves, ranges_of, top
-from rodfem.output.sheet import DPI, HALO, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
+from rodfem.output.style import HALO, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
 
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
-WIDTH, EVERY = 1.8, 0.03
-"""Width of the line of a real frequency; distance of the marks of others, over the diagonal of the axes."""
+WIDTH = 1.8
+"""Width of the line of a real frequency."""
 
 
 def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> Path:
@@ -44,43 +44,37 @@ def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
     if not branches:
         raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
-        axes = figure.subplots()
+        figure, axes = sheet(str(diagram["title"]), _about(diagram, branches))
         handles = draw_into(axes, branches, most)
         axes.set_xlabel(axis_label(diagram))
-        axes.set_title(str(diagram["title"]))
-        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9)
-        figure.supxlabel(_footer(diagram, branches), fontsize=8.5, color="0.4", x=0.01, ha="left")
+        explain(axes, handles)
     return figure
-
-
-def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
-    """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
-    motions: dict[str, str] = {}
-    shown: set[str] = set()
-    ranges: dict[str, Patch] = {}
-    axes.set_ylim(0, 1.15 * max(top(b, most) for b in branches))
-    for branch in branches:
-        ranges |= _shade(axes, branch)
-        for curve in curves(branch["columns"], branch["special"]):
-            motions.setdefault(curve.motion, curve.colour)
-            shown |= _draw_curve(axes, curve, motions[curve.motion])
-    for special in (s for branch in branches for s in branch["special"] if s["kind"] in SPECIAL):
-        _mark(axes, special)
-        shown.add(special["kind"])
-    axes.set_ylabel(r"frequency $\omega$")
-    handles: list[Artist] = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
-    handles += [
-        Line2D([], [], color="0.3", marker=marker, ls=style, lw=0.8, label=what)
-        for what, (marker, style) in PARTS.items()
-        if what in shown
-    ]
-    handles += [Line2D([], [], ls="none", label=kind, **SPECIAL[kind]) for kind in SPECIAL if kind in shown]
-    return handles + list(ranges.values())
 
 
 PARTS = dict(zip((PAIR, GROWTH, DIVERGED), (("x", "-"), ("+", "--"), ("+", ":")), strict=True))
 """Marker and line of roots that are not real."""
+
+
+def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
+    """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
+    motions, shown, ranges = dict[str, str](), set[str](), dict[str, Artist]()
+    axes.set(ylim=(0, 1.15 * max(top(b, most) for b in branches)), ylabel=r"frequency $\omega$")
+    for branch in branches:
+        for found in ranges_of(branch):
+            axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
+            ranges[found.words] = Patch(color=found.shade, label=found.words)
+        for curve in curves(branch["columns"], branch["special"]):
+            shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
+        shown |= _marked(axes, branch["special"])
+    lines = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
+    return [*lines, *(Line2D([], [], **ENTRIES[what]) for what in ENTRIES if what in shown), *ranges.values()]
+
+
+ENTRIES: dict[str, dict[str, Any]] = {
+    what: {"color": "0.3", "marker": marker, "ls": style, "lw": 0.8, "label": what}
+    for what, (marker, style) in PARTS.items()
+} | {kind: {"ls": "none", "label": kind, **style} for kind, style in SPECIAL.items()}
+"""Entries of the legend for what is not a line."""
 
 
 def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
@@ -89,31 +83,27 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
     drawn = set()
     for (what, part), (marker, style) in zip(curve.parts.items(), PARTS.values(), strict=True):
         if not np.isnan(part).all():
-            axes.plot(curve.loads, part, marker + style, color=color, ms=4, lw=0.8, markevery=EVERY)
+            axes.plot(curve.loads, part, marker + style, color=color, ms=4, lw=0.8, markevery=0.03)
             drawn.add(what)
     return drawn
 
 
-def _shade(axes: Axes, branch: Mapping[str, Any]) -> dict[str, Patch]:
-    """Shade the ranges of the load in which a branch is unstable; returns them by the words of the legend."""
-    out = {}
-    for found in ranges_of(branch):
-        out[found.words] = Patch(color=found.shade, label=found.words)
-        axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
-    return out
+def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
+    """Mark flutter and divergence loads, and write them beside: of divergence above the axis, where its frequency is.
+
+    Returns their kinds.
+    """
+    found = [special for special in specials if special["kind"] in SPECIAL]
+    for special in found:
+        here = float(special["load"]), abs(complex(special["omega2"])) ** 0.5
+        axes.plot(*here, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
+        place = (8.0, 6.0) if here[1] else (0.0, 14.0)
+        text = axes.annotate(f"{special['load']:.6g}", here, place, textcoords="offset points")
+        text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
+    return {special["kind"] for special in found}
 
 
-def _mark(axes: Axes, special: Mapping[str, Any]) -> None:
-    """Mark a flutter or divergence load, and write it beside: of divergence above the axis, where its frequency is."""
-    omega = abs(complex(special["omega2"])) ** 0.5
-    axes.plot(special["load"], omega, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
-    here = float(special["load"]), float(omega)
-    place = (8.0, 6.0) if omega else (0.0, 14.0)
-    text = axes.annotate(f"{special['load']:.6g}", here, place, textcoords="offset points")
-    text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
-
-
-def _footer(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:
+def _about(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:
     """Discretisation, and the greatest bound of the errors of the special loads."""
     text = mesh_in_words(diagram["discretization"])
     found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]

@@ -7,26 +7,28 @@ import sys
 from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import Collection, LineCollection, PolyCollection
-from matplotlib.colors import to_rgb
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
-from rodfem.output.glyphs import glyphs_of
+from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.sheet import DPI, STYLE
-from rodfem.output.solids import Solid, curve_of, profile_of
-from rodfem.output.view import POINT, on_feet, view_of
+from rodfem.output.solids import Glyph, Solid, between, curve_of, striped
+from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
+from rodfem.output.view import POINT, axes_of, axis_of
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
 from rodfem.whole_files import draft_of
@@ -37,42 +39,25 @@ Floats = NDArray[np.float64]
 PANEL, COLUMNS, TITLES = (4.0, 2.75), 3, 0.8  # inches; those that titles take above a panel
 LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
-POINTS, SIDES, SLENDER = (240, 100), (14, 10), 65.0
-"""Points along and around a tube, in a picture and in an animation; the rod's size over the tube's radius."""
-FRAMES, RATE, PERIODS, FAINTEST, GROWS = 60, 20, 2.0, 0.06, 0.8
+POINTS, SLENDER = 100, 65.0
+"""Points along a rod; its size over its radius."""
+FRAMES, RATE, PERIODS, FAINTEST, RISING = 60, 20, 2.0, 0.06, 0.8
 """Of an animation: pictures, pictures a second, periods of an oscillation, amplitude at which a growing mode starts,
 and the share of the time in which it grows; in the rest it goes back, pale, so that the loop joins."""
 TEETH, BENT = 15, 0.05
 """Lines along d1 where a mode hardly displaces the rod; deflection of a rod, over its size, that is one."""
 GROWTH = 1e-9
 """Real part of the root of -mu, relative to it, above which a mode grows."""
-REST, UNSTABLE, STABLE, FREE = "#B4B4B4", "#D55E00", "#0072B2", "#009E73"
 
 
 def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence[int] = ()) -> Path:
     """Draw the modes of one state, each in a panel of its own.
 
-    Parameters
-    ----------
-    path
-        The file ``modes.h5``.
-    branch, row
-        The state, as in ``states.h5``.
-    output
-        Picture to write; an animation where its suffix is .gif, in which unstable modes grow like ``exp(sqrt(-mu) t)``,
-        then go back, and stable ones oscillate, each in a time of its own.  Its end joins its beginning.
-    chosen
-        Numbers of the modes, from 1 on; all where none is given.
-
-    Returns
-    -------
-    output
-        The picture written; its folder is created where it is missing.
-
-    Raises
-    ------
-    InputError
-        If the file has no such modes.
+    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state, as in ``states.h5``.  ``output`` is the picture
+    to write, and to return; an animation where its suffix is .gif, in which unstable modes grow like
+    ``exp(sqrt(-mu) t)``, then go back, and stable ones oscillate, each in a time of its own: its end joins its
+    beginning.  ``chosen`` are numbers of modes, from 1 on; all where none is given.  Raises :class:`InputError` if the
+    file has no such modes.
     """
     modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)
@@ -81,30 +66,31 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
             raise InputError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
     numbers = [n - 1 for n in chosen] or list(range(count))
     columns = min(COLUMNS, len(numbers)) if len(numbers) != 4 else 2
-    rows = ceil(len(numbers) / columns)
-    moving = output.suffix.lower() == ".gif"
+    rows, moving = ceil(len(numbers) / columns), output.suffix.lower() == ".gif"
     with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
         FigureCanvasAgg(figure)
         figure.subplots_adjust(0.01, 0.01, 0.99, 1 - (TITLES + 0.4) / (rows * PANEL[1] + 0.5), 0.04, 0.36)
-        figure.suptitle(
-            f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=14, y=1 - 0.1 / figure.get_figheight(), va="top"
-        )
-        places = [figure.add_subplot(rows, columns, i + 1) for i in range(len(numbers))]
-        panels = [_Panel(axes, modes, setting, n, moving) for axes, n in zip(places, numbers, strict=True)]
-        if not moving:
-            for panel in panels:
-                panel.draw()
-            figure.savefig(draft)
-            return output
-        writer = PillowWriter(fps=RATE)
-        writer.setup(figure, str(draft), figure.dpi)
+        words, top = f"{heading(path)}{branch}, load {modes.load:.6g}", 1 - 0.1 / figure.get_figheight()
+        figure.suptitle(words, fontsize=14, y=top, va="top")
+        panels = [_Panel(figure.add_subplot(rows, columns, i), modes, setting, n) for i, n in enumerate(numbers, 1)]
+        _animate(figure, panels, draft) if moving else _draw(figure, panels, draft)
+    return output
+
+
+def _draw(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
+    for panel in panels:
+        panel.draw()
+    figure.savefig(path)
+
+
+def _animate(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
+    writer = PillowWriter(fps=RATE)
+    with writer.saving(figure, str(path), figure.dpi):
         for frame in range(FRAMES):
             for panel in panels:
                 panel.draw(frame / FRAMES)
             writer.grab_frame()
-        writer.finish()
-    return output
 
 
 def amplitude(root: complex, grows: bool, time: float) -> complex:
@@ -117,155 +103,122 @@ def amplitude(root: complex, grows: bool, time: float) -> complex:
     most = np.log(1 / FAINTEST) / root.real
     if root.imag:
         most = min(most, PERIODS * 2 * np.pi / abs(root.imag))
-    back = max(0.0, time - GROWS) / (1 - GROWS)
-    grown = np.exp(root * most * (min(time / GROWS, 1.0) - 1))
+    back = max(0.0, time - RISING) / (1 - RISING)
+    grown = np.exp(root * most * (min(time / RISING, 1.0) - 1))
     return complex(grown + back**2 * (3 - 2 * back) * (np.exp(-root * most) - grown))
+
+
+def drawn_size(u: NDArray[Any], w: NDArray[Any], span: float) -> float:
+    """Factor with which a mode of displacement ``u`` and rotation ``w`` (n, 3) is drawn, of a rod of size ``span``."""
+    moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
+    return min(LARGEST[0] * span / max(moved, POINT * span), LARGEST[1] / max(turned, POINT))
 
 
 class _Panel:
     """One mode in its axes, seen across the plane in which most of it happens."""
 
-    def __init__(self, axes: Axes, modes: Modes, setting: Setting, number: int, moving: bool) -> None:
-        self.axes, self.sides, self.setting = axes, SIDES[moving], setting
-        self.shown: list[Collection] = []
-        s, mu = modes.s, complex(modes.value[number])
-        self.s = fine = np.linspace(s[0], s[-1], POINTS[moving])
-        self.r, self.frames = curve_of(s, modes.r, modes.q, fine)
-        u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
-        span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
-        moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
-        size = min(LARGEST[0] * span / max(moved, POINT * span), LARGEST[1] / max(turned, POINT))
+    def __init__(self, axes: Axes, modes: Modes, setting: Setting, number: int) -> None:
+        self.axes, self.setting, self.shown = axes, setting, list[PolyCollection]()
+        self.s = s = np.linspace(modes.s[0], modes.s[-1], POINTS)
+        self.r, turned = curve_of(modes.s, modes.r, modes.q, s)
+        self.frames = directors(turned)
+        u, w = (CubicSpline(modes.s, part[number].astype(complex))(s) for part in (modes.displacement, modes.rotation))
+        span, mu, error = (
+            float(np.linalg.norm(np.ptp(self.r, axis=0))),
+            complex(modes.value[number]),
+            modes.error[number],
+        )
+        size = drawn_size(u, w, span)
         self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
-        self.combed = size * moved < 0.5 * LARGEST[0] * span
+        self.combed = size * np.linalg.norm(abs(u), axis=1).max() < 0.5 * LARGEST[0] * span
         self.root = np.sqrt(-mu)
-        zero = abs(mu) <= (modes.error[number] if np.isfinite(modes.error[number]) else 0.0)
-        self.free = modes.motion[number] == SYMMETRY or zero
-        self.color = FREE if self.free else UNSTABLE if self.root.real > GROWTH * abs(self.root) else STABLE
-        self._title(modes, number, mu)
-        angles = np.linspace(0, 2 * np.pi, self.sides + 1) - np.pi / self.sides
-        self.profile = self.radius * profile_of(fine, setting.section, angles)
+        free = modes.motion[number] == SYMMETRY or abs(mu) <= (error if np.isfinite(error) else 0.0)
+        self.color = FREE if free else GROWS if self.root.real > GROWTH * abs(self.root) else SWINGS
+        doubt = f" ({error:.0e})" if np.isfinite(error) else ""
+        value = f"{mu.real:.6g}" if mu.imag == 0 else f"{mu.real:.5g} {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.5g}i"
+        what = {FREE: "zero", SWINGS: "stable", GROWS: "unstable" if mu.imag == 0 else "flutter"}[self.color]
+        words = f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {modes.motion[number]}"
+        axes.set_title(words, fontsize=12.5, color=self.color)
         self._look(span)
-        self._rod(self.r, self.frames, REST, 0)
-        self._triad()
-        axes.set_xlim(*self.limits[0])
-        axes.set_ylim(*self.limits[1])
+        self._show(self._rod(self.r, self.frames, REST), 0)
         axes.set_aspect("equal")
         axes.set_axis_off()
 
-    def _title(self, modes: Modes, number: int, mu: complex) -> None:
-        kind, error = modes.motion[number], float(modes.error[number])
-        doubt = f" ({error:.0e})" if np.isfinite(error) else ""
-        value = f"{mu.real:.6g}" if mu.imag == 0 else f"{mu.real:.5g} {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.5g}i"
-        what = {FREE: "zero", STABLE: "stable", UNSTABLE: "unstable" if mu.imag == 0 else "flutter"}[self.color]
-        self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=12.5, color=self.color)
-
     def _look(self, span: float) -> None:
-        """Choose the axes (see :func:`rodfem.output.view.view_of`), the limits, and the sign of the mode.
+        """Choose the axes (see :func:`rodfem.output.view.axes_of`), the limits, and the sign of the mode.
 
         It goes upwards at its greatest amplitude.
         """
-        held, moved = self.setting, self.u.real
-        if np.linalg.norm(self.u.imag) > np.linalg.norm(moved):
-            moved = self.u.imag
-        off = self.r - self.r[0]
-        axis = (self.r[-1] - self.r[0]) if held.axis is None else held.axis
+        moved = self.u.imag if np.linalg.norm(self.u.imag) > np.linalg.norm(self.u.real) else self.u.real
+        axis, off = axis_of(self.setting, self.r), self.r - self.r[0]
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
-        across = most if held.force is None and np.linalg.norm(most) > BENT * span else held.force
-        side, feet = held.widest(self.frames[0]), on_feet(held)
-        self.view = view_of(self.r, moved, axis=held.axis, down=held.down, load=across, side=side, feet=feet)
-        raised = moved @ self.view[1]
+        bent = self.setting.force is None and np.linalg.norm(most) > BENT * span
+        view = axes_of(self.setting, self.r, moved, self.frames[0], most if bent else None)
+        self.look, raised = Look(self.radius, view), moved @ view[1]
         if raised[np.argmax(abs(raised))] < 0.0:
             self.u, self.w = -self.u, -self.w
-        points = []
-        for factor in (1.0, -1.0, 1.0j, -1.0j):
-            r, frames = self._moved(factor)
-            points += [r, *(solid.points for solid in self._glyphs(r, frames))]
-        seen = np.concatenate(points) @ self.view[:2].T
-        low, high = seen.min(axis=0) - 3 * self.radius, seen.max(axis=0) + 3 * self.radius
+        states = [self._moved(factor) for factor in (1.0, -1.0, 1.0j, -1.0j)]
+        points = [solid.points for state in states for solid in [*self._rod(*state, REST), *self._glyphs(*state)]]
+        seen = np.concatenate(points) @ view[:2].T
+        low, high = seen.min(axis=0) - self.radius, seen.max(axis=0) + self.radius
         low[0] -= 0.15 * (high - low)[0]  # room for the triad
-        middle, half = (low + high) / 2, (high - low) / 2
-        half = np.maximum(
-            half, half[::-1] * np.array([PANEL[0], PANEL[1] - TITLES]) / np.array([PANEL[1] - TITLES, PANEL[0]])
-        )
-        self.limits = np.stack([middle - half, middle + half], axis=1)
+        shape = np.array([PANEL[0], PANEL[1] - TITLES])
+        grown = (shape * ((high - low) / shape).max() - (high - low)) / 2
+        low, high = low - grown, high + grown
+        self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        self._triad(low, 0.07 * (high - low)[0])
+
+    def _triad(self, corner: Floats, size: float) -> None:
+        """The directions e1, e2, e3, near a corner; directions that look alike share a label."""
+        corner, names = corner + 1.6 * size, dict[tuple[float, ...], list[str]]()
+        for i, way in enumerate(self.look.axes[:2].T):
+            self.axes.plot(*np.stack([corner, corner + size * way], axis=1), color="0.45", lw=1.2)
+            if np.linalg.norm(way) > 0.5:
+                names.setdefault(tuple(np.round(way, 0)), []).append(f"e{i + 1}")
+        for key, words in names.items():
+            place = corner + 1.5 * size * np.array(key) / np.linalg.norm(key)
+            self.axes.text(*place, ", ".join(words), fontsize=10, color="0.35", ha="center", va="center")
 
     def _moved(self, factor: complex) -> tuple[Floats, Floats]:
         """Centreline and directors of the rod in its mode, of a complex amplitude."""
         u, w = np.real(self.u * factor), np.real(self.w * factor)
         return self.r + u, Rotation.from_rotvec(w).as_matrix() @ self.frames
 
-    def _glyphs(self, r: Floats, frames: Floats) -> list[Solid]:
+    def _glyphs(self, r: Floats, frames: Floats) -> list[Glyph]:
         """What holds and loads the rod: it goes along where it moves with the rod."""
-        return glyphs_of(self.setting, self.s, r, frames, self.radius, self.view, self.r)
+        return glyphs_of(self.setting, self.s, (r, frames), self.look, self.r)
 
     def draw(self, time: float | None = None) -> None:
         """Draw the rod at a time of the loop, from 0 to 1; None: at its greatest amplitude."""
         for drawn in self.shown:
             drawn.remove()
-        grows = self.color == UNSTABLE
+        grows = self.color == GROWS
         r, frames = self._moved(1.0 if time is None else amplitude(self.root, grows, time))
-        pale = 0.6 if grows and time is not None and time > GROWS else 0.0
-        color = (1 - pale) * np.array(to_rgb(self.color)) + pale * np.array(to_rgb(REST))
-        self.shown = self._rod(r, frames, color, 1)
-        if solids := self._glyphs(r, frames):
-            corners = np.concatenate([solid.points[solid.triangles] for solid in solids]) @ self.view.T
-            colors = np.concatenate([np.tile(to_rgb(x.color), (len(x.triangles), 1)) for x in solids])
-            across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            self.shown.append(self._facets(corners, across, colors, 0.5))
+        pale = 0.6 if grows and time is not None and time > RISING else 0.0
+        color = to_hex((1 - pale) * np.array(to_rgb(self.color)) + pale * np.array(to_rgb(REST)))
+        self.shown = [self._show(self._glyphs(r, frames), 0.5), self._show(self._rod(r, frames, color), 1)]
 
-    def _rod(self, centres: Floats, frames: Floats, color: ArrayLike, order: int) -> list[Collection]:
-        """Rod, with a comb along d1 where the mode turns it only: its teeth are lines before the rod and behind it."""
-        drawn: list[Collection] = [self._tube(centres, frames, color, order)]
-        if self.combed:
-            nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1:-1]
-            seen, d1 = centres[nodes] @ self.view.T, frames[nodes, :, 0] @ self.view.T
-            front = d1[:, 2] > 0
-            for chosen, place in ((front, order + 0.2), (~front, order - 0.2)):
-                ends = np.stack([seen[chosen], seen[chosen] + 6.0 * self.radius * d1[chosen]], axis=1)
-                lines = LineCollection(
-                    list(ends[..., :2]), colors=[0.6 * np.array(to_rgb(color))], lw=1.2, zorder=place
-                )
-                self.axes.add_collection(lines)
-                drawn.append(lines)
-        return drawn
+    def _rod(self, centres: Floats, frames: Floats, color: str) -> list[Solid | Glyph]:
+        """Rod with a stripe along d1, and with teeth along d1 where the mode turns it only."""
+        dark = to_hex(0.4 * np.array(to_rgb(color)))
+        nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1 : -1 if self.combed else 1]
+        tips = centres + 6.0 * self.radius * frames[:, :, 0]
+        teeth = [between("bar", centres[i], tips[i], 0.12 * self.radius, dark) for i in nodes]
+        return [*striped((self.s, centres, frames), self.setting.section, self.radius, (color, dark), 12), *teeth]
 
-    def _tube(self, centres: Floats, frames: Floats, color: ArrayLike, order: int) -> PolyCollection:
-        """Rod with a stripe along d1."""
-        surface = centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], self.profile)
-        surface = surface @ self.view.T
-        corners = np.stack([surface[:-1, :-1], surface[1:, :-1], surface[1:, 1:], surface[:-1, 1:]], axis=2)
-        across = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 1] - corners[:, :, 3])
-        base = np.tile(np.array(to_rgb(color)), (*across.shape[:2], 1))
-        base[:, 0] *= 0.35  # the stripe
-        return self._facets(corners.reshape(-1, 4, 3), across.reshape(-1, 3), base.reshape(-1, 3), order)
-
-    def _facets(self, corners: Floats, across: Floats, colors: Floats, order: float) -> PolyCollection:
-        """Facets (n, k, 3) that face the viewer, far ones first, lit from above; ``across`` is their normal (n, 3)."""
+    def _show(self, solids: Sequence[Solid | Glyph], order: float) -> PolyCollection:
+        """Show the triangles of solids that face the viewer, far ones first, lit from above."""
+        corners = np.concatenate([np.empty((0, 3, 3)), *(x.points[x.triangles] for x in solids)]) @ self.look.axes.T
+        colors = np.concatenate([np.empty((0, 3)), *(np.tile(to_rgb(x.color), (len(x.triangles), 1)) for x in solids)])
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), TINY)
         light = 0.55 + 0.45 * np.clip(across @ np.array([-0.25, 0.75, 0.6]), 0, 1)
         near = np.argsort(corners[:, :, 2].mean(axis=1))
         near = near[across[near, 2] > 0]
-        shades = np.clip(colors * light[:, None], 0, 1)[near]
+        shades = (colors * light[:, None])[near]
         drawn = PolyCollection(corners[near, :, :2], facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=order)
-        self.axes.add_collection(drawn)
-        return drawn
-
-    def _triad(self) -> None:
-        """The directions e1, e2, e3, in the lower left corner; directions that look alike share a label."""
-        size = 0.07 * np.ptp(self.limits[0])
-        corner = self.limits[:, 0] + 1.6 * size
-        labels: list[tuple[Floats, list[str]]] = []
-        for i, axis in enumerate(self.view[:2].T):
-            self.axes.plot(*np.stack([corner, corner + size * axis], axis=1), color="0.45", lw=1.2, zorder=3)
-            if np.linalg.norm(axis) > 0.5:
-                place = next((names for at, names in labels if np.linalg.norm(at - axis) < 0.5), None)
-                if place is None:
-                    labels.append((axis, place := []))
-                place.append(f"e{i + 1}")
-        for axis, names in labels:
-            self.axes.text(*(corner + 1.5 * size * axis), ", ".join(names), fontsize=10, color="0.35", ha="center",
-                           va="center", zorder=3)  # fmt: skip
+        return self.axes.add_collection(drawn, autolim=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.file_format import STATES, UNREADABLE
-from rodfem.output.glyphs import DARK, LOAD, glyphs_of
+from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Solid, curve_of, profile_of, rod
-from rodfem.output.view import axis_of, on_feet, view_of
+from rodfem.output.solids import Glyph, Solid, curve_of, striped
+from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE
+from rodfem.output.view import axes_of, thickness
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.whole_files import draft_of
@@ -28,7 +30,6 @@ __all__ = ["draw_shape", "draw_shape_safely", "main"]
 
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the caption
-ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
@@ -47,35 +48,21 @@ def draw_shape(
 
     Parameters
     ----------
-    states
-        The file ``states.h5``; lengths in it are nondimensional.
-    branch, row
-        Name of the branch, and row of the state in it, counted from 0.
+    states, branch, row
+        The file ``states.h5``, the name of the branch, and the row of the state in it, counted from 0.
     path
-        Picture to write; the suffix decides the format (.png, .jpg, .bmp, .tif).
+        Picture to write, and to return; its folder is created.  The suffix decides the format (.png, .jpg, .bmp, .tif).
     caption
         Line at the foot of the picture: scene, branch and load when None, nothing when empty.
     radius
-        Mean radius of the rod, nondimensional; about 1/90 of its length when None.
+        Mean radius of the rod; that of :func:`rodfem.output.view.thickness` when None.
     size
         Width and height of the picture in pixels; words keep theirs, so that a smaller picture has larger ones.
     view
         Axes of the picture as rows (3, 3), as :func:`view_in` gives them; those of this state when None.
 
-    Returns
-    -------
-    path
-        The picture written; its folder is created where it is missing.
-
-    Raises
-    ------
-    ValueError
-        If the file, the branch or the row does not exist, an argument has no meaning, or (:class:`InputError`) the
-        file has another or a newer format.
-    ImportError
-        If PyVista or one of the libraries it needs is missing.
-    RuntimeError
-        If the picture comes out blank.
+    Raises :class:`ValueError` where there is no such state or an argument has no meaning, :class:`ImportError` where
+    PyVista or a library that it needs is missing, and :class:`RuntimeError` where the picture comes out blank.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -83,47 +70,32 @@ def draw_shape(
     if radius is not None and not 0.0 < radius < float("inf"):
         raise ValueError(f"radius={radius} is not positive: expected a length, try 0.01 or leave it out")
     state = _read(Path(states), branch, row)
-    thickness = radius or state.thickness()
-    view = state.view() if view is None else view
+    look = Look(radius or thickness(state.centres), state.view() if view is None else view)
     pyvista = _import_pyvista()
     plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
     plotter.set_background("white")
-    solids = state.solids(thickness, view)
+    solids = state.solids(look)
     for solid in solids:
-        _add(pyvista, plotter, solid)
-    _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
+        surface = pyvista.PolyData.from_regular_faces(solid.points, solid.triangles)
+        plotter.add_mesh(surface, color=solid.color, split_sharp_edges=True, feature_angle=40.0, **STYLE)
+    _add_directors(pyvista, plotter, state, look.radius)
     points = np.concatenate([solid.points for solid in solids])
-    _look(plotter, points, view, 5.0 * thickness, size)
+    _look_at(plotter, points, look, size)
     plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", color=DARK, x_color=DARK, y_color=DARK, z_color=DARK)
     loaded = any(solid.color == LOAD for solid in solids)
-    text = state.caption if caption is None else caption
-    _write(plotter, [*_labels(text, loaded, size), *_notes(state)], size)
+    _write(plotter, state.caption if caption is None else caption, state.setting.notes, loaded)
     return _shoot(plotter, path)
 
 
-Label = tuple[str, float, float, str]
-"""Words, their place in shares of the picture, from its lower left corner, and their colour."""
-
-
-def _labels(caption: str, loaded: bool, size: tuple[int, int]) -> list[Label]:
-    """The line at the foot, and the names of what has its colour."""
-    top = 1.0 - 70.0 / size[1]
-    labels = [(caption, 0.5, 0.03, "black"), ("d₁", 1.0 - 104.0 / size[0], top, FIRST)]
-    labels += [("d₂", 1.0 - 48.0 / size[0], top, SECOND)]
-    return labels + ([("load", 1.0 - 184.0 / size[0], top, LOAD)] if loaded else [])
-
-
-def _notes(state: State) -> list[Label]:
-    """What of a state is not drawn."""
-    notes = state.setting.notes
-    return [("not drawn: " + ", ".join(notes), 0.5, 0.095, DARK)] if notes else []
-
-
-def _write(plotter: Any, labels: Sequence[Label], size: tuple[int, int]) -> None:
-    """Write labels, each in one line that fits the picture."""
+def _write(plotter: Any, caption: str, notes: Sequence[str], loaded: bool) -> None:
+    """Write the line at the foot, what is not drawn above it, and the names of what has its colour."""
     font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
-    for label, x, y, colour in filter(lambda item: item[0], labels):
-        style = {"font_size": min(20, int(0.875 * size[0]) // len(label)), "color": colour, "font_file": font}
+    width, height = plotter.window_size
+    labels = [(caption, 0.5, 0.03, "black"), (f"not drawn: {', '.join(notes)}" if notes else "", 0.5, 0.095, DARK)]
+    names = [("load" if loaded else "", 184, LOAD), ("d₁", 104, FIRST), ("d₂", 48, SECOND)]
+    labels += [(name, 1.0 - right / width, 1.0 - 70.0 / height, colour) for name, right, colour in names]
+    for label, x, y, colour in (label for label in labels if label[0]):
+        style = {"font_size": min(20, int(0.875 * width) // len(label)), "color": colour, "font_file": font}
         actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
         actor.GetTextProperty().SetJustificationToCentered()
 
@@ -148,16 +120,9 @@ def view_in(states: Path, branch: str, row: int) -> Floats:
 class State:
     """A state as a picture needs it, at n places along the rod.
 
-    Attributes
-    ----------
-    s, centres, directors
-        Arclengths (n,), centreline (n, 3), and rotations (n, 3, 3) with columns d1, d2, d3.
-    reference
-        Centreline (n, 3) of the state that it has left: of the first branch, at the nearest load.
-    setting
-        What holds and loads the rod.
-    caption
-        Scene, branch and load.
+    Arclengths ``s`` (n,), centreline ``centres`` (n, 3), and ``directors`` (n, 3, 3) as columns; ``reference`` is the
+    centreline (n, 3) of the state that it has left, of the first branch at the nearest load, ``setting`` what holds and
+    loads the rod, and ``caption`` has scene, branch and load.
     """
 
     s: Floats
@@ -169,24 +134,13 @@ class State:
 
     def view(self) -> Floats:
         """Axes of the picture, (3, 3)."""
-        held, moved = self.setting, self.centres - self.reference
-        axis, side, feet = axis_of(held, self.reference), held.widest(self.directors[0]), on_feet(held)
-        return view_of(self.reference, moved, axis=axis, down=held.down, load=held.force, side=side, feet=feet)
+        return axes_of(self.setting, self.reference, self.centres - self.reference, self.directors[0])
 
-    def thickness(self) -> float:
-        """Mean radius with which the rod is drawn."""
-        length = np.linalg.norm(np.diff(self.centres, axis=0), axis=1).sum()
-        return float(min(length / 90.0, np.linalg.norm(np.ptp(self.centres, axis=0)) / 40.0))
-
-    def solids(self, radius: float, view: Floats) -> list[Solid]:
+    def solids(self, look: Look) -> list[Solid | Glyph]:
         """The rod, its stripe, what holds it and what loads it."""
-        around = [np.linspace(-np.pi, np.pi, 49)[:-1], np.linspace(-0.3, 0.3, 9)]
-        profiles = [radius * profile_of(self.s, self.setting.section, angles) for angles in around]
-        out = [
-            rod(self.centres, self.directors, profiles[0], ROD),
-            rod(self.centres, self.directors, 1.02 * profiles[1], STRIPE),
-        ]
-        return out + glyphs_of(self.setting, self.s, self.centres, self.directors, radius, view)
+        pose = self.centres, self.directors
+        rods = striped((self.s, *pose), self.setting.section, look.radius, (ROD, STRIPE))
+        return [*rods, *glyphs_of(self.setting, self.s, pose, look)]
 
 
 def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
@@ -224,7 +178,8 @@ def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
     at = np.linspace(s[0], s[-1], count)
     if not np.isfinite(r).all() or not np.ptp(r, axis=0).any():
         raise ValueError("the centreline is a point, or not finite")
-    return at, *curve_of(s, r, q, at)
+    centres, turned = curve_of(s, r, q, at)
+    return at, centres, directors(turned)
 
 
 def _import_pyvista() -> Any:
@@ -243,45 +198,26 @@ def _import_pyvista() -> Any:
 STYLE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
 
 
-def _add(pyvista: Any, plotter: Any, solid: Solid) -> None:
-    """Add a solid, smooth but for its edges."""
-    faces = np.column_stack([np.full(len(solid.triangles), 3), solid.triangles]).ravel()
-    surface = pyvista.PolyData(solid.points, faces)
-    surface = surface.compute_normals(feature_angle=40.0, split_vertices=True, auto_orient_normals=False)
-    plotter.add_mesh(surface, color=solid.color, **STYLE)
-
-
-def _add_directors(pyvista: Any, plotter: Any, centres: Floats, directors: Floats, radius: float) -> None:
+def _add_directors(pyvista: Any, plotter: Any, state: State, radius: float) -> None:
     """Add arrows along d1 and d2."""
-    stations = np.linspace(0, len(centres) - 1, 27).round().astype(int)[1:-1]
+    stations = np.linspace(0, len(state.s) - 1, 27).round().astype(int)[1:-1]
     geometry = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
     for index, colour in ((0, FIRST), (1, SECOND)):
-        points = pyvista.PolyData(centres[stations])
-        points["director"] = directors[stations, :, index]
+        points = pyvista.PolyData(state.centres[stations])
+        points["director"] = state.directors[stations, :, index]
         arrows = points.glyph(orient="director", scale=False, factor=4.5 * radius, geom=geometry)
         plotter.add_mesh(arrows, color=colour, **STYLE)
 
 
-def _look(plotter: Any, points: Floats, view: Floats, margin: float, size: tuple[int, int]) -> None:
-    """Set a camera without perspective that sees all points (n, 3), above the caption.
-
-    Parameters
-    ----------
-    plotter
-        Whose camera it is.
-    points, view
-        All that is to be seen, and the axes of the picture (3, 3).
-    margin
-        Length that is kept free around them.
-    size
-        Width and height of the picture in pixels.
-    """
-    seen, aspect = points @ view.T, size[0] / size[1]
-    low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
+def _look_at(plotter: Any, points: Floats, look: Look, size: tuple[int, int]) -> None:
+    """Set a camera without perspective that sees all points (n, 3), above the caption, in a picture of a ``size``."""
+    axes, aspect = look.axes, size[0] / size[1]
+    seen = points @ axes.T
+    low, high = seen.min(axis=0) - 5.0 * look.radius, seen.max(axis=0) + 5.0 * look.radius
     middle, half = (low + high) / 2, (high - low) / 2
     scale = max(half[1] / ROOM, half[0] / aspect)
-    focus = (middle - (0.0, (1.0 - ROOM) / 2 * scale, 0.0)) @ view  # the caption's line is below
-    plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * view[2]), tuple(focus), tuple(view[1])]
+    focus = (middle - (0.0, (1.0 - ROOM) / 2 * scale, 0.0)) @ axes  # the caption's line is below
+    plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * axes[2]), tuple(focus), tuple(axes[1])]
     plotter.camera.enable_parallel_projection()
     plotter.camera.parallel_scale = scale
     plotter.renderer.ResetCameraClippingRange()
@@ -292,19 +228,9 @@ def draw_shape_safely(
 ) -> str | None:
     """Draw as `draw_shape` does, but in a process of its own, which may crash without harm.
 
-    ``states``, ``branch``, ``row``, ``path`` and ``options`` are as there.
-
-    Parameters
-    ----------
-    states, branch, row, path, **options
-        As for `draw_shape`; the options are caption and radius.
-    limit
-        Time that drawing may take, in seconds.
-
-    Returns
-    -------
-    trouble
-        None where the picture was written, else a sentence that says what failed and what to do.
+    ``states``, ``branch``, ``row`` and ``path`` are as there, ``options`` are caption and radius, ``limit`` is the time
+    in seconds that it may take.  Returns None where the picture was written, else a sentence that says what failed and
+    what to do.
     """
     command = [sys.executable, "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
     command += [f"--{key}={value}" for key, value in {"output": path, **options}.items() if value is not None]

@@ -56,15 +56,14 @@ def snapshot(
     comm = solvers[0].system.comm
     with TemporaryDirectory() as folder:
         states, picture = Path(folder) / "states.h5", Path(folder) / "shape.png"
-        home = next((b.name for b in branches if any(p is point for p in b.points)), "state")
-        first = branches[0]
+        homes = {id(p): (b.name, i) for b in reversed(branches) for i, p in enumerate(b.points)}
+        (name, row), first, png = homes.get(id(point), ("state", 0)), branches[0], b""
         save_states(replace(first, special=[]), solvers, states, first=True)
-        row = next((i for i, p in enumerate(first.points) if p is point), -1)
-        if row < 0:
-            save_states(Branch(home, None, 0, [point]), solvers, states, first=False)
-        png = b""
+        if name != first.name:
+            save_states(Branch(name, None, 0, [point]), solvers, states, first=False)
+            row = 0
         if comm.rank == 0:
-            draw_shape(states, first.name if row >= 0 else home, max(row, 0), picture, caption=caption)
+            draw_shape(states, name, row, picture, caption=caption)
             png = picture.read_bytes()
     found = Snapshot(png)
     if path is not None and comm.rank == 0:

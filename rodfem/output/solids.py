@@ -1,17 +1,20 @@
-"""Solids for pictures: surfaces of triangles, swept along a path by a cross-section that may change on the way.
+"""Bodies of pictures: surfaces of triangles, each placed by an affine map.
 
-All are made by :func:`loft` from closed rings of points: boxes, cylinders, cones, balls, coils, arrows and rods alike.
+A picture has few bodies (a box, a ball, a coil, an arrow) at many places.  A glyph is a body, a colour and the map that
+places it.  So a support that moves with its state is the same body elsewhere, and a spring that is stretched is a coil
+whose map is stretched along its axis.  All bodies are lofts through closed rings of points.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from rodfem.problem.quaternions import directors
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
 Floats = NDArray[np.float64]
@@ -19,10 +22,14 @@ Floats = NDArray[np.float64]
 FLATTEST = 7.0
 """Greatest proportion of the sides of a rod's cross-section that is drawn."""
 SIDES = 24
+"""Corners of a round cross-section."""
+WIRE = 0.22
+"""Radius of the wire of a spring, in radii of the rod."""
+COILS = {"coil": (6, 1.5, 11.0), "small coil": (4, 0.9, 7.0)}
+"""Turns of a spring, their radius, and its length at rest, in radii of the rod."""
 
 
-@dataclass(frozen=True)
-class Solid:
+class Solid(NamedTuple):
     """Corners ``points`` (n, 3), ``triangles`` (k, 3) of their numbers, and a colour."""
 
     points: Floats
@@ -30,7 +37,77 @@ class Solid:
     color: str
 
 
-def loft(rings: Floats, color: str) -> Solid:
+class Glyph(NamedTuple):
+    """A ``body`` of :func:`body_of` in a colour, where the ``map`` (4, 3) places it: ``(x, 1) @ map``."""
+
+    body: str
+    color: str
+    map: Floats
+
+    @property
+    def points(self) -> Floats:
+        """Corners (n, 3)."""
+        return body_of(self.body)[0] @ self.map[:3] + self.map[3]
+
+    @property
+    def triangles(self) -> NDArray[np.int64]:
+        """Numbers of the corners of each triangle (k, 3)."""
+        return body_of(self.body)[1]
+
+
+@cache
+def body_of(name: str) -> tuple[Floats, NDArray[np.int64]]:
+    """Corners and triangles of a body.
+
+    ``box`` and ``wedge`` have half sides of one, ``ball`` the radius one.  ``bar`` and ``arrow`` go from zero to one
+    along z, with radii of one for the bar and the arrow's shaft.  ``coil`` and ``small coil`` go so, too, with x and y
+    in radii of the rod.  ``spiral`` lies in the plane of x and y, and ``turn`` is an arrow three quarters of the way
+    about z, whose radius is one, and whose head is at x.
+    """
+    if name in ("box", "wedge"):
+        top = 0.22 if name == "wedge" else 1.0
+        corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+        return _loft(np.array([np.column_stack([size * corners, np.full(4, z)]) for size, z in ((1, -1), (top, 1))]))
+    if name == "ball":
+        angle = np.linspace(0, np.pi, 13)
+        return _swept(np.outer(-np.cos(angle), (0, 0, 1)), np.sin(angle))
+    if name == "bar":
+        return _swept(np.outer((0.0, 1.0), (0, 0, 1)), 1.0)
+    if name == "arrow":
+        return _swept(np.outer((0, 0.76, 0.76, 1), (0, 0, 1)), np.array([1, 1, 2.6, 0]))
+    if name == "spiral":
+        angle = np.linspace(0, 5 * np.pi, 120)
+        return _swept(_ring(np.linspace(1.6, 3.4, 120), angle, 0 * angle), WIRE)
+    if name == "turn":
+        angle = np.append(np.linspace(-1.6 * np.pi, -0.585, 40), 0.0) + 0.29
+        path, radii = _ring(1.0, angle, 0.5 + 0.6 * angle / np.pi), np.full(42, 0.09)
+        radii[-2:] = 2.6 * 0.09, 0.0
+        return _swept(np.insert(path, 40, path[39], axis=0), radii)
+    turns, wide, length = COILS[name]
+    t = np.linspace(0, 1, 24 * turns + 1)
+    winding = _ring(wide * np.minimum(1, 8 * np.minimum(t, 1 - t)), 2 * np.pi * turns * t, length * (0.1 + 0.8 * t))
+    points, triangles = _swept(np.vstack([np.zeros(3), winding, (0, 0, length)]), WIRE, sides=10)
+    return points / (1, 1, length), triangles
+
+
+def _ring(radius: ArrayLike, angle: Floats, height: Floats) -> Floats:
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+
+
+def _swept(path: Floats, radii: ArrayLike, sides: int = SIDES) -> tuple[Floats, NDArray[np.int64]]:
+    """Round solid along a ``path`` (n, 3) of ``radii`` (n,); a point may be repeated, with another radius."""
+    tangents = np.gradient(path.astype(float), axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    normal, angles, rings = across(tangents[0]), 2 * np.pi * np.arange(sides) / sides, []
+    for point, tangent, radius in zip(path, tangents, np.broadcast_to(radii, len(path)), strict=True):
+        normal = normal - (normal @ tangent) * tangent  # carried along without twist
+        normal = normal / np.linalg.norm(normal)
+        around = np.outer(np.cos(angles), normal) + np.outer(np.sin(angles), np.cross(tangent, normal))
+        rings.append(point + radius * around)
+    return _loft(np.array(rings))
+
+
+def _loft(rings: Floats) -> tuple[Floats, NDArray[np.int64]]:
     """Surface through n closed rings of k points, (n, k, 3), with flat lids."""
     n, k = rings.shape[:2]
     i, j = (x.ravel() for x in np.indices((n - 1, k)))
@@ -44,37 +121,36 @@ def loft(rings: Floats, color: str) -> Solid:
     triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1), *lids])
     corners = points[triangles]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return Solid(points, triangles[area > NEGLIGIBLE * max(area.max(), TINY)], color)
+    return points, triangles[area > NEGLIGIBLE * max(area.max(), TINY)]
 
 
-def sweep(path: ArrayLike, radii: ArrayLike, color: str, sides: int = SIDES) -> Solid:
-    """Round solid along a ``path`` (n, 3) of ``radii`` (n,); a point may be repeated, with another radius.
+def glyph(body: str, color: str, at: Floats, axes: ArrayLike) -> Glyph:
+    """A ``body`` of a ``color`` ``at`` a place (3,), whose directions x, y, z become the rows of ``axes`` (3, 3)."""
+    return Glyph(body, color, np.vstack([axes, at]))
 
-    It has ``sides`` faces around, of one ``color``.
+
+def ball(at: Floats, radius: float, color: str) -> Glyph:
+    """Ball about a place (3,)."""
+    return glyph("ball", color, at, radius * np.eye(3))
+
+
+def between(body: str, start: Floats, end: Floats, radius: float, color: str) -> Glyph:
+    """A ``body`` of a ``color`` along z, from ``start`` (3,) to ``end`` (3,), with this ``radius``."""
+    a = across(end - start)
+    b = np.cross(end - start, a)
+    return glyph(body, color, start, [radius * a, radius * b / np.linalg.norm(b), end - start])
+
+
+def turn(centre: Floats, axis: Floats, size: float, front: Floats, color: str) -> Glyph:
+    """Arrow of a ``color`` about an ``axis`` (3,), in the sense of a moment along it.
+
+    It winds along the axis a little, so that it is seen from all sides.  Its head is in the direction ``front``,
+    ``centre`` (3,) is its own, ``size`` the radius of the arc.
     """
-    path = np.asarray(path, dtype=float)
-    radii = np.broadcast_to(np.asarray(radii, dtype=float), len(path))
-    tangents = np.gradient(path, axis=0)
-    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    normal = across(tangents[0])
-    angles = 2 * np.pi * np.arange(sides) / sides
-    rings = []
-    for point, tangent, radius in zip(path, tangents, radii, strict=True):
-        normal = normal - (normal @ tangent) * tangent  # carried along without twist
-        normal = normal / np.linalg.norm(normal)
-        other = np.cross(tangent, normal)
-        rings.append(point + radius * (np.outer(np.cos(angles), normal) + np.outer(np.sin(angles), other)))
-    return loft(np.array(rings), color)
-
-
-def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Centreline (n, 3) and directors (n, 3, 3) at arclengths ``at`` (n,) of a state, by splines through its nodes.
-
-    The nodes are at ``s`` (m,), with positions ``r`` (m, 3) and quaternions ``q`` (m, 4) of any length and sign.
-    """
-    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
-    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
-    return CubicSpline(s, r)(at), directors(CubicSpline(s, q * signs[:, None])(at))
+    axis = axis / np.linalg.norm(axis)
+    a = front - (front @ axis) * axis
+    a = across(axis) if np.linalg.norm(a) < 0.1 else a / np.linalg.norm(a)
+    return glyph("turn", color, centre, size * np.array([a, np.cross(axis, a), axis]))
 
 
 def across(direction: Floats) -> Floats:
@@ -83,79 +159,42 @@ def across(direction: Floats) -> Floats:
     return np.asarray(out / np.linalg.norm(out))
 
 
-def box(centre: Floats, frame: Floats, half: ArrayLike, color: str, top: float = 1.0) -> Solid:
-    """Box about ``centre`` (3,) of sizes 2 ``half`` (3,) along the columns of ``frame`` (3, 3), of one ``color``.
+def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
+    """Centreline (n, 3) and unit quaternions (n, 4) at arclengths ``at`` (n,) of a state, by splines through its nodes.
 
-    ``top`` scales the sides of one end.
+    The nodes are at ``s`` (m,), with positions ``r`` (m, 3) and quaternions ``q`` (m, 4) of any length and sign.
     """
-    a, b, c = np.asarray(half, dtype=float)
-    corners = np.array([(a, b), (-a, b), (-a, -b), (a, -b)])
-    rings = [np.column_stack([size * corners, np.full(4, z)]) for size, z in ((1.0, -c), (top, c))]
-    return loft(centre + np.array(rings) @ frame.T, color)
-
-
-def ball(centre: Floats, radius: float, color: str) -> Solid:
-    """Ball about a centre (3,)."""
-    angle = np.linspace(0, np.pi, 13)
-    path = centre - radius * np.outer(np.cos(angle), (0.0, 0.0, 1.0))
-    return sweep(path, radius * np.sin(angle), color)
-
-
-def coil(start: Floats, end: Floats, radius: float, wire: float, turns: int, color: str) -> Solid:
-    """Spring from a point to another, with straight ends.
-
-    From ``start`` (3,) to ``end`` (3,) there are so many ``turns`` of the ``radius``, of a wire of radius ``wire``;
-    ``color`` is its colour.
-    """
-    direction = end - start
-    a = across(direction)
-    b = np.cross(direction / np.linalg.norm(direction), a)
-    t = np.linspace(0, 1, 24 * turns + 1)
-    angle, size = 2 * np.pi * turns * t, radius * np.minimum(1.0, 8 * np.minimum(t, 1 - t))
-    along = start + np.outer(0.1 + 0.8 * t, direction)
-    winding = along + (size * np.cos(angle))[:, None] * a + (size * np.sin(angle))[:, None] * b
-    return sweep(np.concatenate([[start], winding, [end]]), wire, color, sides=10)
-
-
-def arrow(path: ArrayLike, radius: float, color: str) -> Solid:
-    """Arrow along a path (n, 3), whose head, of 5 radii, begins at the path's last but one point."""
-    path = np.asarray(path, dtype=float)
-    radii = np.full(len(path) + 1, radius)
-    radii[-2:] = 2.6 * radius, 0.0
-    return sweep(np.concatenate([path[:-1], path[-2:-1], path[-1:]]), radii, color)
-
-
-def straight_arrow(start: Floats, end: Floats, radius: float, color: str) -> Solid:
-    """Arrow from ``start`` (3,) to ``end`` (3,), with a shaft of this ``radius``, of one ``color``."""
-    size = float(np.linalg.norm(end - start))
-    neck = end - min(6.5 * radius / size, 0.7) * (end - start)
-    return arrow([start, neck, end], radius, color)
-
-
-def round_arrow(centre: Floats, axis: Floats, size: float, radius: float, color: str, front: Floats) -> Solid:
-    """Arrow three quarters of the way about an axis (3,), in the sense of a moment along it.
-
-    It winds along the axis a little, and its head is in the direction ``front``, so that it is seen from all sides.
-    ``centre`` (3,) and ``axis`` (3,) are its own, ``size`` is the radius of the arc, ``radius`` that of the shaft,
-    ``color`` its colour.
-    """
-    axis = axis / np.linalg.norm(axis)
-    a = front - (front @ axis) * axis
-    a = across(axis) if np.linalg.norm(a) < 0.1 else a / np.linalg.norm(a)
-    b = np.cross(axis, a)
-    head = min(6.5 * radius / size, 1.2)
-    angle = np.append(np.linspace(-1.6 * np.pi, -head, 40), 0.0) + head / 2
-    along = np.outer(size * (0.5 + 0.6 * angle / np.pi), axis)
-    return arrow(centre + size * (np.outer(np.cos(angle), a) + np.outer(np.sin(angle), b)) + along, radius, color)
+    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
+    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
+    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
+    return CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 
 def rod(centres: Floats, frames: Floats, profile: Floats, color: str) -> Solid:
     """Rod with the cross-sections of :func:`profile_of`, (n, k, 2), in the planes of d1 and d2 of ``frames``.
 
-    ``centres`` (n, 3) and ``frames`` (n, 3, 3) are those of the cross-sections, ``profile`` their outlines, ``color``
-    its colour.
+    ``centres`` (n, 3) and ``frames`` (n, 3, 3) are those of the cross-sections, ``profile`` their outlines;
+    ``color`` is its colour.
     """
-    return loft(centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], profile), color)
+    return Solid(*_loft(centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], profile)), color)
+
+
+def striped(
+    pose: tuple[Floats, Floats, Floats],
+    section: tuple[Floats, Floats] | None,
+    radius: float,
+    colors: Sequence[str],
+    sides: int = 2 * SIDES,
+) -> list[Solid]:
+    """A rod of a mean ``radius`` with a stripe along d1, in its ``pose``.
+
+    That has arclengths (n,), centreline (n, 3) and directors (n, 3, 3); ``section`` is that of :func:`profile_of`,
+    ``colors`` are those of the rod, of so many ``sides``, and of the stripe.
+    """
+    s, centres, frames = pose
+    around = (1.0, np.linspace(-np.pi, np.pi, sides + 1)[:-1]), (1.02, np.linspace(-0.3, 0.3, sides // 6 + 1))
+    outlines = [size * radius * profile_of(s, section, angles) for size, angles in around]
+    return [rod(centres, frames, outline, color) for outline, color in zip(outlines, colors, strict=True)]
 
 
 def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats) -> Floats:

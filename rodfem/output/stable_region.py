@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,76 +30,45 @@ class StableRegion(NamedTuple):
 def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> StableRegion | None:
     """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
 
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus; its stable side is that on which its index is zero.
-    loci
-        Those of all loci of the plane, ``one`` among them.
-
-    Returns
-    -------
-    region
-        None where neither side is stable all along the locus, as where another one crosses it, where it is not known
-        which side is, or where the locus has more than one load at a value of the second parameter.
+    ``one`` is the file of the locus, whose stable side is that on which its index is zero, and ``loci`` are all of the
+    plane.  None where neither side is stable all along the locus, as where another one crosses it, where it is not
+    known which side is, or where the locus has more than one load at a value of the second parameter.
     """
-    columns, (load, other) = one["columns"], one["parameters"]
-    x, y = (np.asarray(columns[name], dtype=float) for name in (other, load))
-    side, low = one.get("lower"), [pair[0] for pair in columns["index"]]
-    steps = np.diff(x)
-    if passed(one).any() or not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
+    x, y = _curve(one)
+    side, crossed = one.get("lower"), CROSSES in [mark["kind"] for mark in one["marks"]]
+    monotone = len(x) > 1 and abs(np.sign(np.diff(x)).sum()) == len(x) - 1
+    if crossed or not side or not monotone or any(next(zip(*one["columns"]["index"], strict=True))):
         return None
     order = np.argsort(x)
     grid = np.linspace(x.min(), x.max(), COUNT)
     edge = np.interp(grid, x[order], y[order])
     end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
-    for another in loci:
-        for level in _levels(another, grid) if another is not one else ():
-            between = side * (level - edge) > 0
-            end = np.where(between & (side * (level - end) < 0), level, end)
+    others = (_levels(another, grid) for another in loci if another is not one)
+    for level in chain.from_iterable(others):
+        nearer = (side * (level - edge) > 0) & (side * (level - end) < 0)
+        end = np.where(nearer, level, end)
     return StableRegion(grid, edge, end)
 
 
-def plane_of(one: Mapping[str, Any]) -> str:
-    """What is to be said after ``stable`` or ``index`` of a locus: :data:`IN_PLANE`, or nothing.
+def _curve(one: Mapping[str, Any]) -> tuple[Floats, Floats]:
+    """Second parameter and load of all rows of a locus."""
+    x, y = (np.asarray(one["columns"][name], dtype=float) for name in reversed(one["parameters"]))
+    return x, y
 
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus.
-    """
+
+def plane_of(one: Mapping[str, Any]) -> str:
+    """What is to be said after ``stable`` or ``index`` of a locus: :data:`IN_PLANE`, or nothing."""
     return IN_PLANE if one.get("planar") else ""
 
 
 def in_words(one: Mapping[str, Any]) -> str:
-    """What the region of a locus is, for legends.
-
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus.
-    """
+    """What the region of a locus is, for legends."""
     return f"stable{plane_of(one)}, as far as these curves tell"
-
-
-def passed(one: Mapping[str, Any]) -> NDArray[np.int_]:
-    """Number of curves that cross a locus between its start and each row, (rows,): at each the two sides change places.
-
-    Parameters
-    ----------
-    one
-        Contents of the file of the locus.
-    """
-    rows, start = np.arange(len(one["columns"]["index"])), one["start"]
-    beyond = [mark["row"] for mark in one["marks"] if mark["kind"] == CROSSES]
-    return np.array([sum(start < at <= row or row <= at < start for at in beyond) for row in rows], dtype=int)
 
 
 def _levels(one: Mapping[str, Any], grid: Floats) -> list[Floats]:
     """Loads (len(grid),) at which each segment of a locus has these values of the second parameter; nan where none."""
-    load, other = one["parameters"]
-    x, y = (np.asarray(one["columns"][name], dtype=float) for name in (other, load))
-    found = []
+    (x, y), found = _curve(one), []
     for i in np.flatnonzero(np.diff(x) != 0):
         share = (grid - x[i]) / (x[i + 1] - x[i])
         found.append(np.where((share >= 0) & (share <= 1), y[i] + share * (y[i + 1] - y[i]), np.nan))

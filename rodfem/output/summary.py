@@ -12,9 +12,9 @@ from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
-from rodfem.output.endings import MEETS
-from rodfem.output.intervals import Interval, changes_at, coexisting, intervals_of, stable_ones, without_stable
-from rodfem.output.plot_pieces import PLANAR, STABLE, UNDECIDED
+from rodfem.output.intervals import Interval, changes_at, coexisting, intervals_in, intervals_of, without_stable
+from rodfem.output.pieces import MEETS, PLANAR, STABLE, UNDECIDED
+from rodfem.output.words import is_sweep, many
 
 MOST_INTERVALS, MOST_NAMES = 6, 6
 """Intervals of a branch that are told one by one, and branches that are named in one sentence."""
@@ -39,45 +39,50 @@ UNRESOLVED = ", as far as this mesh tells: it does not resolve that state"
 def in_sentences(data: Mapping[str, Any]) -> list[str]:
     """Sentences on a diagram, the contents of ``diagram.json``: its branches, ranges of stability, open questions."""
     first, *others = data["branches"]
-    told = [x for x in others if {i.kind for i in intervals_of(x)} & {STABLE, PLANAR, UNDECIDED}]
-    quiet = [x for x in others if x not in told and intervals_of(x)]
-    out = [_of_branch(first, data), *(_of_branch(branch, data) for branch in told[:MOST_NAMES])]
+    told = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
+    quiet = [branch for branch in others if branch not in told and _kinds(branch)]
+    out = [_of_branch(branch, data) for branch in (first, *told[:MOST_NAMES])]
     if more := told[MOST_NAMES:]:
         out.append(f"{_names(more)} have stable states, too.")
     if quiet:
-        verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
-        out.append(f"{_names(quiet)} {verb} whole range.")
-    if not _is_sweep(data):
-        out += _ranges(data)
-    return out + list(_open(data))
+        out.append(
+            f"{_names(quiet)} {'is unstable on its' if len(quiet) == 1 else 'are unstable on their'} whole range."
+        )
+    return [*out, *([] if is_sweep(data) else _ranges(data)), *_open(data)]
+
+
+def _kinds(branch: Mapping[str, Any]) -> set[str]:
+    """Kinds of stability along a branch."""
+    return {interval.kind for interval in intervals_of(branch)}
 
 
 def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     """What is stable along a branch, what happens where that changes, and how it ends."""
-    intervals, load = intervals_of(branch), data["parameter"]
-    name = _subject(branch, data)
+    intervals, load, name = intervals_of(branch), data["parameter"], _subject(branch, data)
     if not intervals:
         return f"{name} has one state only; {_end(branch)}."
-    parts, told = [], intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
     start, stop = told_apart(intervals[0].loads[0], intervals[-1].loads[1], width=_width(data))
     if len(intervals) == 1:
         coarse = any(special.get("resolved") is False for special in branch["special"])
-        parts.append(
-            f"{name} is {_state(told[0], data)} on its whole range, from {load} = {start} to {stop}"
-            + UNRESOLVED * coarse
-        )
-    for number, (one, after) in enumerate(zip(told, intervals[1:], strict=False)):
+        state, doubt = _state(intervals[0], data), UNRESOLVED if coarse else ""
+        parts = [f"{name} is {state} on its whole range, from {load} = {start} to {stop}{doubt}"]
+    else:
+        (state, end), *others = _changes(intervals, data, stop)
+        parts = [f"{name} is {state} from {load} = {start} {end}", *(f"then {state} {end}" for state, end in others)]
+    return "; ".join(parts + ([] if branch["ended"] == "end of range" else [_end(branch)])) + "."
+
+
+def _changes(intervals: Sequence[Interval], data: Mapping[str, Any], stop: str) -> Iterator[tuple[str, str]]:
+    """States of intervals in order, each with what happens at its end; only the first of many."""
+    told = intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
+    for one, after in zip(told, intervals[1:], strict=False):
         where, what = change_in_words(one, after, data["branches"])
-        begin = f"{name} is {_state(one, data)} from {load} = {start}" if not number else f"then {_state(one, data)}"
-        parts.append(f"{begin} to {where}, where it {what}")
-    if 1 < len(intervals) == len(told):
-        parts.append(f"then {_state(told[-1], data)} to {stop}")
-    elif len(intervals) > len(told):
-        changes = _count(len(intervals) - 1 - len(told), "time", "times")
-        parts.append(f"then its stability changes {changes} more before {load} = {stop}")
-    if branch["ended"] != "end of range":
-        parts.append(_end(branch))
-    return "; ".join(parts) + "."
+        yield _state(one, data), f"to {where}, where it {what}"
+    if len(intervals) == len(told):
+        yield _state(told[-1], data), f"to {stop}"
+    else:
+        more = many(len(intervals) - 1 - len(told), "time")
+        yield "its stability", f"changes {more} more before {data['parameter']} = {stop}"
 
 
 def _end(branch: Mapping[str, Any]) -> str:
@@ -111,24 +116,25 @@ def _state(interval: Interval, data: Mapping[str, Any]) -> str:
     """Stability of an interval in words."""
     if interval.kind == STABLE:
         plane = " in its plane (not examined in space)" if data.get("planar") and interval.in_space is None else ""
-        return f"stable{plane}, by the frequencies found," if _is_sweep(data) else f"stable{plane}"
+        return f"stable{plane}, by the frequencies found," if is_sweep(data) else f"stable{plane}"
     if interval.kind == UNDECIDED:
         return f"of undecided stability ({interval.why})"
     if interval.kind == PLANAR:
         return f"stable in its plane but not in space (index {interval.in_space} at most)"
     index = f"{interval.least}" if interval.least == interval.most else f"{interval.least} to {interval.most}"
     many = "s"[: interval.most != 1]
-    return f"unstable ({index} eigenvalue{many})" if _is_sweep(data) else f"unstable (index {index})"
+    return f"unstable ({index} eigenvalue{many})" if is_sweep(data) else f"unstable (index {index})"
 
 
 def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
     """Ranges of the load without a stable state, and with several."""
-    load, stable = data["parameter"], stable_ones(data["branches"])
-    undecided = [x for branch in data["branches"] for x in intervals_of(branch) if x.kind == UNDECIDED]
-    low, high = sorted(data["range"])
-    for a, b in without_stable(stable, low, high):
+    if is_sweep(data):
+        return
+    load, stable = data["parameter"], intervals_in(data["branches"], STABLE)
+    undecided = [x.covers for x in intervals_in(data["branches"], UNDECIDED)]
+    for a, b in without_stable(stable, *sorted(data["range"])):
         first, last = told_apart(a, b, width=_width(data))
-        doubt = any(x.covers[0] < b and x.covers[1] > a for x in undecided)
+        doubt = any(low < b and high > a for low, high in undecided)
         but = ", but there are states of undecided stability" if doubt else ""
         yield f"From {load} = {first} to {last} no stable state was found{but}."
     pairs = list(coexisting(stable))
@@ -137,7 +143,7 @@ def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
         first, last = told_apart(a, b, width=_width(data))
         yield f"From {load} = {first} to {last} two stable states coexist, of {names}: hysteresis is possible."
     if more := pairs[MOST_NAMES:]:
-        yield f"So do {_count(len(more), 'further pair', 'further pairs')} of stable states at other loads."
+        yield f"So do {many(len(more), 'further pair')} of stable states at other loads."
 
 
 def _width(data: Mapping[str, Any]) -> float:
@@ -152,32 +158,35 @@ def _open(data: Mapping[str, Any]) -> Iterator[str]:
     if any(branch.get("singular_start") for branch in branches):
         yield "The first state is singular: what leaves it was not followed."
     if missed := data.get("branch_points_not_followed"):
-        yield f"{_count(missed, 'branch point was', 'branch points were')} not followed."
+        yield f"{many(missed, 'branch point was', 'branch points were')} not followed."
     if changes := sum(len(branch.get("unexplained") or ()) for branch in branches):
-        yield f"{_count(changes, 'change', 'changes')} of the index without a special point: see the warnings."
+        yield f"{many(changes, 'change')} of the index without a special point: see the warnings."
     if coarse := sum(special.get("resolved") is False for branch in branches for special in branch["special"]):
-        yield f"The mesh does not resolve {_count(coarse, 'special point', 'special points')}: use more elements."
+        yield f"The mesh does not resolve {many(coarse, 'special point')}: use more elements."
 
 
 def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple[str, str]:
     """Load at which two intervals of a branch meet, and what happens there."""
     branch, row = one.branch, one.last
-    found = changes_at(branch, row)
-    if found:
+    if found := changes_at(branch, row):
         return known_digits(found[0]), " and ".join(_event(special, branch, branches) for special in found)
     column, segment = branch["columns"]["load"], row if after.rank > one.rank else row - 1
     a, b = told_apart(column[segment], column[segment + 1])
-    where = f"some load between {a} and {b}"
-    if any(change["row"] == segment for change in branch.get("unexplained") or ()):
-        return where, "changes its index without a special point that says why"
+    unexplained = any(change["row"] == segment for change in branch.get("unexplained") or ())
+    what = "changes its index without a special point that says why" if unexplained else _change(one, after)
+    return f"some load between {a} and {b}", what
+
+
+def _change(one: Interval, after: Interval) -> str:
+    """What happens between two intervals where no special point is."""
     if one.kink or after.kink:
-        return where, f"comes to a kink of the {after.kink}" if after.kink else f"leaves a kink of the {one.kink}"
+        return f"comes to a kink of the {after.kink}" if after.kink else f"leaves a kink of the {one.kink}"
     if UNDECIDED in (one.kind, after.kind):
-        return where, "has an eigenvalue that is not told from zero on one side"
+        return "has an eigenvalue that is not told from zero on one side"
     verb = "loses" if one.kind == STABLE else "changes"
-    if one.in_space is None or after.in_space is None or (one.least, one.most) != (after.least, after.most):
-        return where, f"{verb} its stability, and no special point says why"
-    return where, f"{verb} its stability against motions out of the plane (without planar it is located)"
+    if None in (one.in_space, after.in_space) or (one.least, one.most) != (after.least, after.most):
+        return f"{verb} its stability, and no special point says why"
+    return f"{verb} its stability against motions out of the plane (without planar it is located)"
 
 
 def _event(special: Mapping[str, Any], branch: Mapping[str, Any], branches: Branches) -> str:
@@ -236,18 +245,9 @@ def known_digits(special: Mapping[str, Any]) -> str:
     return f"{load:.{digits}g}"
 
 
-def _count(number: int, one: str, many: str) -> str:
-    return f"{number} {one if number == 1 else many}"
-
-
 def _names(branches: Sequence[Mapping[str, Any]]) -> str:
     """Branches by name, or, where they are many, by number."""
     names = [called(branch["name"]) for branch in branches]
     if len(names) > MOST_NAMES:
         return f"{len(names)} other branches"
     return _named(" and ".join(filter(None, (", ".join(names[:-1]), names[-1]))))
-
-
-def _is_sweep(data: Mapping[str, Any]) -> bool:
-    """Whether stability is that of frequencies, under loads without a potential."""
-    return any("omega2" in branch["columns"] for branch in data["branches"])

@@ -17,22 +17,15 @@ from rodfem.problem.setting import HELD, TURNS, Setting
 
 Floats = NDArray[np.float64]
 
-TILT, STEEP = np.radians([20.0, 55.0])
-"""By which a picture is seen from above; that of a closed rod, to show what is across its plane."""
-ASIDE, ABOVE = np.radians([40.0, 35.0])
-"""By which a rod that bends and moves in different planes is seen from aside, and from above."""
-BESIDE = 0.87
-"""Cosine of a load and the motion below which their plane is not that of the picture."""
-NEAR = 0.9
-"""Cosine from which on a direction is taken for that of the nearest axis of space."""
-SIDEWAYS = 0.3
-"""Cosine of a rod's chord and the axis of its only support below which it leaves that sideways."""
-LEVEL = 0.1
-"""Cosine below which an axis of space is across a direction, for its sense."""
-ARCHED = 0.05
-"""Mean distance of a rod from the line of its ends, relative to its size, from which on it is an arch."""
-UNSEEN = 1e-3
-"""Displacement, or distance of the ends, relative to the rod's size, which a picture does not show."""
+TILT, STEEP, ABOVE, ASIDE = np.radians([20.0, 55.0, 35.0, 40.0])
+"""By which a picture is seen from above; that of a closed rod, to show what is across its plane; and by which a rod
+that bends and moves in different planes is seen from above, and from aside."""
+NEAR, SIDEWAYS, LEVEL = 0.9, 0.3, 0.1
+"""Cosines: from which on a direction is taken for that of the nearest axis of space, or a load for that of the motion;
+below which a chord leaves the axis of the rod's only support sideways; below which an axis of space is across."""
+ARCHED, UNSEEN = 0.05, 1e-3
+"""Mean distance of a rod from the line of its ends from which on it is an arch, and displacement, or distance of the
+ends, that a picture does not show: relative to the rod's size."""
 POINT = 1e-9
 """A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
 
@@ -49,30 +42,17 @@ def view_of(
 ) -> Floats:
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
-    Parameters
-    ----------
-    reference, moved
-        Centreline (n, 3) of the state that the rod has left, and displacement (n, 3) from it.
-    axis
-        Direction (3,) of the rod's axis; None: from one end of ``reference`` to the other.
-    down
-        Direction of a load along the rod (gravity), which is downwards in the picture.
-    load
-        Direction of a force across the rod, or of its deflection, which is not along the line of sight.
-    side
-        Direction that is upwards where a straight rod has not moved.
-    feet
-        Whether the rod is held in two places or more (:func:`on_feet`), and may be an arch.
+    ``reference`` and ``moved`` (n, 3) are the centreline of the state that the rod has left, and the displacement from
+    it.  All other arguments are directions (3,): ``axis`` that of the rod (None: from one end of ``reference`` to the
+    other), ``down`` that of a load along the rod, of gravity, which is downwards, ``load`` that of a force across the
+    rod, or of its deflection, which is not along the line of sight, ``side`` what is upwards where a straight rod has
+    not moved.  With ``feet`` the rod is held in two places or more, and may be an arch.
 
-    Returns
-    -------
-    axes
-        Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is
-        the principal direction of the displacement across it.  A load that is not nearly along that direction is
-        vertical instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is
-        horizontal (:func:`upwards`), whichever way the rod moves and the load pulls, but for an arch on whose crown
-        the load presses: its crown is above its feet.  With gravity that is downwards.
-        A closed rod is shown in the plane nearest to it.
+    Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is the
+    principal direction of the displacement across it.  A load that is not nearly along that direction is vertical
+    instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is horizontal,
+    whichever way the rod moves and the load pulls, but for an arch on whose crown the load presses: its crown is above
+    its feet.  A closed rod is shown in the plane nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
@@ -88,19 +68,44 @@ def view_of(
     else:
         right = _snapped(chord / np.linalg.norm(chord))
         up = upwards(_principal(shape, right, UNSEEN * size, side))
-        up = up * (_standing(up, reference, load) if feet and load is not None else 1.0)
         if load is not None:
-            aside = load - (load @ right) * right
-            if abs(up @ aside) < BESIDE * np.linalg.norm(aside):
-                up, tilt = _snapped(aside / np.linalg.norm(aside)), ABOVE
-                up = up - (up @ right) * right
-                up = upwards(up / np.linalg.norm(up))
-                up = up * (_standing(up, reference, load) if feet else 1.0)
-                right = np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up)  # the rod goes away, so upwards
-            elif (up @ aside) * (np.cross(right, up) @ aside) > POINT * (aside @ aside):  # towards the load
-                tilt = -tilt
+            right, up, tilt = _loaded(right, up, load, reference if feet else None)
     back = np.cross(right, up)
     return np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
+
+
+def _loaded(right: Floats, up: Floats, load: Floats, arch: Floats | None) -> tuple[Floats, Floats, float]:
+    """Directions and tilt of a picture in which a ``load`` is seen; ``arch`` (n, 3) is a rod that may be one.
+
+    A load that is not nearly along the motion, which is upwards, is itself upwards, and the rod is seen from aside.
+    """
+    aside = load - (load @ right) * right
+    standing = up * _standing(up, arch, load)
+    if abs(up @ aside) >= NEAR * np.linalg.norm(aside):
+        towards = (standing @ aside) * (np.cross(right, standing) @ aside) > POINT * (aside @ aside)
+        return right, standing, -TILT if towards else TILT
+    up = _snapped(aside / np.linalg.norm(aside))
+    up = up - (up @ right) * right
+    up = upwards(up / np.linalg.norm(up))
+    up = up * _standing(up, arch, load)
+    return np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up), up, ABOVE  # the rod goes away, so upwards
+
+
+def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
+    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), held and loaded so.
+
+    ``setting`` holds and loads it, ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to
+    show, by default of dead forces.
+    """
+    load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
+    along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}
+    return view_of(reference, moved, load=load, feet=feet, **along)
+
+
+def thickness(centres: Floats) -> float:
+    """Mean radius with which a rod of this centreline (n, 3) is drawn: by its length, and by its extent if it coils."""
+    length = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
+    return float(min(length / 90.0, np.linalg.norm(np.ptp(centres, axis=0)) / 40.0))
 
 
 def axis_of(setting: Setting, reference: Floats) -> Floats:
@@ -117,20 +122,13 @@ def axis_of(setting: Setting, reference: Floats) -> Floats:
     return np.asarray(chord)
 
 
-def _standing(up: Floats, reference: Floats, load: Floats) -> float:
-    """-1 where an arch, the rod ``reference`` (n, 3), would hang from ``up`` though the ``load`` presses on its crown.
-
-    Otherwise 1.
-    """
-    feet = np.linspace(reference[0], reference[-1], len(reference))
-    bow, size = (reference - feet).mean(axis=0), np.linalg.norm(np.ptp(reference, axis=0))
+def _standing(up: Floats, rod: Floats | None, load: Floats) -> float:
+    """-1 where an arch, the ``rod`` (n, 3), would hang from ``up`` though the ``load`` presses on its crown; else 1."""
+    if rod is None:
+        return 1.0
+    bow, size = (rod - np.linspace(rod[0], rod[-1], len(rod))).mean(axis=0), np.linalg.norm(np.ptp(rod, axis=0))
     arch = np.linalg.norm(bow) > ARCHED * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
     return sign_of(up @ bow) if arch and load @ bow < 0 else 1.0
-
-
-def on_feet(setting: Setting) -> bool:
-    """Whether a rod is held in two places or more."""
-    return sum(bool(x.held.any()) for x in setting.supports) > 1
 
 
 def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:

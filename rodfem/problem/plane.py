@@ -19,8 +19,8 @@ from rodfem.forms.rotation import rotation
 from rodfem.problem.end import SIDES
 from rodfem.problem.local_state import STATES, Constants, Place, place, trials
 from rodfem.problem.roles import functions_of
-from rodfem.problem.symbols import symbols
-from rodfem.problem.values import Symbol, Values
+from rodfem.problem.symbols import Symbol, symbols
+from rodfem.problem.values import Values
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ class LocalState:
 
     def __init__(self, scene: Scene) -> None:
         """Make symbols for a place of a ``scene``."""
-        self.q, self.r, self.k = ([Symbol() for _ in range(n)] for n in (4, 3, 3))
-        self.v = [Symbol() for _ in scene.free_strains]
-        self.constants = Constants(s=Symbol(), **{name: Symbol() for name in scene.parameters})
+        self.q, self.r, self.k = ([Symbol.named(x) for _ in range(n)] for x, n in (("q", 4), ("r", 3), ("k", 3)))
+        self.v = [Symbol.named("v") for _ in scene.free_strains]
+        self.constants = symbols(scene)
 
 
 def check_plane(scene: Scene) -> None:

@@ -8,19 +8,20 @@ guards them, makes terms of them or asks what they depend on cannot forget one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from functools import wraps
 from logging import getLogger
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rodfem.errors import SceneError
 
 if TYPE_CHECKING:
     from rodfem.problem.load import Load
 
+T = TypeVar("T")
 Conversion = Callable[[Any], Any]
 LOG_OF_UFL = getLogger("UFL")
 UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
@@ -148,6 +149,17 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
 
     call.guards = what  # type: ignore[attr-defined]
     return call
+
+
+def derived(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
+    """Return what ``make()`` derives from an object that does not change, once, by its ``key``: it is kept with it.
+
+    Of a function of a scene it is what does not depend on constants, and serves all scenes that have the function.
+    """
+    known: dict[Hashable, T] = vars(owner).setdefault("derived", {})
+    if key not in known:
+        known[key] = make()
+    return known[key]
 
 
 def _spelled(trouble: BaseException) -> str:

@@ -7,7 +7,7 @@ named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,12 +25,12 @@ from rodfem.problem.kinds import plain
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.plane import check_plane
-from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
+from rodfem.problem.roles import Role, changes, derived, functions_of, guarded, role_field
 from rodfem.problem.start import check_continuity
+from rodfem.problem.symbols import symbols
 from rodfem.problem.table import Table, tables_of
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
-from rodfem.problem.values import Symbol
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
 ASIDE = 1e-6
@@ -353,8 +353,11 @@ class Scene(Contribution):
         """Loads at which all that depends on the load is checked: both ends of the range, then some inside."""
         return [*self.span, *inside(self.span)]
 
-    def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
-        """Return the same scene with another parameter as its load, over ``span``, and other constants.
+    def varying(self, load: str = "", span: tuple[float, float] | None = None, /, **values: float) -> Scene:
+        """Return the same scene with another parameter as its ``load``, over ``span``, and other constants.
+
+        What is left out stays.  Scenes that are made so from one another, or by :func:`dataclasses.replace`, have the
+        same functions: forms are derived and compiled once for all of them.
 
         Raises :class:`SceneError` for a name that is no parameter's.
         """
@@ -362,7 +365,13 @@ class Scene(Contribution):
         if unknown:
             raise SceneError(f"{unknown[0]!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
         parameters = {n: replace(p, value=values.get(n, p.value)) for n, p in self.parameters.items()}
-        return replace(self, load=load, span=span, parameters=parameters)
+        return replace(self, load=load or self.load, span=span or self.span, parameters=parameters)
+
+    def alike(self, other: Scene) -> bool:
+        """Whether another scene has the same functions and all else: values of constants, load and range may differ."""
+        own = {"interval", "parameters", "load", "span"}  # another scene has its own objects there
+        same = all(getattr(self, f.name) is getattr(other, f.name) for f in fields(self) if f.name not in own)
+        return same and self.interval == other.interval and [*self.parameters] == [*other.parameters]
 
     @property
     def length(self) -> float:
@@ -491,30 +500,23 @@ class Scene(Contribution):
 
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
-        if s not in self._stiffnesses:
-            self._stiffnesses[s] = self._stiffness_at(s)
-        return self._stiffnesses[s]
+        return derived(self, ("stiffness", s), lambda: self._stiffness_at(s))
 
-    @cached_property
-    def _stiffnesses(self) -> dict[float | None, np.ndarray]:
-        """Stiffness by the arclength, differentiated once: systems, their companions and pictures ask for it."""
-        return {}
-
-    @cached_property
-    def _hessian(self) -> tuple[Symbol, Any]:
-        """Second derivative of ``W`` in the strains of :meth:`stiffness`, and the symbol of its arclength."""
-        free_v, s = self.free_strains, Symbol()
+    def _hessian(self) -> tuple[Constants, Any]:
+        """Second derivative of ``W`` in the strains of :meth:`stiffness`, and the symbols of its constants."""
+        free_v, c = self.free_strains, symbols(self)
         x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free_v] + [0.0] * 3))
         v = [ufl.as_ufl(value) for value in UNDEFORMED]
         for position, component in enumerate(free_v):
             v[component] = x[position]
         k = ufl.as_vector([x[len(free_v) + i] for i in range(3)])
-        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, Constants(**vars(self.constants()) | {"s": s})))
-        return s, apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
+        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, c))
+        return c, apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
 
     def _stiffness_at(self, s: float | None) -> np.ndarray:
-        symbol, hessian = self._hessian
-        symbol.value = self.constants(s=s).s
+        c, hessian = derived(self.energy, ("hessian", self.rod, *self.parameters), self._hessian)
+        for name, value in vars(self.constants(s=s)).items():
+            getattr(c, name).value = value
         out = np.zeros((len(self.free_strains) + 3,) * 2)
         for i, j in zip(*np.tril_indices(len(out)), strict=True):  # not hessian(...): it differentiates every time
             out[i, j] = out[j, i] = float(hessian.evaluate((), {}, (int(i), int(j)), StackDict()))

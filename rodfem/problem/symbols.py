@@ -11,17 +11,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
-from math import inf, isfinite, isinf, isnan, nan
+from functools import partial
+from math import isfinite, isinf, isnan
 from typing import TYPE_CHECKING, Any
 
 import ufl
-from ufl.algorithms import expand_derivatives
-from ufl.utils.stacks import StackDict
 
 from rodfem.errors import SceneError
-from rodfem.problem.kinds import number_of, plain
+from rodfem.problem.kinds import number_of
 from rodfem.problem.local_state import STATES, Constants, inside, some_places
-from rodfem.problem.roles import LOG_OF_UFL, Role, UnnamedError, functions_of
+from rodfem.problem.roles import Role, UnnamedError, derived, functions_of
+from rodfem.problem.values import Values
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -173,8 +173,7 @@ def _give(c: Constants, there: Constants) -> None:
 
 def _check_of_constants(scene: Scene, what: str, function: Callable[[Any], Any], role: Role, s: float | None) -> None:
     """Compare a function of the constants and its expression: at the scene's load, at others, and at arclengths."""
-    c = _constants(scene, s)
-    expressions = [e if e is None else _Value(e) for e in _listed(role, function(c))]
+    c, expressions = derived(function, (role, s, *scene.parameters), lambda: _of_constants(scene, function, role, s))
     places = scene.samples() if role.along else []
     values: list[_Pair] = []
     for there in (
@@ -183,10 +182,24 @@ def _check_of_constants(scene: Scene, what: str, function: Callable[[Any], Any],
         numbers = _listed(role, function(there))
         _give(c, there)
         values += [
-            (e if e is None else e(), x if x is None else number_of(x), there)
+            (e if e is None else e.at(), x if x is None else number_of(x), there)
             for e, x in zip(expressions, numbers, strict=True)
         ]
     _compare(scene, what, values)
+
+
+def _of_constants(scene: Scene, function: Any, role: Role, s: float | None) -> tuple[Constants, list[Any]]:
+    """Symbols of the constants, and what a function of them returns as expressions."""
+    c = _constants(scene, s)
+    return c, [e if e is None else Values(e) for e in _listed(role, function(c))]
+
+
+def _of_place(scene: Scene, function: Any, role: Role, s: float | None, state: int) -> tuple[Constants, Values]:
+    """The same of a function of a place, in a state."""
+    c, energy = _constants(scene, s), role.call == "W(v, k, c)"
+    names = ("q", "r", "v", "k") if energy else ("x.q", "x.r", "x.v", "x.k")
+    x = some_places(scene, state, _named(names), c.s)[energy or role.along]
+    return c, Values(function(x.v, x.k, c) if energy else function(x, c))
 
 
 def _check_of_places(scene: Scene, what: str, function: Callable[..., Any], role: Role, s: float | None) -> None:
@@ -195,10 +208,9 @@ def _check_of_places(scene: Scene, what: str, function: Callable[..., Any], role
     at, along = inside(scene.interval)[0] if s is None else s, energy or role.along
     values: list[_Pair] = []
     for i in range(len(STATES)):
-        c = _constants(scene, s)
-        x = some_places(scene, i, _named(("q", "r", "v", "k") if energy else ("x.q", "x.r", "x.v", "x.k")), c.s)[along]
+        key = (role, s, i, scene.length, *scene.parameters)
+        c, expression = derived(function, key, partial(_of_place, scene, function, role, s, i))
         y = some_places(scene, i, s=at)[along]
-        expression = _Value(function(x.v, x.k, c) if energy else function(x, c))
         for load in [None] if i else [None, *scene.loads()]:
             there = scene.constants(load, at)
             _give(c, there)
@@ -206,7 +218,7 @@ def _check_of_places(scene: Scene, what: str, function: Callable[..., Any], role
                 number = number_of(function(y.v, y.k, there) if energy else function(y, there))
             except SceneError:  # undefined: at a state that the rod need not take
                 continue
-            values.append((expression(), number, there))
+            values.append((expression.at(), number, there))
     _compare(scene, what, values)
 
 
@@ -223,25 +235,6 @@ def _named(names: tuple[str, ...]) -> Callable[[Any], Any]:
 
 def _listed(role: Role, values: Any) -> list[Any]:
     return list(values) if role.size else [values]
-
-
-class _Value:
-    """Value of an expression at the values that its symbols have, infinite where it is undefined."""
-
-    def __init__(self, expression: Any) -> None:
-        self.expression = expand_derivatives(ufl.as_ufl(expression))
-
-    def __call__(self) -> float:
-        """Return the value, nan where UFL does not evaluate such an expression."""
-        silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True
-        try:
-            return plain(self.expression.evaluate((), {}, (), StackDict()))
-        except (ArithmeticError, ValueError):
-            return inf
-        except Exception:  # of UFL's own, too, for a function that it does not evaluate
-            return nan
-        finally:
-            LOG_OF_UFL.disabled = silent
 
 
 def _compare(scene: Scene, what: str, values: list[_Pair]) -> None:

@@ -6,16 +6,19 @@ once, without indices, and each is evaluated for an array of places.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import erf
+from collections.abc import Callable, Mapping
+from math import erf, inf, nan
 from typing import Any
 
 import numpy as np
 import ufl
 from ufl import classes
-from ufl.algorithms import expand_indices
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms import expand_derivatives, expand_indices
 from ufl.corealg.traversal import unique_post_traversal
+from ufl.utils.stacks import StackDict
+
+from rodfem.problem.kinds import plain
+from rodfem.problem.roles import LOG_OF_UFL
 
 OTHER_NAMES: dict[str, Any] = {
     "ln": np.log,
@@ -47,30 +50,15 @@ OPERATIONS: dict[Any, Callable[..., Any]] = {
 }
 
 
-class Symbol(classes.Variable):  # type: ignore[misc]
-    """A number of a place, with the value that it is given last: the arclength, or a component of the state."""
-
-    __slots__ = ("value",)
-
-    def __init__(self, value: float = 0.0) -> None:
-        """Be a symbol of its own, with a ``value``."""
-        super().__init__(ufl.as_ufl(0.0))
-        self.value = value
-
-    def evaluate(self, *_: Any, **__: Any) -> float:
-        """Return the value."""
-        return float(self.value)
-
-
 class Values:
     """A scalar ``expression`` of symbols as a function of their values."""
 
     def __init__(self, expression: Any) -> None:
         """List the nodes of the expression."""
-        self.expression = expand_indices(apply_algebra_lowering(ufl.as_ufl(expression)))
+        self.expression = expand_indices(expand_derivatives(ufl.as_ufl(expression)))
         self._nodes = list(unique_post_traversal(self.expression))
 
-    def __call__(self, places: dict[Symbol, np.ndarray]) -> np.ndarray:
+    def __call__(self, places: dict[Any, np.ndarray]) -> np.ndarray:
         """Values at places, each given by the arrays of its symbols: all of one length; nan where there is none."""
         size, known = len(next(iter(places.values()))), dict[Any, Any](places)
         try:
@@ -80,15 +68,21 @@ class Values:
                         known[node] = _value(node, known)
             return np.broadcast_to(np.asarray(known[self.expression], dtype=float), (size,))
         except NotImplementedError:  # a function that is evaluated at one place at a time
-            return np.array([self._at({symbol: float(x[i]) for symbol, x in places.items()}) for i in range(size)])
+            return np.array([self.at({symbol: float(x[i]) for symbol, x in places.items()}) for i in range(size)])
 
-    def _at(self, place: dict[Symbol, float]) -> float:
-        for symbol, value in place.items():
+    def at(self, place: Mapping[Any, float] | None = None) -> float:
+        """Value with the symbols of a ``place``, inf where it is undefined, nan where UFL does not evaluate it."""
+        for symbol, value in (place or {}).items():
             symbol.value = value
+        silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True
         try:
-            return float(self.expression(()))
+            return plain(self.expression.evaluate((), {}, (), StackDict()))
         except (ArithmeticError, ValueError):
-            return float("nan")
+            return inf
+        except Exception:  # of UFL's own, too, for a function that it does not evaluate
+            return nan
+        finally:
+            LOG_OF_UFL.disabled = silent
 
 
 def _value(node: Any, known: dict[Any, Any]) -> Any:

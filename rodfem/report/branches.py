@@ -12,15 +12,13 @@ from scipy.interpolate import CubicSpline
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.modes.modes import RIGID
-from rodfem.output.endings import endings
 from rodfem.output.frequency_curves import curves, ranges_of, top
+from rodfem.output.pieces import endings, pieces_of
 from rodfem.output.plot_frequencies import SPECIAL
-from rodfem.output.plot_pieces import pieces_of
 from rodfem.output.smooth import between
+from rodfem.output.words import readings_of, words_of
 from rodfem.report.packing import plain
-from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
-from rodfem.report.words import words_of
 from rodfem.tolerances import NEGLIGIBLE
 from rodfem.writhe import writhe
 
@@ -52,13 +50,13 @@ def branch_data(
         "colour": colour,
         "parent": branch["parent"],
         "ended": branch["ended"],
-        "endings": [list(ending) for ending in endings(branch)],
+        "endings": endings(branch),
         "load": columns["load"],
         "negative": columns["negative"],
         "ordinates": ordinates,
         "between": _between(branch, ordinates),
         "readings": readings_of(branch, natural),
-        "pieces": _pieces(branch, colour),
+        "pieces": [{"rows": [x.first, x.last], "kind": x.kind, "index": x.label} for x in pieces_of(branch)],
         "special": [_special(x) for x in branch["special"]],
         "words": [told.index(each) for each in words],
         "told": [asdict(each) for each in told],
@@ -153,16 +151,6 @@ def _derived(shapes: Shapes) -> dict[str, list[float | None]]:
         SHORTENING: plain(length - ends),
         WRITHE: plain(np.array([writhe(CubicSpline(shapes.s, r), (shapes.s[0], shapes.s[-1])) for r in shapes.r])),
     }
-
-
-def _pieces(branch: Mapping[str, Any], colour: str) -> list[dict[str, Any]]:
-    """First and last row, index and kind of each piece of one index."""
-    found, first = [], 0
-    for piece in pieces_of(branch, colour):
-        last = first + len(piece.curve) - 1
-        found.append({"rows": [first, last], "kind": piece.kind, "index": piece.label})
-        first = last
-    return found
 
 
 def _special(special: Mapping[str, Any]) -> dict[str, Any]:

@@ -73,15 +73,7 @@ def _locus(path: Path, one: Mapping[str, Any], data: Mapping[str, Any]) -> dict[
     load, other = one["parameters"]
     if load != data["parameter"] or other not in data["constants"] or one["kind"] not in LINES:
         raise InputError(f"{path} is no locus of the diagram beside it: keep the files of one run together.")
-    columns = one["columns"]
-    try:
-        x, y = ([float(value) for value in columns[name]] for name in (other, load))
-        index = [[int(value) for value in pair] for pair in columns["index"]]
-        marks = [(int(mark["row"]), str(mark["kind"])) for mark in one["marks"]]
-    except (KeyError, TypeError, ValueError) as trouble:
-        raise InputError(f"{path} has columns that are no numbers ({trouble}): run the scene again.") from trouble
-    if not len(x) == len(y) == len(index) or any(not 0 <= row < len(x) for row, _ in marks):
-        raise InputError(f"{path} has columns of different lengths, or marks outside: run the scene again.")
+    x, y, index, marks = _rows(path, one)
     return {
         "file": path.name,
         "kind": one["kind"],
@@ -98,3 +90,18 @@ def _locus(path: Path, one: Mapping[str, Any], data: Mapping[str, Any]) -> dict[
         "special": _special_points(one, data),
         "here": data["constants"][other],
     }
+
+
+def _rows(
+    path: Path, one: Mapping[str, Any]
+) -> tuple[list[float], list[float], list[list[int]], list[tuple[int, str]]]:
+    """Second parameter, load, indices and marks of a locus; raises :class:`InputError` where they are none."""
+    try:
+        x, y = ([float(value) for value in one["columns"][name]] for name in reversed(one["parameters"]))
+        index = [[int(value) for value in pair] for pair in one["columns"]["index"]]
+        marks = [(int(mark["row"]), str(mark["kind"])) for mark in one["marks"]]
+    except (KeyError, TypeError, ValueError) as trouble:
+        raise InputError(f"{path} has columns that are no numbers ({trouble}): run the scene again.") from trouble
+    if not len(x) == len(y) == len(index) or any(not 0 <= row < len(x) for row, _ in marks):
+        raise InputError(f"{path} has columns of different lengths, or marks outside: run the scene again.")
+    return x, y, index, marks

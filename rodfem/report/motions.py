@@ -13,15 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.modes.modes import RIGID, SYMMETRY, load_modes
 from rodfem.modes.recorded import Few
-from rodfem.output.glyphs import glyphs_of
-from rodfem.output.plot_modes import GROWTH, LARGEST
-from rodfem.output.view import POINT
+from rodfem.output.digits import eigenvalue_in_words
+from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.plot_modes import GROWTH, drawn_size
 from rodfem.problem.setting import Setting
-from rodfem.report.bodies import Shelf
 from rodfem.report.packing import packed
-from rodfem.report.readings import eigenvalue_in_words
 from rodfem.report.shapes import Shapes
-from rodfem.report.stage import Stage
 from rodfem.tolerances import SAME_EIGENVALUE
 
 Floats = NDArray[np.float64]
@@ -51,100 +48,68 @@ class Shown(NamedTuple):
 def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[Shown]:
     """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical.
 
-    Parameters
-    ----------
-    path, place
-        The file with error bars, None where it has not this state, and the branch and row in it.
-    typical
-        Modes that the run has recorded there, at nodes ``s``.
-    zeros
-        Number of eigenvalues that vanish, symmetries included.
+    ``path`` is the file with error bars, None where it has not this state, and ``place`` the branch and row in it;
+    ``typical`` are modes that the run has recorded there, at nodes ``s``, and ``zeros`` is the number of eigenvalues
+    that vanish, symmetries included.
     """
     shown: list[Shown] = []
     if path is not None:
         modes = load_modes(path, *place)
         each = zip(modes.value, modes.error, modes.motion, modes.displacement, modes.rotation, strict=True)
         shown += [Shown(complex(mu), float(error), motion, modes.s, u, w) for mu, error, motion, u, w in each]
-    if typical is not None:
-        known, least = [mode.value for mode in shown], SMALL * abs(typical.value).max(initial=0.0)
-        new = [
-            not any(abs(x - mu) <= SAME_EIGENVALUE * max(abs(mu), least) for x in known)
-            and not (known and motion == SYMMETRY)
-            for mu, motion in zip(typical.value, typical.motion, strict=True)
-        ]
-        shown += [
-            Shown(complex(typical.value[i]), np.nan, typical.motion[i], s, typical.displacement[i], typical.rotation[i])
-            for i in np.flatnonzero(new)
-        ]
+    shown += [] if typical is None else _others(typical, s, [mode.value for mode in shown])
     shown.sort(key=lambda mode: (mode.motion in (SYMMETRY, RIGID), mode.value.real))
     others = [mode for mode in shown if mode.motion != SYMMETRY]
     vanish = sorted(others, key=lambda mode: abs(mode.value))[: max(zeros - (len(shown) - len(others)), 0)]
     return [mode._replace(zero=any(mode is other for other in vanish)) for mode in shown]
 
 
-def motions_of(
-    modes: Sequence[Shown],
-    row: int,
-    shapes: Shapes,
-    setting: Setting,
-    stage: Stage,
-    shelf: Shelf,
-    bodies: Sequence[int],
-) -> list[dict[str, Any]]:
-    """Modes of one state as the page has them, with the maps of its supports at an amplitude of one.
+def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[Shown]:
+    """Modes that a run has recorded, but those with eigenvalues that are ``known``; these have symmetries, too."""
+    least = SMALL * abs(typical.value).max(initial=0.0)
+    each = zip(typical.value, typical.motion, typical.displacement, typical.rotation, strict=True)
+    return [
+        Shown(complex(mu), np.nan, motion, s, u, w)
+        for mu, motion, u, w in each
+        if not (known and motion == SYMMETRY)
+        and not any(abs(x - mu) <= SAME_EIGENVALUE * max(abs(mu), least) for x in known)
+    ]
 
-    Parameters
-    ----------
-    modes, row
-        The modes, and the row of the branch.
-    shapes, setting
-        States of the branch, and what holds and loads this one.
-    stage, shelf
-        Size and direction of the picture, and the bodies of all supports.
-    bodies
-        Numbers of those of this state.
+
+def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Setting, look: Look) -> list[dict[str, Any]]:
+    """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one.
+
+    ``shapes`` are those of the branch, ``setting`` is what holds and loads the state, ``look`` that of the picture, and
+    ``modes`` are those of :func:`modes_of`.
     """
     r, frames = shapes[row]
     span = float(np.linalg.norm(np.ptp(r, axis=0)))
 
     def moved(u: Floats, w: Floats) -> Any:
         turned = Rotation.from_rotvec(w).as_matrix() @ frames
-        solids = glyphs_of(setting, shapes.s, r + u, turned, stage.radius, stage.axes, r)
-        return packed([shelf.fitted(body, solid) for body, solid in zip(bodies, solids, strict=False)])
+        return packed([x.map for x in glyphs_of(setting, shapes.s, (r + u, turned), look, r)])
 
     out = []
     for mode in modes:
         u, w = (CubicSpline(mode.s, part)(shapes.s) for part in (mode.u, mode.w))
-        size = min(
-            LARGEST[0] * span / max(_largest(u), POINT * span),
-            LARGEST[1] / max(_largest(w), POINT),
-        )
-        parts = [np.real, np.imag] if mode.value.imag else [np.real]
-        out.append(
-            _about(mode)
-            | {"parts": [packed(size * np.concatenate([part(u), part(w)], axis=1)) for part in parts]}
-            | {"maps": [moved(size * part(u), size * part(w)) for part in parts]}
-        )
+        size = drawn_size(u, w, span)
+        parts = [(size * part(u), size * part(w)) for part in ([np.real, np.imag] if mode.value.imag else [np.real])]
+        drawn = [packed(np.concatenate(part, axis=1)) for part in parts]
+        out.append(_about(mode) | {"parts": drawn, "maps": [moved(*part) for part in parts]})
     return out
 
 
 def _about(mode: Shown) -> dict[str, Any]:
     """Eigenvalue, in words with its error, and what the motion does: ``zero``, ``grows`` or neither."""
-    mu, error = mode.value, mode.error
-    known = bool(np.isfinite(error))
-    exact = mode.motion in (SYMMETRY, RIGID)
-    zero = exact or mode.zero or abs(mu) <= (error if known else 0.0)
-    mu = 0j if zero and (exact or not known) else mu
+    exact, known = mode.motion in (SYMMETRY, RIGID), bool(np.isfinite(mode.error))
+    zero = exact or mode.zero or bool(abs(mode.value) <= np.nan_to_num(mode.error, posinf=0.0))
+    mu = 0j if zero and (exact or not known) else mode.value
     root = np.sqrt(-mu)
-    words = EXACT if exact else eigenvalue_in_words(mu, error)
+    words = EXACT if exact else eigenvalue_in_words(mu, mode.error) or COUNTED * zero
     return {
         "value": [mu.real, mu.imag],
-        "words": words or (COUNTED if zero else ""),
+        "words": words,
         "motion": mode.motion,
         "root": [float(root.real), float(root.imag)],
         "kind": "zero" if zero else "grows" if root.real > GROWTH * abs(root) else "swings",
     }
-
-
-def _largest(vectors: NDArray[Any]) -> float:
-    return float(np.linalg.norm(abs(vectors), axis=1).max())

@@ -13,7 +13,7 @@ from rodfem.errors import InputError
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.contents import check_run, read_diagram
 from rodfem.output.digits import with_unit
-from rodfem.output.sheet import mesh_in_words, ordinate_in_words
+from rodfem.output.style import mesh_in_words, ordinate_in_words
 from rodfem.report.branches import DERIVED, ordinates_of
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.loci import loci_of
@@ -52,9 +52,10 @@ def payload_of(folder: Path) -> dict[str, Any]:
 
 def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Titles, labels, constants and origin."""
-    label, words = ordinate_in_words(data), str(data.get("parameter_words") or "").replace("$", "")
-    unit = with_unit("", str(data.get("parameter_unit") or "")).strip()
+    units = {x: str(data.get(f"{name}_unit") or "") for x, name in (("load", "parameter"), ("ordinate", "ordinate"))}
+    words, unit = str(data.get("parameter_words") or "").replace("$", ""), with_unit("", units["load"]).strip()
     names = {"ordinate": data["ordinate"], **DERIVED}
+    labels = names | {"ordinate": ordinate_in_words(data)}
     return {
         "scene": data["scene"],
         "title": plain_of(data.get("title") or data["scene"]),
@@ -62,12 +63,12 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         "symbol": plain_of(data["parameter_label"], always=True),
         "label": " ".join(filter(None, (escape(words), html_of(data["parameter_label"], always=True), escape(unit)))),
         "ordinates": [
-            {"key": key, "name": name, "label": html_of(label if key == "ordinate" else name)}
-            for key, name in ((key, names.get(key, key)) for key in ordinates_of(data))
+            {"key": key, "name": names.get(key, key), "label": html_of(labels.get(key, key))}
+            for key in ordinates_of(data)
         ],
         "constants": data["constants"],
         "natural": data.get("natural") or {},
-        "units": {"load": data.get("parameter_unit") or "", "ordinate": data.get("ordinate_unit") or ""},
+        "units": units,
         "complete": data.get("complete", True),
         "meaning": data.get("meaning", {}),
         "mesh": mesh_in_words(data["discretization"]),

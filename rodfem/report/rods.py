@@ -14,17 +14,15 @@ from rodfem.errors import InputError
 from rodfem.modes.modes import rows_with_modes
 from rodfem.modes.recorded import read as recorded
 from rodfem.output.glyphs import glyphs_of
-from rodfem.output.plot_images import is_traced
+from rodfem.output.plot_diagram import is_traced
 from rodfem.output.profiles import POINTS, PROFILES, profiles_of
-from rodfem.output.sheet import PALETTE
-from rodfem.output.solids import profile_of
+from rodfem.output.solids import body_of, profile_of
+from rodfem.output.style import PALETTE
 from rodfem.problem.setting import read as read_setting
-from rodfem.report.bodies import FLAT, Shelf
 from rodfem.report.branches import branch_data
 from rodfem.report.motions import modes_of, motions_of
 from rodfem.report.packing import packed, plain
-from rodfem.report.shapes import BUDGET, Shapes, shapes_of, stations
-from rodfem.report.stage import Stage, stage_of
+from rodfem.report.shapes import BUDGET, Shapes, Stage, shapes_of, stage_of, stations
 
 Floats = NDArray[np.float64]
 
@@ -43,32 +41,28 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     """
     shapes = _shapes(data, groups, folder)
     states = sum(len(each.r) for each in shapes.values())
-    stage = stage_of(data, shapes, groups)
-    shelf, with_modes, branches = Shelf(stage.radius), rows_with_modes(folder / "modes.h5"), []
+    stage, shelf, branches = stage_of(data, shapes, groups), dict[tuple[str, str], int](), []
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
-        name = branch["name"]
-        here, group = shapes[name], groups[name]
-        found = [_placed(here, row, group, stage, shelf) for row in range(len(here.r))]
-        typical = {each.row: each for each in recorded(group)}
-        exact = {row for other, row in with_modes if other == name}
-        modes, missed = {}, {row: each.trouble for row, each in typical.items() if each.trouble}
-        for row in sorted(row for row in {*typical, *exact} if row < len(here.r)):
-            path, few = folder / "modes.h5" if row in exact else None, typical[row].found if row in typical else None
-            nodes, setting = group["s"][row], read_setting(group, row)
-            nodes = nodes[np.isfinite(nodes)]
-            zeros = 0 if "omega2" in branch["columns"] else branch["columns"]["zero"][row]
-            shown = modes_of(path, (name, row), few, nodes, zeros)
-            if shown:
-                modes[row] = motions_of(shown, row, here, setting, stage, shelf, found[row][0])
-        along = profiles_data(group, states)
-        image = "" if is_traced(branch, data["branches"]) else branch.get("image", "")
-        branches.append(
-            branch_data(branch, here, colour, data.get("natural") or {}, planar=bool(data.get("planar")))
-            | _drawn(here, found)
-            | along
-            | {"modes": modes, "missed": missed, "image": image}
-        )
+        here, group = shapes[branch["name"]], groups[branch["name"]]
+        shown = branch_data(branch, here, colour, data.get("natural") or {}, planar=bool(data.get("planar")))
+        shown |= _drawn(here, group, stage, shelf) | profiles_data(group, states)
+        shown |= _moving(branch, here, group, folder / "modes.h5", stage)
+        traced = is_traced(branch, data["branches"])
+        branches.append(shown | {"image": "" if traced else branch.get("image", "")})
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
+
+
+def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, stage: Stage) -> dict[str, Any]:
+    """Modes of a branch by its rows, those with error bars in the file ``path``, and why others have none."""
+    name, modes = branch["name"], {}
+    zeros = [0] * len(shapes.r) if "omega2" in branch["columns"] else branch["columns"]["zero"]
+    typical = {each.row: each for each in recorded(group)}
+    exact = {row for other, row in rows_with_modes(path) if other == name}
+    for row in sorted({*typical, *exact} & {*range(len(shapes.r))}):
+        few, nodes = getattr(typical.get(row), "found", None), group["s"][row]
+        if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
+            modes[row] = motions_of(shown, shapes, row, read_setting(group, row), stage.look)
+    return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items() if each.trouble}}
 
 
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
@@ -78,24 +72,18 @@ def profiles_data(group: Any, states: int) -> dict[str, Any]:
     at M points, nan beyond the last one of a coarser mesh; ``element`` (P,), how many of them an element has, which
     determine its polynomials, and 0 where some are left out; ``jumps`` (P,) of each of the four between elements.
     """
-    found = [profiles_of(group, row) for row in range(len(group["load"]))]
-    if None in found:
+    found = [one for one in (profiles_of(group, row) for row in range(len(group["load"]))) if one is not None]
+    if not found:
         return {"profile": None, "element": None, "jumps": None}
-    most = group[POINTS][0].size
+    most, loaded = group[POINTS][0].size, _loaded(group)
     kept = np.unique(np.linspace(0, most - 1, min(most, max(2, BUDGET // states))).round().astype(int))
     out = np.full((len(found), most, 1 + 3 * len(PROFILES)), np.nan)
-    loaded = _loaded(group)
-    jumps: dict[str, list[float]] = {symbol: [] for symbol in PROFILES}
     for place, one in zip(out, found, strict=True):
-        assert one is not None
-        count = one.points.size
-        place[:count, 0] = one.points.ravel()
-        for i, symbol in enumerate(PROFILES):
-            place[:count, 3 * i + 1 : 3 * i + 4] = one.fields[symbol].reshape(count, 3)
-            jumps[symbol].append(one.jump(symbol, loaded))
-    element = [one.points.shape[1] if one is not None and len(kept) == most else 0 for one in found]
-    jumped = {symbol: plain(column) for symbol, column in jumps.items()}
-    return {"profile": packed(out[:, kept]), "element": element, "jumps": jumped}
+        columns = [one.points.reshape(-1, 1), *(one.fields[symbol].reshape(-1, 3) for symbol in PROFILES)]
+        place[: one.points.size] = np.hstack(columns)
+    element = [one.points.shape[1] * (len(kept) == most) for one in found]
+    jumps = {symbol: plain([one.jump(symbol, loaded) for one in found]) for symbol in PROFILES}
+    return {"profile": packed(out[:, kept]), "element": element, "jumps": jumps}
 
 
 def _loaded(group: Any) -> list[float]:
@@ -115,18 +103,13 @@ def _shapes(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Sha
     return shapes
 
 
-def _placed(shapes: Shapes, row: int, group: Any, stage: Stage, shelf: Shelf) -> tuple[list[int], list[Floats]]:
-    """Bodies of the supports and loads of a state, and their maps."""
-    r, frames = shapes[row]
-    return shelf.place_all(glyphs_of(read_setting(group, row), shapes.s, r, frames, stage.radius, stage.axes))
-
-
-def _drawn(shapes: Shapes, found: list[tuple[list[int], list[Floats]]]) -> dict[str, Any]:
-    maps = [placed for _, each in found for placed in each]
+def _drawn(shapes: Shapes, group: Any, stage: Stage, shelf: dict[tuple[str, str], int]) -> dict[str, Any]:
+    """Shapes of all states, and the bodies of their supports and loads: numbers on the ``shelf``, and maps."""
+    found = [glyphs_of(read_setting(group, row), shapes.s, shapes[row], stage.look) for row in range(len(shapes.r))]
     return {
         "shape": packed(np.concatenate([shapes.r, shapes.q], axis=2)),
-        "bodies": [numbers for numbers, _ in found],
-        "maps": packed(np.array(maps).reshape(-1, 12)),
+        "bodies": [[shelf.setdefault((x.body, x.color), len(shelf)) for x in glyphs] for glyphs in found],
+        "maps": packed(np.array([x.map for glyphs in found for x in glyphs]).reshape(-1, 12)),
     }
 
 
@@ -136,9 +119,9 @@ def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, 
         "s": packed(shapes.s),
         "outline": packed(_outline(shapes, stage, OUTLINE)),
         "stripe": packed(OVER * _outline(shapes, stage, STRIPE)),
-        "radius": stage.radius,
+        "radius": stage.look.radius,
         "size": float(shapes.s[-1] - shapes.s[0]),
-        "axes": stage.axes.tolist(),
+        "axes": stage.look.axes.tolist(),
         "loadDirection": None if stage.load is None else stage.load.tolist(),
         "notes": list(stage.setting.notes),
         "start": [[branch["name"] for branch in data["branches"]].index(stage.branch), stage.row],
@@ -147,17 +130,19 @@ def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, 
 
 def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
     """Outline of the cross-sections (1, k, 2), or (S, k, 2) at the stations where they differ."""
-    whole = stage.radius * profile_of(shapes.s, stage.setting.section, angles)
-    return whole[:1] if np.ptp(whole, axis=0).max() < UNIFORM * stage.radius else whole
+    whole = stage.look.radius * profile_of(shapes.s, stage.setting.section, angles)
+    return whole[:1] if np.ptp(whole, axis=0).max() < UNIFORM * stage.look.radius else whole
 
 
-def _solids(shelf: Shelf) -> list[dict[str, Any]]:
+def _solids(shelf: dict[tuple[str, str], int]) -> list[dict[str, Any]]:
+    """Bodies in their colours; a box and a wedge have sharp edges."""
+    made = [(*body_of(body), body, color) for body, color in shelf]
     return [
         {
-            "points": packed(body.solid.points),
-            "triangles": body.solid.triangles.ravel().tolist(),
-            "colour": body.solid.color,
-            "flat": len(body.solid.points) <= FLAT,
+            "points": packed(points),
+            "triangles": triangles.ravel().tolist(),
+            "colour": color,
+            "flat": body in ("box", "wedge"),
         }
-        for body in shelf.bodies
+        for points, triangles, body, color in made
     ]

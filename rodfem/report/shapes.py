@@ -1,17 +1,22 @@
-"""States of a branch at equal stations along the rod: centreline and directors, from ``states.h5``."""
+"""States of a branch at equal stations along the rod, from ``states.h5``, and how the page shows the rod first."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from rodfem.errors import InputError
+from rodfem.output.glyphs import Look
+from rodfem.output.pieces import typical_state
+from rodfem.output.solids import curve_of
+from rodfem.output.view import axes_of, thickness
 from rodfem.problem.quaternions import directors
-from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES
+from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting
+from rodfem.problem.setting import read as read_setting
 
 Floats = NDArray[np.float64]
 
@@ -71,8 +76,33 @@ def _state(nodes: tuple[Floats, Floats, Floats], count: int, group: Any) -> tupl
     s, r, q = nodes
     if len(s) < FEWEST_NODES or not np.isfinite(r).all() or not np.isfinite(q).all() or not (np.diff(s) > 0).all():
         raise InputError(f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again.")
-    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
-    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
     at = np.linspace(s[0], s[-1], count)
-    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
-    return at, CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return at, *curve_of(s, r, q, at)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The picture of the typical state.
+
+    ``branch`` and ``row`` are those of the state, ``look`` size and directions of the picture, ``load`` the unit vector
+    along the dead load (3,), or None, and ``setting`` what holds and loads the rod.
+    """
+
+    branch: str
+    row: int
+    look: Look
+    load: Floats | None
+    setting: Setting
+
+
+def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any) -> Stage:
+    """Stage for a diagram; ``groups`` are those of the branches in ``states.h5``, ``shapes`` their states."""
+    branch, row, _ = typical_state(data)
+    first = data["branches"][0]
+    load = next(b["columns"]["load"][row] for b in data["branches"] if b["name"] == branch)
+    left = 0 if branch == first["name"] else int(np.argmin(abs(np.array(first["columns"]["load"]) - load)))
+    reference, (r, frames) = shapes[first["name"]].r[left], shapes[branch][row]
+    setting = read_setting(groups[branch], row)
+    down = setting.force if setting.down is None else setting.down
+    axes = axes_of(setting, reference, r - reference, frames[0])
+    return Stage(branch, row, Look(thickness(r), axes), None if down is None else down / np.linalg.norm(down), setting)

@@ -1,7 +1,7 @@
-"""A state in, a report on its stability out: one interface to all methods, each in :mod:`rodfem.stability.methods`.
+"""A state in, a report on its stability out: one interface to all methods of :mod:`rodfem.stability.registry`.
 
 Every verdict on a conservative state has its index by the count, decided within the count's band by Rayleigh quotients
-(:mod:`rodfem.stability.round_off`); methods differ in how they find eigenvalues and vectors.
+(:mod:`rodfem.stability.near_zero`); methods differ in how they find eigenvalues and vectors.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
-from rodfem.stability.dense import check_number
-from rodfem.stability.method import Found, Method
-from rodfem.stability.methods import AUTO, METHODS, find
-from rodfem.stability.rank import rank_of
-from rodfem.stability.round_off import Decision, decide
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.dependence import rank_of
+from rodfem.stability.methods import Found, Method, Workspace
+from rodfem.stability.near_zero import Decision, decide
+from rodfem.stability.registry import AUTO, METHODS, find
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
-from rodfem.stability.workspace import Workspace
 
 COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
@@ -138,7 +137,7 @@ class Assessor(Workspace):
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
         :class:`InputError` for a method that does not exist or apply, for dependent constraints, and on a small mesh
         for more eigenvalues than it has,
-        :class:`ConvergenceError` where an eigensolver fails.  ``method`` is a name of :mod:`rodfem.stability.methods`,
+        :class:`ConvergenceError` where an eigensolver fails.  ``method`` is a name of :mod:`rodfem.stability.registry`,
         or ``auto``.
         """
         name, reason = self.choose(method, number)
@@ -166,7 +165,7 @@ class Assessor(Workspace):
             except ConvergenceError:
                 few = self.system.fields.unknowns < SMALL * number  # there may be no more than were found
                 if few and not find(DENSE).refusal(self.system):
-                    check_number(self.pencil(x), self.below(x).shift, number)
+                    self._method(DENSE).leftmost(x, number, None)
                 raise
             made += self.factorisations()
         return Verdict(
@@ -195,7 +194,7 @@ class Assessor(Workspace):
         try:
             return decide(self.inertia.at(x))
         except ConvergenceError:
-            rank_of(self.pencil(x, "full"), length=self.system.scene.length)
+            rank_of(Blocks(self.system).assemble(x), length=self.system.scene.length)
             raise
 
 

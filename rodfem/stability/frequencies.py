@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,8 +9,8 @@ from mpi4py import MPI
 
 from rodfem.fem.system import System
 from rodfem.problem.local_state import floats
-from rodfem.stability import mode_type
-from rodfem.stability.condensed import REAL
+from rodfem.stability import motion_names
+from rodfem.stability.spectrum import REAL
 
 MULTIPLE = 1e-8
 """Eigenvalues that differ by less than this, relative, are one that is multiple."""
@@ -31,7 +30,7 @@ class Frequencies:
     """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
 
     Errors are those of ``1 / (mu - shift)`` over the greatest.  ``kinds`` names the motion of each: see
-    :mod:`rodfem.stability.mode_type`.  ``vectors`` (n, k) are complex, or real where all eigenvalues are, with the n
+    :mod:`rodfem.stability.motion_names`.  ``vectors`` (n, k) are complex, or real where all eigenvalues are, with the n
     unknowns of this rank, ``weighed`` (n, k) are their products with the mass, and ``one`` is the natural size of the
     eigenvalues.  The rod is ``floating`` where nothing holds it: it has zero eigenvalues.  Of a rod that is held and
     has slow motions, as a stiff one on soft springs, the ``floor`` is what round-off makes of zero; it is infinite
@@ -88,48 +87,31 @@ def in_order(found: Frequencies) -> Frequencies:
     )
 
 
-def named(
-    system: System, rows: Sequence[tuple[Frequencies, np.ndarray]], number: int | None = None
-) -> list[Frequencies]:
-    """Frequencies of some states, each given with the rotation field there, with the names of their motions.
+def named(system: System, found: Frequencies, turned: np.ndarray, number: int | None = None) -> Frequencies:
+    """Frequencies ``found`` at a state of a ``system``, with names of their motions; ``turned`` is its rotation field.
 
     Only the first ``number`` are named, where that is given.  A multiple eigenvalue has one name, that of its invariant
     subspace: its vectors are any in it, bending about d1 in one state and about d2 in the next.
     """
-    blocks: list[np.ndarray] = []
-    owners: list[np.ndarray] = []
-    counts: list[int] = []
-    together = [
-        [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number] for found, _ in rows
-    ]
-    count = 0
-    for (found, _), of_row in zip(rows, together, strict=True):
-        sizes = [len(group) for group in of_row]
-        vectors = found.vectors[:, [j for group in of_row for j in group]]
-        owner = np.repeat(np.arange(count, count + len(of_row)), sizes)
-        first = 0
-        for group in of_row if max(sizes) > 1 else ():
-            here = slice(first, first := first + len(group))
-            vectors[:, here] = orthonormal(system.comm, vectors[:, here], found.weighed[:, group])
-        parts = [vectors.real, vectors.imag] if np.iscomplexobj(vectors) else [vectors]
-        blocks += parts
-        owners += [owner] * len(parts)
-        counts.append(len(parts) * len(owner))
-        count += len(of_row)
-    squares, moved, columns = np.zeros((count, 3)), np.zeros(count), np.concatenate(blocks, axis=1)
-    turned = np.repeat(np.stack([field for _, field in rows]), counts, axis=0)
-    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, turned, columns))
-    np.add.at(moved, np.concatenate(owners), mode_type.displacements(system, columns))
-    names = iter(mode_type.names(mode_type.of_all(squares, moved)))
-    out, floating = [], floats(system.scene)
-    for (found, _), of_row in zip(rows, together, strict=True):
-        kinds = [""] * len(found.values)
-        for group, name in zip(of_row, names, strict=False):
-            rigid = floating and abs(found.values[group]).max() < STILL * found.far
-            for j in group:
-                kinds[j] = mode_type.RIGID if rigid else name
-        out.append(replace(found, kinds=tuple(kinds)))
-    return out
+    together = [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number]
+    owner = np.repeat(np.arange(len(together)), list(map(len, together)))
+    vectors = np.concatenate([_spanning(system, found, group) for group in together], axis=1)
+    squares, moved = np.zeros((len(together), 3)), np.zeros(len(together))
+    for part in (vectors.real, vectors.imag) if np.iscomplexobj(vectors) else (vectors,):
+        np.add.at(squares, owner, motion_names.squares(system, turned, part))
+        np.add.at(moved, owner, motion_names.displacements(system, part))
+    kinds, floating = [""] * len(found.values), floats(system.scene)
+    for group, name in zip(together, motion_names.names_of(motion_names.of_all(squares, moved)), strict=True):
+        rigid = floating and abs(found.values[group]).max() < STILL * found.far
+        for j in group:
+            kinds[j] = motion_names.RIGID if rigid else name
+    return replace(found, kinds=tuple(kinds))
+
+
+def _spanning(system: System, found: Frequencies, group: list[int]) -> np.ndarray:
+    """Vectors (n, k) of a ``group`` of k equal eigenvalues, orthonormal in the mass where there are several."""
+    vectors = found.vectors[:, group]
+    return orthonormal(system.comm, vectors, found.weighed[:, group]) if len(group) > 1 else vectors
 
 
 def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[list[int]]:

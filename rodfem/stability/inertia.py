@@ -22,13 +22,13 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.compiled_newton import CompiledNewton
-from rodfem.fem.phase import Phase
 from rodfem.fem.state import State
+from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors, Sizes
 from rodfem.linalg.matrices import local_rows, places_in, rounding, shared
-from rodfem.linalg.orthogonal import Basis, combine, generic, orthonormalize
+from rodfem.linalg.orthogonal import generic
 from rodfem.linalg.selection import factors_of
 from rodfem.tolerances import TINY
 
@@ -39,10 +39,12 @@ ZERO_BAND = 1e-7
 """Half width of the band of eigenvalues that count as zero, over the lowest bending one, where round-off is below."""
 NULL, ROUGH = 1e-8, 1e-2
 """Relative change of eigenvalues nearest zero at which their vectors are null vectors, and first guesses of a mode."""
-EXPANDED, DEPTH = 4, 5
-"""Iterations of a block before a Krylov space takes its place, and blocks of that space."""
+DEPTH, RESTARTS = 5, 20
+"""Blocks of a Krylov space, and how often it is begun anew, at most."""
+ROUNDED = 1e-13
+"""Residual, over the largest eigenvalue of the inverse, that is round-off."""
 DEPENDENT = 1e-10
-"""Part of a vector that is left across a space, below which it spans nothing new."""
+"""Part of a vector that is left across a space, and square of that among others, below which it spans nothing new."""
 FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
 FAR = 0.1
@@ -139,6 +141,12 @@ class Inertia:
         held, phase, changes = self._held or (None, None, 0)
         return held is state and phase is self.system.phase and changes == self.matrix.stateGet()
 
+    def moved(self, x: PETSc.Vec) -> Factored:
+        """Assemble ``S`` at ``x`` near the last state, whose phase conditions stay: for a difference."""
+        self._assemble(x, self.system.at(x))
+        self.filled += 1
+        return Factored(self)
+
     def _assemble(self, x: PETSc.Vec, state: State) -> None:
         system = self.system
         with system.clock("assembly"):
@@ -205,12 +213,47 @@ class Inertia:
 
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors, the columns of ``own`` (own rows, count)."""
-        if self._weights is not None:
-            return np.asarray(self._weights @ own)
-        vector, out = self.system.new_vector(), np.empty_like(own)
-        for i in range(own.shape[1]):
-            vector.array[:] = own[:, i]
-            out[:, i] = (self.metric * vector).array_r.real
+        return np.asarray(self._weights @ own) if self._weights is not None else self._products(self.metric, own)
+
+    def times(self, own: np.ndarray) -> np.ndarray:
+        """The matrix that is held now times vectors, the columns of ``own`` (own rows, count)."""
+        known = self._shared
+        return np.asarray(known.matrix @ own) if known is not None else self._products(self.matrix, own)
+
+    def _products(self, matrix: PETSc.Mat, own: np.ndarray) -> np.ndarray:
+        out = np.empty_like(own)
+        for i, column in enumerate(own.T):
+            out[:, i] = (matrix * self.vector(column)).array_r.real
+        return out
+
+    def across(self, own: np.ndarray, basis: np.ndarray, duals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Basis of what vectors (own rows, k) span besides a ``basis``, and its products with the metric.
+
+        Both are orthonormal in the metric, ``duals`` are its products with the ``basis``.  What is less than
+        :data:`DEPENDENT` of a vector spans nothing new.
+        """
+        size = self.sizes(own) if basis.shape[1] else np.ones(own.shape[1])
+        for _ in range(2 if basis.shape[1] else 0):
+            own = own - basis @ self.sum(duals.T @ own)
+        images = self.weighed(own)
+        left = np.sqrt(np.maximum(self.sum((own * images).sum(axis=0)), 0.0))
+        new = left > DEPENDENT * size
+        own, images = own[:, new] / left[new], images[:, new] / left[new]
+        for _ in range(2):
+            squares, turn = np.linalg.eigh(self.sum(own.T @ images))
+            kept = squares > DEPENDENT
+            turn = turn[:, kept] / np.sqrt(squares[kept])
+            own, images = own @ turn, images @ turn
+        return own, images
+
+    def sizes(self, own: np.ndarray) -> np.ndarray:
+        """Norms (k,) of vectors (own rows, k) in the metric."""
+        return np.sqrt(np.maximum(self.sum((own * self.weighed(own)).sum(axis=0)), 0.0))
+
+    def vector(self, own: np.ndarray) -> PETSc.Vec:
+        """Vector of own rows."""
+        out = self.system.new_vector()
+        out.array[:] = own
         return out
 
     def sum(self, own: np.ndarray) -> np.ndarray:
@@ -302,71 +345,76 @@ class Factored:
         zero = self.below(own.tolerance) - negative + self.drifts
         return Index(negative, zero)
 
-    def nearest(
-        self, number: int, accuracy: float = 1e-3, most: int = 60, spare: int = 1
-    ) -> tuple[np.ndarray, list[PETSc.Vec]]:
+    def nearest(self, number: int, accuracy: float = 1e-3, spare: int = 1) -> tuple[np.ndarray, list[PETSc.Vec]]:
         """Return the eigenvalues nearest zero, and their vectors (metric norm 1).
 
-        Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
-        ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
-        resolves).  The block has ``spare`` more vectors.  It converges as the ratio of the eigenvalues inside it to the
-        next one, slowly where these are close: every few iterations a Krylov space takes its place, where all converge
-        much faster.  At most ``most`` iterations are made.  Factors of a count at the edge of a wide band of round-off
-        are replaced by others.
+        Block Lanczos for the largest eigenvalues ``nu`` of ``A = S^-1 M`` with full orthogonalisation, restarted with a
+        block of ``spare`` vectors more than the ``number`` wanted, first those of the last call, until each has the
+        relative ``accuracy``, or what the arithmetic resolves, by its residual in the metric or by its last change.
+        Values are the quotients of ``S`` then.  Factors of a count at the edge of a wide band of round-off are replaced
+        by others.
         """
         own, block = self._own(), number + spare
         if own.factored == self._filled and abs(own.shift) > FAR * own.scale:
             self.below(ZERO_BAND * own.scale)
-        vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]
-        values = np.full(block, np.inf)
-        for i, v in enumerate(vectors):
-            v.axpy(FRESH, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
+        # the old vectors may span an invariant space that misses the nearest one
+        vectors = np.stack([own.seed(i).array_r.real for i in range(block)], axis=1)
+        for column, known in zip(vectors.T, own.vectors, strict=False):
+            column[:] = known.array_r.real + FRESH * column
+        before = np.full(number, np.inf)
         with own.system.clock("stability"):
-            for iteration in range(most):
-                own.system.tidy(block)
-                if iteration and iteration % EXPANDED == 0:
-                    vectors = self._in_krylov_space(vectors)
-                solved = self._inverse(vectors)
-                orthonormalize(solved, own.metric)
-                images = [own.matrix * y for y in solved]
-                # Rayleigh-Ritz: the quotients of S - shift M on the block, whose basis is orthonormal in M
-                theta, z = np.linalg.eigh(np.array([[y.dot(w) for w in images] for y in solved]))
-                order = np.argsort(abs(theta + own.shift))
-                last, values = values, theta[order] + own.shift
-                vectors = [combine(solved, z[:, j]) for j in order]
-                change = abs(values - last)[:number]
-                # a wide band of round-off is that of rough vectors: it does not excuse an inexact smooth one
-                floor = min(own.resolution, accuracy * own.scale)
-                if np.all(change <= np.maximum(accuracy * abs(values[:number]), floor)):
+            for _ in range(RESTARTS):
+                nu, vectors, residuals = self._in_krylov_space(vectors)
+                if self._settled(nu, before, residuals, accuracy):
                     break
-        own.vectors = vectors
-        return values[:number], [v.copy() for v in vectors[:number]]
+                before = nu[:number]
+            images = own.times(vectors)
+            theta, z = np.linalg.eigh(own.sum(vectors.T @ images))
+            order = np.argsort(abs(theta + own.shift))
+            found = [own.vector(v) for v in (vectors @ z[:, order]).T]
+        own.vectors = found
+        return (theta[order] + own.shift)[:number], [v.copy() for v in found[:number]]
 
-    def _inverse(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
-        """``S^-1 M`` of vectors."""
-        out = [v.duplicate() for v in vectors]
-        for v, solved in zip(vectors, out, strict=True):
-            self.factors.solve(self.inertia.metric * v, solved)
-        return out
+    def _settled(self, nu: np.ndarray, before: np.ndarray, residuals: np.ndarray, accuracy: float) -> bool:
+        """Whether the first k eigenvalues ``nu`` have an ``accuracy``, of 1 / nu relative to itself.
 
-    def _in_krylov_space(self, block: list[PETSc.Vec]) -> list[PETSc.Vec]:
-        """As many Ritz vectors of ``A = S^-1 M`` in the space of ``block, A block, ...``, for its largest eigenvalues.
-
-        Block Lanczos with full orthogonalisation.  The projection is that of ``A``, whose eigenvalues of interest are
-        outermost: one of ``S`` would have values near zero that are nobody's.
+        Each is known to within its residual ``r``, and to ``r^2`` over its distance from the others (Kato 1949, Temple
+        1928), or by what it was ``before`` (k,).
         """
-        basis, new = Basis(self.inertia.metric), block
-        images: list[PETSc.Vec] = []
+        wanted, others = np.split(nu, [len(before)])
+        before, residuals = before[: len(wanted)], residuals[: len(wanted)]
+        apart = abs(wanted[:, None] - others).min(axis=1, initial=np.inf)
+        left = residuals * np.minimum(1.0, residuals / np.maximum(apart, TINY))
+        # a wide band of round-off is that of rough vectors: it does not excuse an inexact smooth one
+        floor = min(self.inertia.resolution, accuracy * self.inertia.scale)
+        allowed = np.maximum(accuracy * abs(wanted), floor * wanted**2)
+        left = np.minimum(left, abs(wanted - before))
+        return bool((left <= np.maximum(allowed, ROUNDED * abs(wanted).max())).all())
+
+    def _in_krylov_space(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Eigenvalues of ``A`` in the space of ``block, A block, ...``, the largest in size first.
+
+        Of as many as there are vectors, returns ``A`` times theirs, orthonormalised, and the residuals of these, both
+        in the metric.  The projection is that of ``A``, whose eigenvalues of interest are outermost: one of ``S`` would
+        have values near zero that are nobody's.
+        """
+        own, size = self.inertia, block.shape[1]
+        basis = duals = images = np.zeros((len(block), 0))
+        new = block
         for _ in range(DEPTH):
-            for v in new:
-                basis.add(v.copy(), DEPENDENT)
-            new = self._inverse(basis.vectors[len(images) :])
-            images += new
-        if len(images) < len(block):  # a mesh of a few unknowns has no more
-            return block
-        projection = np.array([[dual.dot(w).real for w in images] for dual in basis.duals])
+            new, weighed = own.across(new, basis, duals)
+            if not new.shape[1]:
+                break
+            basis, duals = np.hstack([basis, new]), np.hstack([duals, weighed])
+            new = self.factors.solve_all(weighed)
+            images = np.hstack([images, new])
+        projection = own.sum(duals.T @ images)
         nu, z = np.linalg.eigh((projection + projection.T) / 2)
-        return [combine(basis.vectors, z[:, j]) for j in np.argsort(-abs(nu))[: len(block)]]
+        order = np.argsort(-abs(nu))
+        nu, z = nu[order], z[:, order[:size]]
+        vectors = images @ z
+        residuals = own.sizes(vectors - basis @ z * nu[:size])
+        return nu, own.across(vectors, basis[:, :0], basis[:, :0])[0], residuals
 
     def noise(self, mode: PETSc.Vec) -> float:
         r"""Round-off in the eigenvalue of a ``mode`` of metric norm 1.

@@ -8,17 +8,14 @@ import numpy as np
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.matrices import local_rows, rounding_of
-from rodfem.stability import mode_type
-from rodfem.stability.cluster_noise import DRAWN
+from rodfem.stability import motion_names
+from rodfem.stability.cluster import DRAWN
 from rodfem.stability.frequencies import Frequencies
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 SAME = 1e-6
 """Relative difference below which a left and a right eigenvalue are paired."""
-
-REAL = 1e-10
-"""Relative imaginary part below which an eigenvalue counts as real."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
     quotients = comm.allreduce(np.sum(Z * (local_rows(pencil.matrix) @ np.concatenate(comm.allgather(X))), axis=0))
     rounded = np.array([rounding_of(pencil.matrix, z, x) for z, x in zip(Z.T, X.T, strict=True)])
     return TwoSided(
-        np.where(abs(values.imag) < REAL * abs(values), values.real, values),
+        values,
         right.errors[chosen],
         tuple(right.kinds[i] for i in chosen),
         X,
@@ -81,7 +78,7 @@ def moving(found: Frequencies, number: int) -> list[int]:
 
     Raises :class:`ConvergenceError` where there are fewer.
     """
-    places = [i for i in upper(found.values, len(found.values)) if found.kinds[i] != mode_type.RIGID]
+    places = [i for i in upper(found.values, len(found.values)) if found.kinds[i] != motion_names.RIGID]
     if len(places) < number:
         raise ConvergenceError(
             f"The mesh has {len(places)} modes, not {number}: ask for fewer, or use a richer discretisation."
@@ -91,8 +88,7 @@ def moving(found: Frequencies, number: int) -> list[int]:
 
 def upper(values: np.ndarray, number: int) -> list[int]:
     """Places of the ``number`` of ``values`` nearest zero that have no negative imaginary part: one of each pair."""
-    kept = values.imag > -SAME * abs(values)
-    return [int(i) for i in np.argsort(abs(values), kind="stable") if kept[i]][:number]
+    return [int(i) for i in np.argsort(abs(values), kind="stable") if values[i].imag >= 0.0][:number]
 
 
 def alone(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:

@@ -1,10 +1,14 @@
-r"""Names of soft modes: the motions of a rod that cost it little energy, as generators of its states.
+r"""Names of modes of vibration and of soft modes.
 
-A vector ``v`` of metric norm 1 is named after the first group of generators ``g_j`` in whose span it lies, nearly: its
-share there is ``b . G^+ b`` with ``G_ij = g_i . M g_j`` and ``b_j = g_j . M v``.  Groups are, in this order, the rigid
-motions, turning of the cross-sections about one director, and the motion along the rod, whose generator is the
-derivative of the state in arclength; a rod that is twisted, or a helix, has to turn as it slides.  Any other vector is
-named after the directors about which the rod turns in it.  Symmetries of the state are no part of any generator here.
+A mode of vibration is named after the directors about which the rod turns in it: bending about one or the other,
+torsion, mixed, or without rotation.
+
+A soft mode is a motion that costs the rod little energy.  Its vector ``v`` of metric norm 1 is named after the first
+group of generators ``g_j`` of the state in whose span it lies, nearly: its share there is ``b . G^+ b`` with ``G_ij =
+g_i . M g_j`` and ``b_j = g_j . M v``.  Groups are, in this order, the rigid motions, turning of the cross-sections
+about one director, and the motion along the rod, whose generator is the derivative of the state in arclength; a rod
+that is twisted, or a helix, has to turn as it slides.  Any other vector is named as a mode of vibration.  Symmetries of
+the state are no part of any generator here.
 """
 
 from __future__ import annotations
@@ -15,11 +19,10 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.fem.generators import Generators
 from rodfem.fem.state import State
-from rodfem.fem.symmetries import Symmetry, elementary_generators, rigid_motions, summed
+from rodfem.fem.symmetries import Generators, Symmetry, elementary_generators, rigid_motions, summed
 from rodfem.fem.system import System
-from rodfem.stability import mode_type
+from rodfem.tolerances import TINY
 
 SHARE = 0.9
 """Share of a vector in the span of a group above which it is named after it."""
@@ -27,6 +30,15 @@ LARGEST_PART = 0.5
 """Part of a rigid motion, relative to the largest one, above which it is named."""
 DEPENDENT = 1e-8
 """Eigenvalue of a Gram matrix of unit vectors below which they are dependent; square of a negligible generator."""
+PURE = 0.99
+"""Share of the mean square rotation above which a mode is named after one kind of motion."""
+RIGID = "rigid motion"
+"""Name of what a rod that nothing holds does at no frequency: translations have no rotation to be named after."""
+STRAIGHT = "without rotation"
+"""Name of a vibration along the rod, or of one in which it moves as a whole."""
+LEAST = 1e-5
+"""Mean square rotation over that of displacements, by the length, below which there is none but for round-off."""
+KINDS = ("bending about d1", "bending about d2", "torsion")
 
 Group = list[tuple[str, PETSc.Vec]]
 
@@ -49,8 +61,8 @@ class MotionNames:
         if not vectors:
             return []
         state = self.system.at(x)
-        turning, rigid, along = self.generators(x, state)
-        return [self._name(state, v, turning, rigid, along) for v in vectors]
+        groups = self.generators(x, state)
+        return [self._name(state, v, groups) for v in vectors]
 
     def generators(self, x: PETSc.Vec, state: State) -> tuple[Group, Group, Group]:
         """Turning of the cross-sections, rigid motions, and the motion along the rod at a ``state``, which is ``x``.
@@ -91,7 +103,8 @@ class MotionNames:
         """Changes of state by all the motions, made when one is first asked for."""
         return Generators(self.system, [*self._turning.values(), *self._rigid.values(), self._along])
 
-    def _name(self, state: State, v: PETSc.Vec, turning: Group, rigid: Group, along: Group) -> str:
+    def _name(self, state: State, v: PETSc.Vec, groups: tuple[Group, Group, Group]) -> str:
+        turning, rigid, along = groups
         share, weights = self.share(v, rigid)
         if share > SHARE:
             named = abs(weights) > LARGEST_PART * abs(weights).max()
@@ -101,7 +114,7 @@ class MotionNames:
                 return motion[0]
         if along and self.share(v, [*along, *turning, *rigid])[0] > SHARE:
             return along[0][0]
-        return mode_type.name(mode_type.shares(self.system, state.turned, [v.array_r.real]))
+        return name_of(turning_shares(self.system, state.turned, [v.array_r.real]))
 
     def share(self, v: PETSc.Vec, group: Group) -> tuple[float, np.ndarray]:
         """Share of ``v`` (metric norm 1) in the span of a group, and the weights of the members in its projection."""
@@ -120,3 +133,66 @@ def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
     """
     weights = np.linalg.pinv(gram, rcond=DEPENDENT, hermitian=True) @ b
     return float(weights @ b), weights
+
+
+def turning_shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
+    """Shares of the rotations about the three directors in a mode, (3,), summing to one, or to zero without rotation.
+
+    Collective.  ``turned`` and ``parts``, the real and the imaginary part of the mode, as in :func:`squares`.
+    """
+    columns = np.stack(parts, axis=1)
+    square, moved = squares(system, turned, columns).sum(axis=0), displacements(system, columns).sum()
+    return of_all(square[None, :], np.array([moved]))[0]
+
+
+def of_all(squares: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Shares (k, 3) of rotations with these ``squares`` (k, 3), zero where they are none beside displacements (k,)."""
+    every = squares.sum(axis=1)
+    return np.asarray(np.where(every > LEAST * moved, 1.0 / np.maximum(every, TINY), 0.0)[:, None] * squares)
+
+
+def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Integrals of the squared rotations about the three directors in each of some perturbations, (k, 3); collective.
+
+    ``turned`` (cells, nodes, components) is the rotation field of the state; ``columns`` (n, k) are the perturbations
+    as values of this rank's unknowns.  The rotation is
+    the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
+    """
+    f = system.fields
+    cells = slice(0, f.owned_cells)
+    size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
+    change = system.changes(columns)[:, f.dofs[f.turning.name][cells]]
+    turned = turned[cells]
+    q, dq = f.turning.quaternion(turned), f.turning.change(turned, change)
+    scalar, v, dv = q[..., :1], q[..., 1:], dq[..., 1:]
+    across = v[..., [1, 2, 0]] * dv[..., [2, 0, 1]] - v[..., [2, 0, 1]] * dv[..., [1, 2, 0]]  # v x dv
+    w = scalar * dv - dq[..., :1] * v - across
+    mine = (w**2 * size).sum(axis=(1, 2))
+    return np.asarray(mine if system.comm.size == 1 else system.comm.allreduce(mine))
+
+
+def displacements(system: System, columns: np.ndarray) -> np.ndarray:
+    """Integrals of the squared displacements, over the rod's length, in each of some perturbations (k,); collective.
+
+    They are summed as rotations are: see :func:`squares`.  Without a centreline there are none.
+    """
+    f = system.fields
+    if "r" not in f.dofs:
+        return np.zeros(columns.shape[1])
+    cells = slice(0, f.owned_cells)
+    size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None] / system.scene.length**2
+    mine = (system.changes(columns)[:, f.dofs["r"][cells]] ** 2 * size).sum(axis=(1, 2, 3))
+    return np.asarray(mine if system.comm.size == 1 else system.comm.allreduce(mine))
+
+
+def name_of(share: np.ndarray) -> str:
+    """Name of a motion by its shares: of :data:`KINDS`, ``bending`` (about both), ``mixed``, or :data:`STRAIGHT`."""
+    return names_of(share[None, :])[0]
+
+
+def names_of(shares: np.ndarray) -> list[str]:
+    """The same of several motions, (k, 3)."""
+    kinds = (*KINDS, "bending", "mixed")
+    mixed = np.where(shares[:, 0] + shares[:, 1] > PURE, len(KINDS), len(KINDS) + 1)
+    found = [kinds[i] for i in np.where(shares.max(axis=1) > PURE, shares.argmax(axis=1), mixed).tolist()]
+    return [STRAIGHT if not share.any() else kind for share, kind in zip(shares, found, strict=True)]

@@ -1,45 +1,170 @@
-r"""The eigenvalues near zero at a state, and what round-off leaves open of each.
+r"""The eigenvalues near zero at a state: their values, and what round-off leaves open of each.
 
-The uncertainty on one mesh is the larger of two numbers: the round-off of the Rayleigh quotient
-(:func:`~rodfem.stability.round_off.quotient_error`), and that of the state itself, which Newton's method solves for to
-:data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh adds to that a richer one tells
-(:mod:`rodfem.adaptivity.soft_states`).
+The factors of ``S`` are the exact ones of a matrix that differs by about ``eps |S|``.  An eigenvalue relative to the
+metric is then uncertain by that over the smallest mass: ``|S| ~ 1/h``, ``m ~ h`` for linear elements of size h, so that
+a count decides nothing within the *band* ``10 eps |S| / m ~ eps/h^2``.  That is the bound for the roughest vector.
+For one smooth vector y of metric norm 1 independent errors of the entries of S change the quotient ``y.Sy`` by about
+
+    eps (sum_ij (S_ij y_i y_j)^2)^(1/2),
+
+smaller by some powers of h.  Eigenvalues inside the band are therefore decided by their quotients, and count as zero
+only where ten times this exceeds their magnitude.
+
+Those nearer to zero than a part of the lowest bending eigenvalue are *soft*.  Their uncertainty on one mesh is at least
+what Newton's method leaves of the state, :data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh adds to that a richer one
+tells (:mod:`rodfem.adaptivity.soft_states`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.stability.inertia import NULL, ROUGH, Factored, Index, Inertia
-from rodfem.stability.round_off import MANY, SPARE, quotient_error
+from rodfem.linalg.matrices import rounding
+from rodfem.stability.inertia import NULL, ROUGH, ZERO_BAND, Factored, Index, Inertia
 from rodfem.stability.soft_mode import Judgement, SoftMode
 
+MANY = 100
+"""Most eigenvalues near zero that are decided one by one."""
+WILD = 1e6
+"""Half width of the band, over the lowest bending eigenvalue, above which nothing is decided."""
+DECIDED = 1e-3
+"""Relative accuracy of eigenvalues that decide a sign."""
+FAR = 1e-2
+"""Eigenvalue, over the lowest bending one, above which a relative accuracy of 1e-3 tells it from zero."""
+SPARE = 2
+"""Vectors more than there are eigenvalues in the band."""
 SOFT = 1e-4
-"""Eigenvalues nearer to zero than this, over the lowest bending eigenvalue, are soft."""
-FIRM = 1e-4
-"""Relative change at which eigenvalues have converged that are not soft."""
+"""Eigenvalues nearer to zero than this, over the lowest bending one, are soft; and are solved for to this change."""
 CLEAR = 10.0
 """Times that limit beyond which a rough estimate of the nearest eigenvalue says that none is soft."""
 
 
 @dataclass(frozen=True)
-class NearZero:
-    """Soft eigenvalues of a state, their ``values`` in ascending order, ``vectors``, and ``uncertainty`` on the mesh.
-
-    ``firm`` is the number of negative eigenvalues that are not among them, ``zero`` that of zeros that are not.
-    """
+class Quotients:
+    """Rayleigh quotients ``values`` (k,) of ``vectors``, and their ``uncertainty`` (k,) by round-off in the matrix."""
 
     values: np.ndarray
     vectors: list[PETSc.Vec]
     uncertainty: np.ndarray
+
+    @property
+    def negative(self) -> int:
+        """Number of those that are negative."""
+        return int((self.values < -self.uncertainty).sum())
+
+    @property
+    def zero(self) -> int:
+        """Number of those that are zero to working accuracy."""
+        return int((abs(self.values) <= self.uncertainty).sum())
+
+
+@dataclass(frozen=True)
+class Decision:
+    """An ``index``, the half width of what counted as zero, and the eigenvalues inside the band of the count.
+
+    Attributes
+    ----------
+    band
+        Half width of the band in which the inertia alone decides nothing, relative to the system's metric.
+    inside
+        Rayleigh quotients of the eigenvalues inside the band, symmetry modes left out.
+    uncertainty
+        What round-off in the matrix may make of each of them: those smaller than theirs are counted as zero.
+    """
+
+    index: Index
+    band: float
+    inside: np.ndarray
+    uncertainty: np.ndarray
+
+
+@dataclass(frozen=True)
+class NearZero(Quotients):
+    """Soft eigenvalues of a state, in ascending order.
+
+    ``firm`` is the number of negative eigenvalues that are not among them, ``rest`` that of zeros that are not.
+    """
+
     firm: int
-    zero: int
+    rest: int
+
+
+def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
+    """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
+    return 10 * rounding(matrix, y, y)
+
+
+def quotients(found: Factored, vectors: list[PETSc.Vec], least: float = 0.0) -> Quotients:
+    """Rayleigh quotients of ``vectors`` of metric norm 1 at a state; ``least`` is the smallest uncertainty."""
+    values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
+    return Quotients(values, vectors, np.array([max(quotient_error(found.matrix, v), least) for v in vectors]))
+
+
+def inside_band(found: Factored, number: int, accuracy: float = DECIDED, least: float = 0.0) -> Quotients:
+    """The ``number`` eigenvalues inside the band of the count, which were ``found``.
+
+    Those near zero have the relative ``accuracy``, the others are accurate enough for their signs; ``least`` is the
+    smallest uncertainty.  Raises :class:`ConvergenceError` where others are found than were counted.
+    """
+    inertia = found.inertia
+    theta, vectors = found.nearest(number + SPARE, DECIDED)
+    vectors = [vectors[i] for i in np.argsort(abs(theta))]
+    small = int((abs(theta) < FAR * inertia.scale).sum())
+    if accuracy < DECIDED and small:  # the signs of all others are known
+        vectors[:small] = found.nearest(small, accuracy)[1]
+        inertia.vectors = list(vectors)
+    out = quotients(found, vectors[:number], least)
+    if (abs(out.values) > 2 * inertia.tolerance).any():
+        raise ConvergenceError(
+            f"{number} eigenvalues are within round-off of the count, {inertia.tolerance:.2g} in the metric, and are "
+            "not told apart: take larger elements, or a lower degree."
+        )
+    return out
+
+
+def decide(found: Factored) -> Decision:
+    """Count at a state; eigenvalues within the band are decided by their Rayleigh quotients.
+
+    Raises :class:`ConvergenceError` where there are too many of those.
+
+    Factorisations are those of the count alone, the last of which serves :meth:`~Factored.nearest` here and afterwards.
+    """
+    index, inertia = found.count(), found.inertia
+    inside, least = index.zero - found.drifts, ZERO_BAND * inertia.scale
+    if inside == 0 or inertia.resolution <= least:
+        return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
+    if inertia.resolution > WILD * inertia.scale:
+        raise ConvergenceError(
+            f"Eigenvalues up to {inertia.resolution:.2g} are within round-off of the count, {inertia.scale:.2g} is the "
+            "lowest of bending: the state, or a stiffness, is out of all proportion to it."
+        )
+    if inside > MANY:
+        raise ConvergenceError(
+            f"{inside} eigenvalues are within round-off of the count, {inertia.resolution:.2g} in the metric: the mesh "
+            "is too fine for this rod; use fewer elements of a higher degree."
+        )
+    q = inside_band(found, inside, least=least)
+    index = replace(index, negative=index.negative + q.negative, zero=q.zero + found.drifts)
+    return Decision(index, inertia.tolerance, q.values, q.uncertainty)
+
+
+def resolve(found: Factored) -> tuple[int, int]:
+    """Least and greatest index of a state, small eigenvalues judged by their Rayleigh quotients.
+
+    Those within the tolerance of zero are told from zero down to their round-off; what is left open between the two
+    numbers is zero to working accuracy.  Modes of symmetries are left out.
+    """
+    index = found.count()
+    if (near := index.zero - found.drifts) <= 0:
+        return index.negative, index.negative
+    q = inside_band(found, near, NULL)
+    return index.negative + q.negative, index.negative + q.negative + q.zero
 
 
 def soft_limit(inertia: Inertia) -> float:
@@ -56,14 +181,36 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     inertia = found.inertia
     index, limit = index or found.count(), soft_limit(inertia)
     inside = index.zero - found.drifts
-    number = max(inside, least) + SPARE
+    members = _candidates(found, limit, inside, least)
+    if members is None:
+        return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
+    q = quotients(found, members, TOLERANCE * inertia.scale)
+    # the count has the nearest ones as zero: beside its tolerance a quotient and the count need not agree
+    counted = np.argsort(abs(q.values))[inside:]
+    firm = index.negative - int((q.values[counted] < 0).sum())
+    order = np.argsort(q.values)
+    values, uncertainty = q.values[order], q.uncertainty[order]
+    # in a wide band of round-off most eigenvalues are told from zero by their quotients
+    away = abs(values)
+    soft = (away < SOFT * inertia.scale) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
+    vectors = [members[i] for i in order[soft]]
+    firm += int((values[~soft] < 0).sum())
+    return NearZero(values[soft], vectors, uncertainty[soft], firm, found.drifts + int((values[~soft] == 0).sum()))
+
+
+def _candidates(found: Factored, limit: float, inside: int, least: int) -> list[PETSc.Vec] | None:
+    """Vectors of the eigenvalues within the ``limit``, ``inside`` of them in a count, and of the ``least`` number.
+
+    None where a rough estimate is far from it.
+    """
+    inertia, number = found.inertia, max(inside, least) + SPARE
     with inertia.afresh():  # whatever was computed before, the same result
         if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
-            return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
-        values, vectors = found.nearest(number, FIRM)
+            return None
+        values, vectors = found.nearest(number, SOFT)
         while (abs(values) < limit).all() and number < MANY:
             number *= 2
-            values, vectors = found.nearest(number, FIRM)
+            values, vectors = found.nearest(number, SOFT)
         # what is far from zero need not be as sharp: the values there lie dense on coarse meshes, and converge slowly
         close = int((abs(values) < CLEAR * SOFT * inertia.scale).sum())
         if close:
@@ -75,21 +222,7 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
             f"{inside} or more eigenvalues are within {limit:.2g} of zero and are not told apart: use fewer elements "
             "of a higher degree."
         )
-    members = [vectors[i] for i in chosen]
-    quotients = np.array([v.dot(found.matrix * v).real for v in members]) + found.shift
-    floor = TOLERANCE * inertia.scale
-    uncertainty = np.array([max(quotient_error(found.matrix, v), floor) for v in members])
-    # the count has the nearest ones as zero: beside its tolerance a quotient and the count need not agree
-    counted = np.argsort(abs(quotients))[inside:]
-    firm = index.negative - int((quotients[counted] < 0).sum())
-    order = np.argsort(quotients)
-    values, uncertainty = quotients[order], uncertainty[order]
-    # in a wide band of round-off most eigenvalues are told from zero by their quotients
-    away = abs(values)
-    soft = (away < SOFT * inertia.scale) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
-    vectors = [members[i] for i, is_soft in zip(order, soft, strict=True) if is_soft]
-    firm += int((values[~soft] < 0).sum())
-    return NearZero(values[soft], vectors, uncertainty[soft], firm, found.drifts + int((values[~soft] == 0).sum()))
+    return [vectors[i] for i in chosen]
 
 
 def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judgement:
@@ -101,4 +234,4 @@ def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judge
     told = [m for m in modes if m.decided]
     negative = found.firm + sum(m.value < 0 for m in told)
     zero = sum(not m.decided and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
-    return Judgement(negative, found.zero + zero, len(modes) - len(told), tuple(modes))
+    return Judgement(negative, found.rest + zero, len(modes) - len(told), tuple(modes))

@@ -4,7 +4,12 @@ A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low
 couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
 axis: flutter.
 
-The finite eigenvalues are those of the pencil on its unknowns with mass: :mod:`~rodfem.stability.condensed`.
+The finite eigenvalues are those of the pencil on its unknowns with mass: :mod:`~rodfem.stability.spectrum`.
+
+What round-off makes of an eigenvalue that is zero is bounded by 1e-7 of the natural size of bending, whatever the rod.
+Where it has motions far slower than bending, as a stiff rod on soft supports, that is too much: theirs may be as small.
+It is measured for them then, by independent relative errors of all entries of the matrix, and they are solved for to
+what a state leaves open of them.
 
 A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
 ``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
@@ -13,26 +18,20 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
-from scipy.sparse.linalg import splu
 
 from rodfem import compat
-from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.linalg.chain import Chain, Elimination, GaveUpError
-from rodfem.linalg.factorization import Factors
-from rodfem.linalg.matrices import Shared, gathered, local_rows, places_in, shared
-from rodfem.linalg.selection import factors_of
+from rodfem.linalg.matrices import gathered, local_rows, rounding_of, shared
 from rodfem.problem.local_state import floats
-from rodfem.stability import mode_type
-from rodfem.stability.condensed import SHIFT, Condensed, Eigenpairs
+from rodfem.stability import motion_names
 from rodfem.stability.frequencies import REAL, Frequencies, in_order, named, orthonormal, product, squares
+from rodfem.stability.inertia import NOISE
 from rodfem.stability.pencil import (
-    FACTORS,
     PencilMatrices,
     StatePencil,
     assemble_pencil,
@@ -40,14 +39,19 @@ from rodfem.stability.pencil import (
     symmetry_modes,
     weighed_modes,
 )
-from rodfem.stability.slow_motions import floor_of_slow
-from rodfem.stability.spectrum import Spectrum, inside
+from rodfem.stability.spectrum import SHIFT, Condensed, Eigenpairs, Spectrum, condensed, inside, times
 from rodfem.tolerances import NEGLIGIBLE
 
 BEYOND = 6
 """Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
 SPARE = 2
 """Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
+FREQUENCIES = 6
+"""Number of frequencies recorded at each load where nobody asks for another."""
+SLOW, SOLVED, CLEAR = 1e-3, 1e-9, 10.0
+"""Part of the natural size below which eigenvalues are slow, what a state leaves open of them, and times that."""
+APART = 1e-3
+"""Relative distance of two slow ones that are not one: one, or a multiple one, may be about to vanish in any rod."""
 PILE = 64
 """States after which what PETSc keeps of matrices that are not used any more is destroyed."""
 
@@ -61,8 +65,6 @@ class NonsymmetricSolver(PencilMatrices):
     def __init__(self, system: System) -> None:
         """Allocate the matrices of the pencil once."""
         super().__init__(system)
-        self.inverted: tuple[PETSc.Mat, Factors] | None = None
-        self.places: np.ndarray | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
         self._rows: sp.csr_matrix | None = None
         self.floating = system.scene.closed or floats(system.scene)
@@ -70,10 +72,9 @@ class NonsymmetricSolver(PencilMatrices):
 
     @property
     def rows(self) -> sp.csr_matrix:
-        """The mass on one rank, real; where compiled code assembles it, an array that is the matrix's own."""
+        """The mass, real, rows of this rank; where compiled code assembles it, an array that is the matrix's own."""
         if (own := shared(self.mass)) is None:
-            start, columns, values = self.mass.getValuesCSR()
-            return sp.csr_matrix((values.real, columns, start), shape=self.mass.size)
+            return local_rows(self.mass).real
         if self._rows is None:
             self._rows = own.matrix
         return self._rows
@@ -133,11 +134,11 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         ``S g = 0`` follows ``z.Mg = 0``.
         """
         with self.system.clock("stability"):
-            condensed = self.condensed(target)
-            pairs = condensed.greatest(number + SPARE, left=left)
+            pencil = self.condensed(target)
+            pairs = pencil.greatest(number + SPARE, left=left)
             pairs = pairs.at(slice(len(pairs.nu) - _half(pairs.nu)))
-            found = self._found(condensed, condensed.values(pairs), pairs, left=left)
-            return named(self.system, [(in_order(found), self.turned)])[0]
+            found = self._found(pencil, pencil.values(pairs), pairs, left=left)
+            return named(self.system, in_order(found), self.turned)
 
     def near_zero(self, number: int, *, left: bool = False) -> Frequencies:
         """Return more than the ``number`` eigenvalues nearest zero, in ascending order of their real parts."""
@@ -149,7 +150,24 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         with self.system.clock("stability"):
             one = self.system.scene.units.omega2
             found = Spectrum(self.condensed(SHIFT * one), one)
-            return replace(found, floor=floor_of_slow(self, found))
+            return replace(found, floor=self._floor(found))
+
+    def _floor(self, spectrum: Spectrum) -> float:
+        """Round-off of the slow eigenvalues in the ``spectrum``; infinite where the rod has none."""
+        values, one = spectrum.values, spectrum.one
+        slow = np.flatnonzero(abs(values) < SLOW * one)
+        several = len(slow) and (abs(values[slow] - values[slow[0]]) > APART * abs(values[slow]).max()).any()
+        if self.floating or not len(slow) or not (self.slow or several):
+            return np.inf
+        found = self.of(spectrum, slow)
+        energy = abs(self.squares(found.vectors, found.weighed))
+        columns = zip(found.vectors.T, energy.tolist(), strict=True)
+        rounded = [rounding_of(self.matrix, v, v) / e for v, e in columns if e > 0]
+        return max(SOLVED * one, float(spectrum.noise[slow].max()), NOISE * max(rounded, default=0.0))
+
+    def leftmost(self, number: int) -> Frequencies:
+        """Left-most eigenvalues, ``number`` or more of those nearest the origin, whose motions have no names yet."""
+        return in_order(self.nearest(max(number, FREQUENCIES) + BEYOND + SPARE))
 
     def nearest(self, number: int) -> Frequencies:
         """Those of the spectrum nearest to its shift, ``number`` or one less, not to cut a pair, not named yet."""
@@ -176,18 +194,9 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """
         self._held()
         if target not in self._condensed:
+            stiffness, mass = (gathered(A).real for A in self.in_units())
             shift = target / self.system.scene.units.omega2
-            factors = self.eliminated(target)
-            if factors is not None:
-                mass, solve, transposed = self.mass_in_units(), factors.solve, factors.solve_transposed
-            else:
-                stiffness, mass = (gathered(A) for A in self.in_units())
-                try:
-                    lu = splu((stiffness - shift * mass).real.tocsc())
-                except RuntimeError as trouble:
-                    raise ConvergenceError(_singular(target)) from trouble
-                mass, solve, transposed = mass.real, lu.solve, partial(lu.solve, trans="T")
-            self._condensed = {target: Condensed(mass, solve, transposed, shift)}  # factors are those of one shift
+            self._condensed = {target: condensed(stiffness, mass, shift)}  # factors are those of one shift
         return self._condensed[target]
 
     def _found(self, condensed: Condensed, values: np.ndarray, pairs: Eigenpairs, *, left: bool = False) -> Frequencies:
@@ -205,27 +214,14 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def motion(self, basis: np.ndarray) -> str:
         """Type of the motion spanned by a ``basis`` (n, k)."""
-        return mode_type.name(mode_type.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
+        return motion_names.name_of(
+            motion_names.turning_shares(self.system, self.turned, [*basis.real.T, *basis.imag.T])
+        )
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
-        """``M X`` for real or complex vectors (n, k), with any PETSc."""
-        if self.system.comm.size == 1:
-            rows = self._held().rows
-            if not np.iscomplexobj(vectors):
-                return np.asarray(rows @ vectors)
-            parts = np.ascontiguousarray(vectors).view(float)  # real and imaginary parts in turn, in real arithmetic
-            return np.ascontiguousarray(rows @ parts).view(complex)
-        if np.iscomplexobj(vectors):
-            return np.asarray(self.weighed(vectors.real) + 1j * self.weighed(vectors.imag))
-        out, x = np.empty_like(vectors), self.system.new_vector()
-        for i, column in enumerate(vectors.T):
-            x.array[:] = column
-            out[:, i] = (self.mass * x).array_r.real
-        return out
-
-    def mass_in_units(self) -> sp.csr_matrix:
-        """The mass on one rank for unknowns in units of their natural sizes."""
-        return self._held().rows if self.system.scene.units.ordinary else local_rows(self.in_units()[1])
+        """``M X`` for real or complex vectors (n, k)."""
+        comm = self.system.comm
+        return times(self._held().rows, vectors if comm.size == 1 else np.concatenate(comm.allgather(vectors)))
 
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """``a^* b`` of all ranks' rows."""
@@ -258,46 +254,11 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             shares[moving] = work[moving] / values[moving]
             vectors += np.outer(mode.array_r.real, shares)
 
-    def eliminated(self, target: float) -> Elimination | None:
-        """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none.
 
-        Raises :class:`~rodfem.errors.ConvergenceError` where it is singular.
-        """
-        if self.system.comm.size > 1 or compat.COMPLEX:
-            return None
-        own, mass, kept = shared(self.matrix), shared(self.mass), self._shared.inverted
-        if own and mass and kept and isinstance(kept[1], Chain) and self.system.scene.units.ordinary:
-            return self._refactored(kept[1], own, mass, target)
-        matrix, mass = self.in_units()
-        if kept is None:
-            rows = matrix.size[0] if self.system.fields.along else 0
-            factors = factors_of("lu", self.system.comm, rows, self.system.fields.dense_rows, {8: 0}, prefix=FACTORS)
-            self._shared.inverted = kept = matrix.copy(), factors
-        else:
-            matrix.copy(kept[0], PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        shifted, factors = kept
-        if not isinstance(factors, Chain):
-            return None
-        shifted.axpy(-target / self.system.scene.units.omega2, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        factors(shifted)
-        if not factors.regular:
-            raise ConvergenceError(_singular(target))
-        return None if factors.resorted else factors.elimination
-
-    def _refactored(self, factors: Chain, own: Shared, mass: Shared, target: float) -> Elimination | None:
-        """The same by factors that know the pattern, of values that need no matrix of PETSc's."""
-        if self._shared.places is None:
-            self._shared.places = places_in(own.pattern, mass.pattern)
-        values = own.values.copy()
-        values[self._shared.places] -= target * mass.values
-        try:
-            factors.elimination.factor(values)
-        except GaveUpError:
-            return None
-        factors.adopt(regular=factors.elimination.regular)
-        if not factors.regular:
-            raise ConvergenceError(_singular(target))
-        return factors.elimination
+def begins_slowly(spectrum: Spectrum) -> bool:
+    """Whether one of the eigenvalues of the first state is slow: it is about to vanish in no ordinary rod."""
+    sizes = abs(spectrum.values) / spectrum.one
+    return bool(((sizes > CLEAR * SOLVED) & (sizes < SLOW)).any())
 
 
 def _half(nu: np.ndarray) -> int:
@@ -305,7 +266,3 @@ def _half(nu: np.ndarray) -> int:
     if len(nu) < 2 or not nu[-1].imag:
         return 0
     return int(abs(nu[:-1] - nu[-1].conjugate()).min() > abs(nu[-1].imag))
-
-
-def _singular(target: complex) -> str:
-    return f"The pencil is singular at the shift {target:.6g}: choose another load, or another discretisation."

@@ -12,7 +12,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.problem.ring import CLOSING_MOMENT
 from rodfem.stability.inertia import NULL, Factored, Index, Inertia
-from rodfem.stability.round_off import inside_band, quotient_error
+from rodfem.stability.near_zero import inside_band
 from rodfem.tolerances import same_place
 
 PUSHED = 1e-8
@@ -32,7 +32,7 @@ class InSpace:
         """Allocate the system of the same rod in space."""
         self.planar = planar
         fields = planar.fields
-        self.system = System(planar.scene.in_space(), fields.discretization, planar.comm, planar.clock, fields.mesh)
+        self.system = System(planar.scene.in_space(), fields.discretization, planar.comm, planar.clock)
         self.inertia = Inertia(self.system)
         self._out = self._out_of_plane()
 
@@ -58,10 +58,10 @@ class InSpace:
         near = index.zero - found.drifts
         if near <= 0:
             return index.negative
-        values, vectors = inside_band(found, near, NULL)
+        q = inside_band(found, near, NULL)
         falling = [
-            value < -quotient_error(found.matrix, v) and self._share(v) > 0.5  # mostly out of the plane
-            for value, v in zip(values, vectors, strict=True)
+            value < -error and self._share(v) > 0.5  # mostly out of the plane
+            for value, error, v in zip(q.values, q.uncertainty, q.vectors, strict=True)
         ]
         return index.negative + int(sum(falling))
 

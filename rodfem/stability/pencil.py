@@ -1,8 +1,7 @@
 """The pencil of a state, and SLEPc set up to find its eigenvalues.
 
 SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
-and overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry,
-else ``-rodfem_lu_...`` (see :mod:`rodfem.linalg.factorization`).
+and overrule what is set here.
 """
 
 from __future__ import annotations
@@ -24,12 +23,10 @@ from rodfem.linalg.orthogonal import combine
 from rodfem.problem.validation import trouble_with_inertia
 from rodfem.tolerances import NEGLIGIBLE
 
-UNSYMMETRIC, SLICED = 1e-13, 1e-10
-"""Relative tolerances of SLEPc for a pencil without symmetry, and for all eigenvalues of an interval."""
+SLICED = 1e-10
+"""Relative tolerance of SLEPc for all eigenvalues of an interval."""
 OF_VECTORS = 1e-9
-"""The same for vectors of a symmetric pencil: the error of its eigenvalues is the square."""
-FACTORS = "rodfem_st_"
-"""Prefix of the options for the factors of a pencil without symmetry."""
+"""The same for vectors of the left-most ones: the error of the eigenvalues is the square."""
 LEAST = 6
 """How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
@@ -215,52 +212,17 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
     return deflated
 
 
-class EigenSolver(SLEPc.EPS):
-    """SLEPc's solver, all of whose functions that may give up raise :class:`PETSc.Error` then."""
+def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
+    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite.
 
-    def solve(self) -> None:
-        """Find the eigenvalues."""
-        with slepc_errors():
-            super().solve()
-
-    def setUp(self) -> None:
-        """Make the factors, and all else that :meth:`solve` needs."""
-        with slepc_errors():
-            super().setUp()
-
-    def setFromOptions(self) -> None:
-        """Overrule what is set by PETSc's options."""
-        with slepc_errors():
-            super().setFromOptions()
-
-    def getKrylovSchurKSP(self) -> PETSc.KSP:
-        """The solver of linear systems of spectrum slicing."""
-        with slepc_errors():
-            return super().getKrylovSchurKSP()
-
-
-def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str, *, symmetric: bool) -> SLEPc.EPS:
-    """Krylov-Schur solver with shift-invert for the pencil ``matrix - mu mass``.
-
-    Its options begin with ``prefix``; ``symmetric`` says that both matrices are, and the mass semidefinite.
+    Its options begin with ``prefix``.
     """
-    solver = EigenSolver().create(matrix.comm)
+    solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
     solver.setOperators(matrix, mass)
-    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP if symmetric else SLEPc.EPS.ProblemType.GNHEP)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.getST().setType(SLEPc.ST.Type.SINVERT)
     return solver
-
-
-def seek(solver: SLEPc.EPS, target: complex, number: int, size: int, tolerance: float) -> None:
-    """Ask for the ``number`` eigenvalues nearest to ``target`` from a space of ``size``, to a relative ``tolerance``.
-
-    They are those of the pencil of ``solver``.
-    """
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    solver.setTarget(target)
-    solver.setDimensions(number, size)
-    solver.setTolerances(tol=tolerance, max_it=300)
 
 
 class Inverse:
@@ -273,16 +235,6 @@ class Inverse:
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
         """Solve for ``z``."""
         self.factors.solve(b, z)
-
-
-def use_inverse(solver: SLEPc.EPS, context: object) -> None:
-    """Have the shifted matrix of a solver never formed: ``context``, of a python preconditioner, is its inverse."""
-    transform = solver.getST()
-    transform.setMatMode(SLEPc.ST.MatMode.SHELL)
-    ksp = transform.getKSP()
-    ksp.setType("preonly")
-    ksp.getPC().setType("python")
-    ksp.getPC().setPythonContext(context)
 
 
 def with_factors(
@@ -300,15 +252,24 @@ def with_factors(
     are right up to massless unknowns: purification corrects all of them at once.  Eigenvectors that are ``deflated``
     are not found; ``start`` is the first vector.
     """
-    solver = eigensolver(matrix, mass, "rodfem_", symmetric=True)
-    seek(solver, target, number, number + max(number, LEAST), OF_VECTORS)
+    solver = eigensolver(matrix, mass, "rodfem_")
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    solver.setTarget(target)
+    solver.setDimensions(number, number + max(number, LEAST))
+    solver.setTolerances(tol=OF_VECTORS, max_it=300)
     solver.setPurify(False)
     if start is not None:
         solver.setInitialSpace([start])
     if deflated:
         solver.setDeflationSpace(list(deflated))
-    use_inverse(solver, inverse)
-    solver.setFromOptions()
+    transform = solver.getST()
+    transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
+    ksp = transform.getKSP()
+    ksp.setType("preonly")
+    ksp.getPC().setType("python")
+    ksp.getPC().setPythonContext(inverse)
+    with slepc_errors():
+        solver.setFromOptions()
     return solver
 
 
@@ -319,17 +280,18 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, roo
     The pencil is ``matrix - mu mass``, the two numbers are ``low`` and ``high``; ``room`` is what MUMPS has beyond its
     estimate, a percentage.
     """
-    solver = eigensolver(matrix, mass, "rodfem_slicing_", symmetric=True)
+    solver = eigensolver(matrix, mass, "rodfem_slicing_")
     solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
     solver.setInterval(low, high)
     solver.setTolerances(tol=SLICED)
     solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    solver.setFromOptions()
-    ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
-    ksp.setType("preonly")
-    ksp.getPC().setType("cholesky")
-    ksp.getPC().setFactorSolverType("mumps")
-    controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
-    with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
-        solver.setUp()
+    with slepc_errors():
+        solver.setFromOptions()
+        ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
+        ksp.setType("preonly")
+        ksp.getPC().setType("cholesky")
+        ksp.getPC().setFactorSolverType("mumps")
+        controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
+        with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
+            solver.setUp()
     return solver

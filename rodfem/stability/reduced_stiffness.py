@@ -28,10 +28,9 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.linalg.matrices import shared
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Inertia
-from rodfem.stability.round_off import quotient_error
+from rodfem.stability.near_zero import quotient_error
 
 NEAR = 1e-3
 """Eigenvalue of H, over the lowest bending one, below which S is too near singular to be solved with."""
@@ -41,8 +40,8 @@ DIFFERENCE, AHEAD = 1e-4, 1e-6
 """Distances of the states whose matrices are differenced, in the metric: on both sides, and ahead alone."""
 ROTATED = 1.0
 """Size of ``W^t M W - 1`` above which a border has become that of other modes."""
-ROUGH, DEPENDENT = 1e-3, 1e-3
-"""Relative accuracy of the eigenvalues of a border; square of a mode that is none of its own."""
+ROUGH = 0.1
+"""Relative accuracy of the eigenvalues of a border: any space near that of their modes serves."""
 MODES = 6
 """Columns of a border."""
 
@@ -91,11 +90,12 @@ class Condensation:
         found = self.inertia.at(x)
         found.count()
         with self.inertia.afresh():
-            vectors = found.nearest(count, ROUGH)[1]
-        phi = np.stack([v.array_r for v in vectors], axis=1)
-        squares, turn = np.linalg.eigh(self.inertia.sum(phi.T @ self.inertia.weighed(phi)))
-        kept = squares > DEPENDENT  # a mesh of a few unknowns has no more
-        return np.asarray(phi @ (turn[:, kept] / np.sqrt(squares[kept])))
+            return np.stack([v.array_r.real for v in found.nearest(count, ROUGH)[1]], axis=1)
+
+    def improved(self, reduced: ReducedStiffness) -> np.ndarray:
+        """The border after a step of inverse iteration: ``W``, made orthonormal."""
+        none = reduced.W[:, :0]
+        return self.inertia.across(reduced.W, none, none)[0]
 
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
         """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
@@ -117,7 +117,7 @@ class Condensation:
         soft = int(abs(values).argmin())
         doubt = TOLERANCE * inertia.scale
         if abs(values[soft]) < SOFT * inertia.scale:
-            doubt = max(doubt, quotient_error(inertia.at(x).matrix, self.vector(W @ vectors[:, soft])))
+            doubt = max(doubt, quotient_error(inertia.at(x).matrix, inertia.vector(W @ vectors[:, soft])))
         rotated = float(np.linalg.norm(inertia.sum(W.T @ inertia.weighed(W)) - np.eye(W.shape[1]), 2))
         return ReducedStiffness(H, self._rate(x, tangent, H, W), far, W, rotated, doubt)
 
@@ -128,7 +128,7 @@ class Condensation:
         if k not in self._bordered:
             self._bordered[k] = Bordered(self.system, matrix, k, self.inertia.constraints)
         bordered = self._bordered[k]
-        far = bordered.factor(matrix, [self.vector(B[:, j]) for j in range(k)])
+        far = bordered.factor(matrix, [self.inertia.vector(B[:, j]) for j in range(k)])
         solved = [bordered.solve(None, e) for e in np.eye(k)]
         H = -np.array([g for _, g in solved])
         return far, _symmetric(H), np.stack([w.array_r for w, _ in solved], axis=1)
@@ -138,9 +138,8 @@ class Condensation:
         system, inertia = self.system, self.inertia
         system.set_phase(x)
         ahead = x + tangent * AHEAD
-        inertia._assemble(ahead, system.at(ahead))
-        out = (inertia.sum(W.T @ self._times(W)) - H) / AHEAD
-        inertia.filled += 1
+        inertia.moved(ahead)
+        out = (inertia.sum(W.T @ inertia.times(W)) - H) / AHEAD
         phase = system.phase
         if phase.rows:
             rates = (system.at(ahead).generators - system.at(x).generators) / AHEAD
@@ -150,23 +149,10 @@ class Condensation:
                 out += term + term.T
         return _symmetric(out)
 
-    def _times(self, columns: np.ndarray) -> np.ndarray:
-        """The matrix that is held now times columns."""
-        known = shared(self.inertia.matrix)
-        if known is not None:
-            return np.asarray(known.matrix @ columns)
-        return np.stack([(self.inertia.matrix * self.vector(c)).array_r for c in columns.T], axis=1)
-
     def _row(self, columns: np.ndarray, number: int) -> np.ndarray:
         """Row of a global number of columns, on all ranks."""
         begin, end = self.inertia.metric.getOwnershipRange()
         return self.inertia.sum(columns[number - begin] if begin <= number < end else np.zeros(columns.shape[1]))
-
-    def vector(self, own: np.ndarray) -> PETSc.Vec:
-        """Vector of own rows."""
-        out = self.system.new_vector()
-        out.array[:] = own
-        return out
 
 
 def _symmetric(A: np.ndarray) -> np.ndarray:

@@ -1,21 +1,220 @@
-"""All eigenvalues ``mu = omega^2`` of a state under loads without a potential: which are real, negative, or complex."""
+r"""All finite eigenvalues ``mu = omega^2`` of a pencil ``S x = mu M x``, on its unknowns with mass.
+
+The mass is ``M = L R^t``: ``R = L`` has as many columns as its rank; of a large pencil ``L`` is ``M``, and ``R`` one.
+With a shift ``a``
+
+    T w = nu w,        T = R^t (S - a M)^-1 L,        nu = 1 / (mu - a),
+
+has all finite eigenvalues: ``x = (S - a M)^-1 L w / nu`` and ``w = R^t x``.  Massless unknowns, multipliers and
+constraints are eliminated by as many solves as ``L`` has columns.  Directions with mass that the constraints hold have
+``nu = 0``, in no Jordan blocks: round-off leaves them as small as it is, and finite eigenvalues are told from them down
+to there.  LAPACK finds all eigenvalues of ``T``; of a large ``T`` SLEPc finds the greatest.
+
+Round-off ``dT`` moves a simple eigenvalue by up to ``|dT| |z|`` for its right and left vectors ``w`` and ``z``, with
+``|w| = 1`` and ``z.w = 1``, and one of two that meet by no more than ``(|dT| |T|)^(1/2)``, where ``z`` has no bound
+(Wilkinson, The Algebraic Eigenvalue Problem, 1965, chapter 2).
+
+Of a state under loads without a potential a :class:`Spectrum` says which are real, negative, or complex.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TypeAlias
 
 import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+from scipy.linalg.lapack import dpstrf
+from scipy.sparse.linalg import splu
+from slepc4py import SLEPc
 
-from rodfem.stability.condensed import ALL, REAL, Condensed, times
+from rodfem.compat import slepc_errors
+from rodfem.errors import ConvergenceError
 from rodfem.tolerances import TINY
+
+SHIFT = -10.0
+"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
+
+Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
+its digits from all others.
+"""
+REAL = 1e-7
+"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
+ALL = 1000
+"""Rank of the mass up to which all eigenvalues are found: LAPACK takes some seconds there."""
+LARGEST = 2000
+"""Unknowns with mass up to which it is factored by dense matrices."""
+SOME = 40
+"""Eigenvalues that are found where the rank is greater."""
+DENSE = 80
+"""Rank of the mass up to which all eigenvalues cost no more than some by a Krylov space."""
+RANK = 1e-13
+"""Pivot of the mass below which it is round-off, relative to its diagonal: a quaternion's own length has no mass."""
+FINITE = 1e-13
+"""Eigenvalue of an inverted pencil, over the greatest, below which it is that of an infinite one."""
+ROUNDED = 1e-14
+"""Round-off of ``T``, over the norms of its factors, where the inverse has its natural size, one, at least.
+
+Of free rods on six elements 1.2e-14 of its norm is seen."""
+TOLERANCE = 1e-13
+"""Relative tolerance of SLEPc."""
+
+Solve = Callable[[np.ndarray], np.ndarray]
+Matrix: TypeAlias = np.ndarray | sp.csr_matrix
+
+
+def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
+    """Rows with mass (h,), and ``L`` and ``R`` in them (h, r): by Cholesky's method with pivots of a unit diagonal."""
+    size = np.sqrt(np.maximum(mass.diagonal(), 0.0))
+    heavy = np.flatnonzero(size)
+    if len(heavy) > LARGEST:
+        return heavy, mass[heavy][:, heavy].tocsr(), sp.identity(len(heavy), format="csr")
+    scale = size[heavy]
+    block = mass[heavy][:, heavy].toarray() / np.outer(scale, scale)
+    if not len(heavy):
+        return heavy, block, block
+    lower, pivots, rank, _ = dpstrf(block, tol=RANK, lower=1)
+    out = np.zeros((len(heavy), rank))
+    out[pivots - 1] = np.tril(lower)[:, :rank]
+    return heavy, out * scale[:, None], out * scale[:, None]
+
+
+@dataclass(frozen=True)
+class Eigenpairs:
+    """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, and their ``right`` vectors (r, k), or those of ``T^t``.
+
+    ``noise`` (k,) is what round-off may make of ``nu``, ``error`` (k,) the residual over the size of ``T``; where two
+    meet the former is its root.  Of all eigenvalues ``left`` vectors (k, r) are known, too: both are biorthonormal, and
+    right ones have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
+    """
+
+    nu: np.ndarray
+    right: np.ndarray
+    noise: np.ndarray
+    error: np.ndarray
+    left: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    vectors: np.ndarray | None = None
+
+    def at(self, places: slice | np.ndarray) -> Eigenpairs:
+        """Those at some places, without left vectors."""
+        vectors = None if self.vectors is None else self.vectors[:, places]
+        return Eigenpairs(
+            self.nu[places], self.right[:, places], self.noise[places], self.error[places], vectors=vectors
+        )
+
+
+class Condensed:
+    """A pencil on its unknowns with mass, in units of natural sizes, about a ``shift``."""
+
+    def __init__(self, mass: sp.csr_matrix, solve: Solve, solve_transposed: Solve, shift: float) -> None:
+        """Take the ``mass``, and what solves with ``S - shift M`` for arrays (n, k): ``solve``, ``solve_transposed``.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where nothing has mass.
+        """
+        self.solve, self.solve_transposed, self.shift, self.rows = solve, solve_transposed, shift, mass.shape[0]
+        self.heavy, self.lower, self.dual = factors_of_mass(mass)
+        self.rank = self.lower.shape[1]
+        if self.rank == 0:
+            raise ConvergenceError("The rod has no inertia: give it a mass, or a rotary inertia.")
+
+    def spread(self, w: np.ndarray, factor: Matrix | None = None) -> np.ndarray:
+        """``L w`` (n, k) for ``w`` (r, k), or that of another ``factor``: products of vectors with the mass."""
+        product = times(self.lower if factor is None else factor, w)
+        out = np.zeros((self.rows, w.shape[1]), dtype=product.dtype, order="F")
+        out[self.heavy] = product
+        return out
+
+    @cached_property
+    def images(self) -> np.ndarray:
+        """``(S - a M)^-1 L`` (n, r)."""
+        return self.solve(self.spread(np.eye(self.rank)))
+
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """The same in the rows with mass (h, r)."""
+        return self.images[self.heavy]
+
+    @cached_property
+    def pairs(self) -> Eigenpairs:
+        """All finite eigenvalues, or some where the mass has a rank above :data:`ALL`."""
+        if self.rank > ALL:
+            return self._some()
+        matrix, size = self.dual.T @ self.inverse, np.linalg.norm(self.lower)
+        nu, right = np.linalg.eig(matrix)
+        try:
+            left = np.linalg.inv(right)
+        except np.linalg.LinAlgError:
+            left = np.linalg.pinv(right)
+        rounded = ROUNDED * size * max(np.linalg.norm(self.inverse), size)
+        noise = np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))
+        error = np.linalg.norm(matrix @ right - right * nu, axis=0) / max(abs(nu).max(), TINY)
+        order = np.argsort(-abs(nu), kind="stable")
+        order = order[abs(nu[order]) > noise[order]]
+        return Eigenpairs(nu[order], right[:, order], noise[order], error[order], left[order])
+
+    def _some(self) -> Eigenpairs:
+        """The :data:`SOME` greatest eigenvalues; left vectors are those within the span of the right ones."""
+        found = self.greatest(SOME)
+        return replace(found, left=np.linalg.pinv(found.right), vectors=self.vectors(found))
+
+    @cached_property
+    def right(self) -> np.ndarray:
+        """Vectors of the pencil (h, k) in the rows with mass."""
+        pairs = self.pairs
+        return times(self.inverse, pairs.right) / pairs.nu if pairs.vectors is None else pairs.vectors[self.heavy]
+
+    def greatest(self, number: int, *, left: bool = False) -> Eigenpairs:
+        """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones where these are fewer.
+
+        LAPACK finds them where it costs no more, or where SLEPc gives up: at times it cannot sort equal complex ones.
+        """
+        if self.rank > max(DENSE, 3 * number) and (self.rank > ALL or "pairs" not in vars(self)):
+            try:
+                return self._nearest(number, left=left)
+            except ConvergenceError:
+                if self.rank > ALL:
+                    raise
+        return (replace(self.pairs, right=self.pairs.left.T) if left else self.pairs).at(slice(number))
+
+    def _nearest(self, number: int, *, left: bool) -> Eigenpairs:
+        """The same by SLEPc; raises :class:`ConvergenceError` where it gives up."""
+        first, last, solve = self.lower, self.dual, self.solve
+        if left:
+            first, last, solve = self.dual, self.lower, self.solve_transposed
+        nu, w = krylov(lambda w: last.T @ solve(self.spread(w[:, None], first))[self.heavy, 0], self.rank, number)
+        order = np.argsort(-abs(nu), kind="stable")[:number]
+        error, noise = np.full(len(nu), TOLERANCE), np.full(len(nu), TOLERANCE * abs(nu).max())
+        return Eigenpairs(nu, w, noise, error).at(order[abs(nu[order]) > noise[order]])
+
+    def values(self, pairs: Eigenpairs) -> np.ndarray:
+        """Eigenvalues ``mu`` (k,) without imaginary parts that are noise."""
+        values, size = self.shift + 1.0 / pairs.nu, abs(pairs.nu)
+        return np.where(abs(values.imag) * size <= pairs.noise / size, values.real, values).astype(complex)
+
+    def vectors(self, pairs: Eigenpairs, *, left: bool = False) -> np.ndarray:
+        """Vectors (n, k) of the pencil for those of ``T``, or ``left`` ones: ``z.S = mu z.M`` without conjugation."""
+        nu, w = pairs.nu, pairs.right
+        if pairs.vectors is not None:
+            return pairs.vectors
+        if not left and "images" in vars(self):
+            return times(self.images, w) / nu
+        given = self.spread(w, self.dual if left else self.lower)
+        solve = self.solve_transposed if left else self.solve
+        if not np.iscomplexobj(given):
+            return solve(given) / nu
+        solved = solve(np.concatenate([given.real, given.imag], axis=1))
+        k = w.shape[1]
+        return (solved[:, :k] + 1j * solved[:, k:]) / nu
 
 
 @dataclass(frozen=True)
 class Spectrum:
     """Eigenvalues of a ``condensed`` pencil, nearest to its shift first; ``one`` is their natural size.
 
-    What round-off makes of zero is ``floor``, where it is known (:mod:`rodfem.stability.slow_motions`).
+    What round-off makes of zero is ``floor``, where it is known (:mod:`rodfem.stability.nonsymmetric`).
     """
 
     condensed: Condensed
@@ -81,3 +280,74 @@ def inside(basis: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Shares (k,) of ``vectors`` (r, k) in the span of a real ``basis`` (r, m)."""
     parts = np.linalg.qr(basis)[0].T @ vectors
     return np.asarray((abs(parts) ** 2).sum(axis=0) / np.maximum((abs(vectors) ** 2).sum(axis=0), TINY))
+
+
+def times(matrix: Matrix, w: np.ndarray) -> np.ndarray:
+    """Product of a real matrix (n, r) with ``w`` (r, k), real or complex, in real arithmetic."""
+    if not np.iscomplexobj(w):
+        return np.asarray(matrix @ w)
+    parts = np.ascontiguousarray(w).view(float)  # real and imaginary parts in turn
+    return np.ascontiguousarray(matrix @ parts).view(complex)
+
+
+def condensed(stiffness: sp.csr_matrix, mass: sp.csr_matrix, shift: float) -> Condensed:
+    """A pencil on its unknowns with mass, by LU factors; raises :class:`ConvergenceError` if it is singular there."""
+    try:
+        lu = splu((stiffness - shift * mass).tocsc())
+    except RuntimeError as trouble:
+        raise ConvergenceError(
+            f"The pencil is singular at the shift {shift:.6g}: choose another load, or another discretisation."
+        ) from trouble
+    return Condensed(mass, lu.solve, partial(lu.solve, trans="T"), shift)
+
+
+class Operator:
+    """A real matrix that is known by its products, as PETSc's python matrices ask for it."""
+
+    def __init__(self, apply: Solve) -> None:
+        self.apply = apply
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """``y = T x``."""
+        values = x.array_r
+        y.array[:] = self.apply(values.real)
+        if np.iscomplexobj(values):
+            y.array[:] += 1j * self.apply(values.imag)
+
+
+def krylov(apply: Solve, size: int, number: int, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The ``number`` greatest eigenvalues, and vectors, of a real matrix (size, size) that ``apply`` multiplies with.
+
+    The Krylov space begins with the vector ``start`` (size,), or with any.
+
+    Raises :class:`~rodfem.errors.ConvergenceError` where SLEPc gives up.  Its options begin with ``rodfem_``.
+    """
+    matrix = PETSc.Mat().createPython((size, size), Operator(apply), comm=PETSc.COMM_SELF)
+    matrix.setUp()
+    solver = SLEPc.EPS().create(PETSc.COMM_SELF)
+    solver.setOptionsPrefix("rodfem_")
+    solver.setOperators(matrix)
+    solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
+    solver.setDimensions(number, min(2 * number + 20, size))
+    solver.setTolerances(tol=TOLERANCE, max_it=300)
+    solver.setFromOptions()
+    re, im = matrix.createVecs()
+    if start is not None:
+        re.array[:] = start
+        solver.setInitialSpace([re])
+    try:
+        with slepc_errors():
+            solver.solve()
+    except PETSc.Error as trouble:
+        why = str(trouble).splitlines()[-1]
+        raise ConvergenceError(f"SLEPc found no eigenvalues ({why}): use another mesh.") from trouble
+    nu, columns = list[complex](), list[np.ndarray]()
+    for i in range(solver.getConverged()):
+        nu.append(complex(solver.getEigenpair(i, re, im)))
+        columns.append(re.array_r + (0.0 if np.iscomplexobj(re.array_r) else 1j * im.array_r))
+    solver.destroy()
+    matrix.destroy()
+    if not nu:
+        raise ConvergenceError("SLEPc found no eigenvalue: use a richer discretisation.")
+    return np.array(nu), np.stack(columns, axis=1)

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import places_in, shared
@@ -40,9 +41,8 @@ from rodfem.stability.pencil import (
 from rodfem.tolerances import SAME_EIGENVALUE
 
 HIT = 1e-8
-"""A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
-
-
+"""A shift nearer to an eigenvalue than this, relative to the farthest one found, or to itself, is one: but for
+round-off, which spoils the others, and the count there."""
 EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
@@ -52,8 +52,6 @@ LEAST_SPREAD = 1e-3
 """Part of the greatest eigenvalue that is added to the distance of the others: equal ones have none."""
 NOISE = 1e-6
 """Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
-COINCIDENT = 1e-8
-"""Distance of an eigenvalue from the shift, relative to that, below which the count beside it is round-off."""
 
 
 @dataclass(frozen=True)
@@ -199,12 +197,16 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             )
         spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
         held.shift = modes.values[0] - 0.1 * spread
-        units = self.system.scene.units
-        if units.ordinary:
-            return modes
-        for vector in modes.vectors:
-            vector.pointwiseMult(vector, self.sizes)
-        return replace(modes, values=units.omega2 * modes.values)
+        return replace(
+            modes, values=self.system.scene.units.omega2 * modes.values, vectors=self.unscaled(modes.vectors)
+        )
+
+    def unscaled(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        """The same vectors, in units of natural sizes before and in those of the rod now."""
+        if not self.system.scene.units.ordinary:
+            for vector in vectors:
+                vector.pointwiseMult(vector, self.sizes)
+        return vectors
 
     def go_below(self) -> None:
         """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""
@@ -226,7 +228,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         mode.scale(1.0 / self.system.norm(mode))
         grown = mode.duplicate()
         held.shifted.factors.solve(held.scaled[1] * mode, grown)
-        return not self.system.norm(grown) * COINCIDENT * abs(held.shift) < 1.0
+        return not self.system.norm(grown) * HIT * abs(held.shift) < 1.0
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``, symmetry modes not included.
@@ -288,7 +290,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             start.array[:] += held.last
         inverse = Inverse(held.shifted.factors)
         solver = with_factors(*held.scaled, number, held.shift, inverse, start, held.deflated)
-        solver.solve()
+        with slepc_errors():
+            solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
         order = np.argsort(values)[:number]
@@ -319,8 +322,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         """
         held = self._held()
         right = np.stack([(held.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
-        solved = held.shifted.factors.solve_all(right)
-        for value, vector, column in zip(values, vectors, solved.T, strict=True):
+        for value, vector, column in zip(values, vectors, held.shifted.factors.solve_all(right).T, strict=True):
             vector.array[:] = (value - held.shift) * column
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:

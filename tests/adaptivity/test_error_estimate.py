@@ -172,7 +172,7 @@ def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
     assert abs(s.point.ordinate - reference_values.FIRST[0.5][0]) > 5 * s.ordinate_error
     assert s.resolved is False
     stream = StringIO()
-    Report(stream=stream).table(diagram.branches, diagram.solvers[0].system)
+    Report(stream=stream).table(diagram.data, diagram.branches)
     if MPI.COMM_WORLD.rank == 0:
         assert "(at least 2e-03)" in stream.getvalue()
         assert "does not resolve" in stream.getvalue()

@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +22,10 @@ from mpi4py import MPI
 
 import rodfem
 from rodfem.app.run import run
-from rodfem.app.terminal import _law
 from rodfem.continuation.branch import NormalForm
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
+from rodfem.output.words import law_in_words
 from rodfem.problem.ends import Attachment, clamped, free
 from rodfem.problem.scene import Inertia, Ordinate, Scene
 
@@ -210,9 +210,12 @@ def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, cap
 
 
 def test_a_coefficient_that_may_have_either_sign() -> None:
-    law = NormalForm("supercritical pitchfork", -13.0, 1, 200.0, -1)
-    assert _law(law, True) == "supercritical pitchfork, load = load_b + c x + ..., where c is not told from zero"
-    assert "load_b - 13.0 (2e-01) x" in _law(replace(law, uncertainty=0.2), True)
+    law = asdict(NormalForm("supercritical pitchfork", -13.0, 1, 200.0, -1))
+    assert (
+        law_in_words({"law": law})
+        == "supercritical pitchfork, load = load_b + c x + ..., where c is not told from zero"
+    )
+    assert "load_b - 13.0 (2e-01) x" in law_in_words({"law": law | {"uncertainty": 0.2}})
 
 
 def test_an_equilibrium_that_there_is_not() -> None:

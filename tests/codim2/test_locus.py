@@ -37,7 +37,7 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.plot_locus import _footer, draw_locus
+from rodfem.output.plot_locus import _about, draw_locus
 from rodfem.output.stable_region import stable_region
 from rodfem.problem.ends import clamped, free, pinned
 from rodfem.problem.scene import Ordinate, Parameter, Scene
@@ -309,11 +309,11 @@ def test_errors_that_are_not_known_are_said_to_be_so() -> None:
     json.dumps(data, allow_nan=False)
     assert data["without_estimate"] == [rows[0]]
     assert data["columns"]["error"][rows[0]] == [None, None]
-    told = re.search(r"curves accurate to (\S+) \((.*)\)$", _footer([data]))
+    told = re.search(r"curves accurate to (\S+) \((.*)\)$", _about([data]))
     assert told is not None and known <= float(told[1]) <= 1.1 * known  # rounded up
     assert told[2] == f"estimated at {len(rows) - 1} of {len(found.values)} points, without success at 1 more"
     found.error[rows] = np.inf
-    assert _footer([found.data()]).endswith(f"the error could not be estimated at any of {len(rows)} points")
+    assert _about([found.data()]).endswith(f"the error could not be estimated at any of {len(rows)} points")
 
 
 def test_nothing_is_left_behind() -> None:

@@ -11,7 +11,7 @@ from classics import SUPPORTS, column
 
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, StepControl, clamped, free, trace
 from rodfem.codim2.follow import locus
-from rodfem.continuation.convexity_between import lost_between
+from rodfem.continuation.arc import lost_between
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.local_state import Constants
@@ -97,8 +97,8 @@ def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("width", [pytest.param(1e-2, marks=pytest.mark.alone), 1e-3])
-def test_convexity_lost_between_the_places_of_the_quadrature(width: float) -> None:
+@pytest.mark.alone
+def test_convexity_lost_between_the_places_of_the_quadrature(width: float = 1e-2) -> None:
     """Twisting stiffness ``(s - 0.37)^2 + (P - 1)^2 - width^2``: negative within a width of 0.37, where P is near 1."""
 
     def notch(v: Any, k: Any, c: Any) -> Any:

@@ -56,7 +56,7 @@ def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     assert abs(fold.point.load - true.fun) <= max(fold.error_estimate, 1e-13)
     assert (fold.negative_before, fold.negative_after) == (1, 0)
     rows = [p for p in diagram[1].points[1:] if p is not fold.point and not p.undecided]
-    assert {(p.negative, p.slope < 0) for p in rows} == {(1, True), (0, False)} and len(rows) > 20
+    assert {(p.negative, p.slope < 0) for p in rows} == {(1, True), (0, False)} and len(rows) > 12
 
 
 @pytest.mark.few(1)

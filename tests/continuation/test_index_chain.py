@@ -40,17 +40,16 @@ from rodfem import (
 from rodfem.app.terminal import Report
 from rodfem.codim2.follow import locus
 from rodfem.continuation.branch import Point
-from rodfem.continuation.follow import _to_load
+from rodfem.continuation.follow import follow
 from rodfem.continuation.index_chain import breaks, explain, merge_doubles
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.switching import directions, leave
 from rodfem.diagram import explorer
-from rodfem.diagram.equivalence import equivalent
+from rodfem.diagram.equivalence import are_images, equivalent
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.two_sides import are_images
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.files import _branch_data
+from rodfem.output.table import branch_data
 from rodfem.stability.assessment import assess
 
 pytestmark = pytest.mark.alone
@@ -333,11 +332,11 @@ def test_what_is_not_explained_is_kept() -> None:
     branch.points, branch.special = rows, singular[1:]
     branch.renumber()
     explain(branch)
-    columns, (entry,) = _branch_data(branch)["columns"], _branch_data(branch)["unexplained"]
+    columns, (entry,) = branch_data(branch)["columns"], branch_data(branch)["unexplained"]
     assert (entry["before"], entry["after"]) == (0, 1)
     assert columns["load"][entry["row"]] == broken.a.load
     terminal = io.StringIO()
-    Report(stream=terminal).table([branch], found.solver.system)
+    Report(stream=terminal).table({"branches": [branch_data(branch)], "parameter": "P", "ordinate": "x"}, [branch])
     assert f"! {branch.name}: {broken}" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
 
 
@@ -382,7 +381,7 @@ def test_a_range_that_begins_at_a_branch_point() -> None:
     (branch,) = diagram
     assert [p.negative for p in branch.points[1:]] == [1] * (len(branch.points) - 1)
     assert any("is singular: 1 eigenvalue(s) vanish there" in sentence for sentence in diagram.warnings)
-    assert _branch_data(branch)["singular_start"] == 1
+    assert branch_data(branch)["singular_start"] == 1
 
 
 def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> None:
@@ -437,10 +436,9 @@ def test_the_last_step_to_a_bound_goes_the_way_of_the_prediction() -> None:
     aside = last.tangent.copy()
     aside.axpy(1.0, special.null_vectors[0])
     aside.scale(1.0 / solver.system.norm(aside))
-    solver.system.set_phase(last.x)
-    assert _to_load(solver, [last], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is not None
-    wrong = replace(last, tangent=aside)
-    assert _to_load(solver, [wrong], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is None
+    bounds = 0.0, last.load + 0.01
+    assert next(follow(solver, [last], StepControl(), bounds)).load == bounds[1]
+    assert "no convergence" in next(follow(solver, [replace(last, tangent=aside)], StepControl(), bounds))
 
 
 @pytest.mark.long

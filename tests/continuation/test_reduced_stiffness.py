@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import acos, cos, pi, sin
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -10,7 +12,7 @@ from golden_cases import cases, trace
 
 import rodfem
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, Solver, pinned
-from rodfem.continuation.crossings import Node, crossings, roots
+from rodfem.continuation.crossings import Node, Zeros, fourth, roots
 from rodfem.continuation.piece import Piece
 from rodfem.forms.energy import bending_and_twist
 from rodfem.linalg.matrices import gathered
@@ -85,13 +87,13 @@ def test_all_zeros_are_eigenvalues_of_the_pencil() -> None:
 def test_crossings_and_their_indices() -> None:
     """One up at 0.3 and one down there: the index stays; a double one at 0.6; none where all is definite."""
     opposite = polynomial(np.diag([-0.3, 0.3]), np.diag([1.0, -1.0]))
-    (found,) = crossings(*opposite, lambda *_: None, 1e-9, [])
+    (found,) = Zeros(lambda *_: None, 1e-9).between(*opposite, np.zeros((2, 2)))
     assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.3, 3, 3, (2, 2))
     double = polynomial(np.diag([0.6, 0.6, 1.0]), np.diag([-1.0, -1.0, 0.5]))
-    (found,) = crossings(*double, lambda *_: None, 1e-9, [])
+    (found,) = Zeros(lambda *_: None, 1e-9).between(*double, np.zeros((3, 3)))
     assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.6, 2, 4, (3, 2))
     clear = polynomial(np.diag([1.0, -2.0]), np.diag([3.0, -1.0]))
-    assert crossings(*clear, lambda *_: None, 1e-9, []) == []
+    assert Zeros(lambda *_: None, 1e-9).between(*clear, np.zeros((2, 2))) == []
 
 
 def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
@@ -105,11 +107,28 @@ def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
             return Node(s, exact(s), np.array([[2 * (s - 0.5)]]), 0)
 
         a, b = (Node(t, exact(t), np.array([[2 * (t - 0.5)]]), 0) for t in (0.0, 1.0))
-        found = crossings(a, b, solve, 1e-12, misses)
+        found = Zeros(solve, 1e-12, misses).between(a, b, np.zeros((1, 1)))
         assert [round(c.s, 9) for c in found] == ([0.499, 0.501] if sign < 0 else [])
         assert [(c.before, c.after) for c in found] == ([(0, 1), (1, 0)] if sign < 0 else [])
         assert len(asked) == 1
         assert len(misses) == (sign > 0)
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("other", [1.0, -0.1])
+def test_a_pair_that_the_cubic_does_not_have(known: bool, other: float) -> None:
+    """``1 + 1.01 sin 6s`` is negative in a twelfth of a piece; what is left of it, the row before shows, or a state."""
+    width = acos(1 / 1.01) / 6
+    expected = sorted([pi / 4 - width, pi / 4 + width] + [0.1] * (other < 0))
+
+    def solve(a: Node | None, b: Node | None, s: float) -> Node:
+        value, slope = (1 + 1.01 * sin(6 * s), other + (other < 0) * s), (6.06 * cos(6 * s), 1.0 * (other < 0))
+        return Node(s, np.diag(value), np.diag(slope), 0)
+
+    before, a, b = (solve(None, None, s) for s in (-1.0, 0.0, 1.0))
+    found = Zeros(solve, 1e-12).between(a, b, fourth(before, a, b) if known else None)
+    assert [c.s for c in found] == pytest.approx(expected, abs=1e-3)
+    assert abs(found[-1].after - found[0].before) == (other < 0)
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""Zeros and lowest values between two arguments, against closed forms."""
+"""Zeros between two arguments, against closed forms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import atan, cos, exp, log
 
 import pytest
 
-from rodfem.roots import lowest_between, zero_between
+from rodfem.roots import zero_between
 
 pytestmark = pytest.mark.alone
 
@@ -39,25 +39,3 @@ def test_zero_between(f: Callable[[float], float], a: float, b: float, zero: flo
 def test_no_change_of_sign() -> None:
     with pytest.raises(ValueError, match="one sign, -1, at both 0 and 1"):
         zero_between(lambda x: -1 - x, 0.0, 1.0, 1e-9)
-
-
-@pytest.mark.parametrize(
-    ("f", "lowest", "within"),
-    [
-        (lambda x: (x - 0.7) ** 2, 0.7, 1e-9),
-        (lambda x: abs(x - 0.7), 0.7, 1e-9),
-        (lambda x: 2 - cos(x - 0.1), 0.1, 1e-7),  # round-off of the value hides more
-        (lambda x: x, 0.0, 1e-8),
-    ],
-    ids=["parabola", "corner", "cosine", "end"],
-)
-def test_lowest_between(f: Callable[[float], float], lowest: float, within: float) -> None:
-    x, value = lowest_between(f, 0.0, 0.4, 1.0, 1e-9)
-    assert x == pytest.approx(lowest, rel=0, abs=within)
-    assert value == f(x)
-
-
-def test_a_negative_value_serves_as_a_lowest_one() -> None:
-    x, value = lowest_between(lambda x: (x - 0.7) ** 2 - 1e-12, 0.0, 0.4, 1.0, 1e-9)
-    assert value < 0.0
-    assert abs(x - 0.7) < 1e-6

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 import small_states
 
-from rodfem import compat
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
-from rodfem.fem.phase import phase_at
+from rodfem.fem.symmetries import phase_at
 from rodfem.linalg.matrices import shared
 from rodfem.stability.motion_names import DEPENDENT, MotionNames
 from rodfem.stability.pencil import symmetry_modes
@@ -37,7 +36,7 @@ def rows(name: str, formulation: str) -> tuple[BranchSolver, list[Point]]:
     solver = found.solvers[0]
     assert isinstance(solver, BranchSolver)
     points = [point for branch in found.branches for point in branch.points if point.mesh == 0]
-    assert len(points) > 60
+    assert len(points) > 40
     return solver, points
 
 
@@ -56,17 +55,6 @@ def test_second_variation_is_that_of_petsc(name: str, formulation: str) -> None:
         inertia._assemble_by_petsc(solver.system.at(point.x))
         np.testing.assert_array_equal(ours, matrix.values)
         np.testing.assert_array_equal(border, inertia.border.array_r)
-
-
-@pytest.mark.parametrize(("name", "formulation"), BOTH)
-def test_local_second_variation_is_that_of_dolfinx(name: str, formulation: str) -> None:
-    solver, points = rows(name, formulation)
-    for point in points[::7]:
-        state = solver.system.at(point.x)
-        ours = state.tangent().toarray()
-        state._register()
-        theirs = compat.local_table(solver.system.equations.jacobian.form).toarray()
-        assert abs(ours - theirs).max() <= 1e-14 * abs(theirs).max()
 
 
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])

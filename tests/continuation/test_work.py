@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from classics import bow, euler
 from golden_cases import cases
+from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
 
-from rodfem import Diagram, Discretization, Ordinate, Plan, Solver, trace
+from rodfem import Discretization, Ordinate, Plan, Solver, StepControl, trace
 from rodfem.continuation.branch import Branch, Point
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.work import EnergyBalance
 
 alone = pytest.mark.alone
 WITH_FOLDS = [
@@ -28,17 +28,6 @@ def rows(branch: Branch) -> list[Point]:
     """Rows that the branch has been followed by: without its special points, and the state that it leaves."""
     special = {id(s.point) for s in branch.special}
     return [p for p in branch.points if id(p) not in special][1 if branch.parent else 0 :]
-
-
-def solver_of(diagram: Diagram) -> BranchSolver:
-    assert isinstance(diagram.solvers[0], BranchSolver)
-    return diagram.solvers[0]
-
-
-@pytest.fixture(scope="module", params=MESHES, ids=["8 P6", "24 P1"])
-def diagram(request: pytest.FixtureRequest) -> Diagram:
-    """The hemitropic rod, straight and buckled."""
-    return trace(cases()["demo hemitropic"](), request.param, Plan(depth=1, error_bars=False))
 
 
 @pytest.mark.few(1)
@@ -90,45 +79,13 @@ def test_stability_is_exchanged_at_folds_as_their_side_says(name: str) -> None:
 
 @pytest.mark.few(1)
 @alone
-def test_every_step_is_balanced(diagram: Diagram) -> None:
-    """On linear elements, too; and hardly any is divided for it."""
-    balanced, solver = EnergyBalance(), solver_of(diagram)
-    steps = [own[: i + 1] for own in map(rows, diagram.branches) for i in range(1, len(own))]
-    assert len(steps) > 80
-    assert all(balanced(solver, step) for step in steps)
-
-
-@pytest.mark.long
-@alone
-def test_a_jump_is_not_balanced(diagram: Diagram) -> None:
-    """States of another branch at nearly the same load, farther than two steps away, in place of the last row.
-
-    Those within a load step of where two branches meet have the energy of either.
-    """
-    solver, own, told = solver_of(diagram), [rows(b) for b in diagram.branches], []
-    for branch in own:
-        for other in (b for b in own if b is not branch):
-            for i in range(4, len(branch)):
-                last, step = branch[i], branch[i].arclength - branch[i - 1].arclength
-                near = min(other, key=lambda p: abs(p.load - last.load))
-                if abs(near.load - last.load) < 0.5 * step and solver.system.distance(near.x, last.x) > 2 * step:
-                    jump = replace(near, arclength=last.arclength)
-                    told.append(not EnergyBalance()(solver, [*branch[:i], jump]))
-    assert len(told) > 150
-    assert sum(told) > 0.95 * len(told)
-
-
-@alone
-def test_energy_that_does_not_follow_the_load_ends_a_branch(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From the load 0.5 on all energies are those of another state, by a part in a million."""
-    whole = BranchSolver.point
-
-    def spoilt(self: BranchSolver, *arguments: Any, **more: Any) -> Point:
-        point = whole(self, *arguments, **more)
-        point.potential += 1e-6 * abs(point.potential) if point.load > 0.5 else 0.0
-        return point
-
-    monkeypatch.setattr(BranchSolver, "point", spoilt)
-    first = trace(cases()["demo hemitropic"](), MESHES[0], Plan(depth=0, error_bars=False)).branches[0]
-    assert "is not the work of the load" in first.ended
-    assert 0.4 < first.points[-1].load < 0.5
+@pytest.mark.parametrize("steps", [StepControl(), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
+@pytest.mark.parametrize("mesh", MESHES, ids=["8 P6", "24 P1"])
+def test_energy_changes_by_the_work_of_the_load(mesh: Discretization, steps: StepControl) -> None:
+    """``V_b - V_a = -int c dlam``, with ``c`` and ``lam`` cubic splines of the arclength: on linear elements, too."""
+    diagram = trace(cases()["demo hemitropic"](), mesh, Plan(depth=1, error_bars=False, steps=steps))
+    for own in map(rows, diagram.branches):
+        s, potential = np.array([p.arclength for p in own]), np.array([p.potential for p in own])
+        load, conjugate = (CubicSpline(s, [getattr(p, name) for p in own]) for name in ("load", "conjugate"))
+        work = [quad(lambda t, c=conjugate, f=load: float(c(t) * f(t, 1)), a, b)[0] for a, b in pairwise(s)]
+        assert np.cumsum(work) == pytest.approx(potential[0] - potential[1:], abs=1e-2 * steps.largest**2)

@@ -15,9 +15,8 @@ from scipy.special import ellipe, ellipk
 
 import rodfem
 from rodfem import Discretization, Event, InputError, Plan, clamped, sliding
-from rodfem.continuation import states_between
+from rodfem.continuation import arc, event_piece
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.states_between import Curve
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
@@ -150,13 +149,13 @@ def test_zeros_between_rows_and_beside_them(kind: str) -> None:
 @pytest.mark.long
 def test_states_with_round_off_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Equilibria that are solved for differ by 1e-8, as beside a soft mode: each event is within its bar."""
-    chosen, solve = np.random.default_rng(4), states_between.solve_at
+    chosen, solve = np.random.default_rng(4), arc.corrected
 
-    def rough(solver: BranchSolver, curve: Curve, s: float) -> PETSc.Vec:
-        x, direction, aside = solve(solver, curve, s), curve(s)[1], solver.system.new_vector()
+    def rough(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
+        x, aside = solve(solver, start, row), solver.system.new_vector()
         solver.system.set_load(aside, 1.0)
-        row = solver.row(direction)
-        aside.axpy(-row.dot(aside) / row.dot(direction), direction)  # on the plane on which the state is solved for
+        along = solver.tangent(row, at=x)
+        aside.axpy(-row.dot(aside) / row.dot(along), along)  # on the plane on which the state is solved for
         return x + aside * (1e-8 * chosen.normal())
 
     touches = tuple(
@@ -165,7 +164,8 @@ def test_states_with_round_off_of_their_own(monkeypatch: pytest.MonkeyPatch) -> 
     tips = tuple(Event(f"tip {c:.2f}", of=lambda state, c=c: state.r[-1, 0] - c) for c in np.linspace(0.06, 0.18, 9))
     plan = replace(PLAN, events=touches + tips)
     exact = {s.note: s.point.load for s in rodfem.trace(COLUMN, MESH, plan)[0].special if s.event}
-    monkeypatch.setattr(states_between, "solve_at", rough)
+    for module in (arc, event_piece):
+        monkeypatch.setattr(module, "corrected", rough)
     found = [s for s in rodfem.trace(COLUMN, MESH, plan)[0].special if s.event]
     assert len(found) == len(exact) == 50
     assert all(abs(s.point.load - exact[s.note]) <= s.located_to < 1e-6 for s in found)

@@ -13,7 +13,7 @@ import pytest
 from rodfem import Discretization, Plan, Scene, trace
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.first_name import is_straight
+from rodfem.diagram.first_state import is_straight
 
 pytestmark = pytest.mark.alone
 

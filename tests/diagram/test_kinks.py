@@ -16,9 +16,8 @@ from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene,
 from rodfem.app.terminal import Report
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.plot_pieces import pieces_of
-from rodfem.output.typical import typical_state
-from rodfem.report.words import words_of
+from rodfem.output.pieces import pieces_of, typical_state
+from rodfem.output.words import words_of
 
 
 def bent(energy: Any, at: tuple[float, ...]) -> Diagram:
@@ -93,13 +92,13 @@ def test_the_reason_is_the_kink_wherever_one_reads_it(tmp_path: Path) -> None:
         assert at in text and "undecided" in text and "near zero" not in text, text
     assert {p.undecided for p in found[0].points} == {0} and "undecided" not in found.data["branches"][0]["columns"]
     assert {x.verdict for x in words_of(found.data["branches"][0])} <= {"undecided", "critical"}
-    assert {p.kind for p in pieces_of(found.data["branches"][0], "black")} == {"stability undecided"}
+    assert {p.kind for p in pieces_of(found.data["branches"][0])} == {"stability undecided"}
 
 
 def test_one_row_on_a_kink_says_nothing_of_those_beside_it() -> None:
     columns = {"load": [0.0, 1.0, 2.0], "ordinate": [0.0] * 3, "negative": [1, 0, 0], "kink": ["stored energy", "", ""]}
     branch = {"name": "a", "parent": None, "columns": columns | {"zero": [0] * 3}, "special": []}
-    assert [p.kind for p in pieces_of(branch, "black")] == ["stable"]
+    assert [p.kind for p in pieces_of(branch)] == ["stable"]
     assert [x.verdict for x in words_of(branch)] == ["undecided", "stable", "stable"]
 
 

@@ -16,9 +16,9 @@ from mpi4py import MPI
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, trace
 from rodfem.continuation.kinds import END
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.condensed import SHIFT
 from rodfem.stability.frequencies import orthonormal
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.spectrum import SHIFT
 
 pytestmark = pytest.mark.alone
 POLE = 20.190728556

@@ -10,8 +10,8 @@ import pytest
 from classics import column, push
 
 from rodfem import Discretization, Plan, clamped, free, trace
+from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
-from rodfem.diagram.step_check import Unresolved
 
 OFTEN, DEEP = 400, 300
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
-from scipy.integrate import solve_ivp, trapezoid
-from scipy.interpolate import CubicSpline
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Scene, clamped, free, trace
@@ -123,46 +122,6 @@ def _saved(locus: Locus, folder: Path) -> Path:
     path = folder / "locus.json"
     locus.save(path)
     return path
-
-
-def peak(y: Any, exp: Any) -> Any:
-    """A peak at the deflection 0.1, of a width of a thousandth."""
-    return 1e4 * exp(-(((y + 0.1) / 1e-3) ** 2))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("of", "integrand"),
-    [
-        pytest.param(
-            lambda x, c: ufl.conditional(ufl.gt(x.r[1], -0.1), 1.0, 0.0),
-            lambda y: 1.0 * (y > -0.1),
-            marks=pytest.mark.alone,
-            id="jump",
-        ),
-        pytest.param(lambda x, c: abs(x.r[1] + 0.1), lambda y: abs(y + 0.1), marks=pytest.mark.alone, id="kink"),
-        pytest.param(lambda x, c: peak(x.r[1], ufl.exp), lambda y: peak(y, np.exp), id="peak"),
-    ],
-)
-def test_the_bar_of_an_integral_holds(of: Any, integrand: Any) -> None:
-    """Of a jump, a kink or a peak in the state: 2.1 had the bar 1.4, and is 32.5; by two meshes alone 1.1 to 21."""
-    rod = Scene(
-        "integral", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: ufl.dot(k, k) / 2, {"P": 0.0}, "P",
-        (clamped(), free(lambda c: (0.0, -c.P, 0.0))), Ordinate("integral", s=None, of=of), (0.0, 3.5),
-    )  # fmt: skip
-    coarse = trace(rod, Discretization(elements=8, degree=4), Plan(depth=0, at=LOADS))
-    fine = trace(rod, Discretization(elements=20, degree=8), Plan(depth=0, at=LOADS, error_bars=False))
-    for (load, value, bar), point in zip(ordinates(coarse), fine[0].special, strict=False):
-        sample = fine.solvers[0].shape.sample(point.point.x)
-        exact = _integral(integrand, sample["s"], sample["r"][:, 1])
-        assert point.point.load == load
-        assert abs(value - exact) <= 1.001 * bar < 100, (load, value, exact, bar)
-
-
-def _integral(integrand: Any, s: np.ndarray, y: np.ndarray) -> float:
-    """By the trapezoidal rule, and a spline through fine states."""
-    fine = np.linspace(s[0], s[-1], 2_000_001)
-    return float(trapezoid(integrand(CubicSpline(s, y)(fine)), fine))
 
 
 @pytest.mark.long

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rodfem.diagram.step_check import PARTS, SHORTER, ShorterSteps, Unresolved
+from rodfem.diagram.shorter_steps import PARTS, SHORTER, ShorterSteps, Unresolved
 
 
 def row(arclength: float) -> Any:

@@ -13,7 +13,6 @@ import pytest
 from closed_forms import column, double, flutter
 from hard.endurance import resident
 from hemitropic_cases import specials
-from matplotlib.figure import Figure
 from mpi4py import MPI
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
@@ -27,7 +26,7 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.frequency_curves import curves, ranges_of
-from rodfem.output.plot_frequencies import draw_frequencies
+from rodfem.output.plot_frequencies import draw_frequencies, figure_of
 from rodfem.problem.end import End
 from rodfem.problem.scene import Scene
 from rodfem.stability.nonsymmetric import PILE, NonsymmetricSolver
@@ -133,17 +132,8 @@ def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.alone
 def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, data, _ = swept(classics.partly_following(0.4, (0.0, 25.0)), monkeypatch)
-    drawn: list[Figure] = []
-
-    class Kept(Figure):
-        def __init__(self, *given: object, **more: object) -> None:
-            super().__init__(*given, **more)
-            drawn.append(self)
-
-    monkeypatch.setattr("rodfem.output.plot_frequencies.Figure", Kept)
     if MPI.COMM_WORLD.rank == 0:
-        draw_frequencies(data, folder / "frequencies.png")
-        (axes,) = drawn[0].axes
+        (axes,) = figure_of(data).axes
         places = [float(line.get_xdata()[0]) for line in axes.get_lines() if line.get_marker() == "v"]
         first = np.arccos(-2 / 3)
         assert places == pytest.approx([first**2, (2 * np.pi - first) ** 2])
@@ -181,15 +171,14 @@ def test_constraints_that_follow_from_others_are_refused() -> None:
 @pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), pytest.param(5, 7, marks=pytest.mark.long)])
-def test_eigenvalues_that_change_with_the_shift_are_said(
+def test_a_singular_pencil_has_the_eigenvalues_of_its_motions(
     elements: int, degree: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a look at its constraints round-off may add an eigenvalue to those of a beam, clamped and hinged."""
+    """Without a look at its constraints round-off adds no eigenvalue to those of a beam, clamped and hinged."""
     monkeypatch.setattr("rodfem.diagram.first_state.require_independent_constraints", lambda *given: None)
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 2)
     diagram = trace(TWICE_HELD, Discretization(elements=elements, degree=degree), Plan(error_bars=False))
-    said = any("are not well defined" in s and "do not trust" in s for s in diagram.warnings)
-    assert said or diagram[0].points[0].omega2[0] == pytest.approx([TURNING**4, 0.0], rel=1e-6)
+    assert diagram[0].points[0].omega2[0] == pytest.approx([TURNING**4, 0.0], rel=1e-6)
 
 
 @pytest.mark.few(1)

@@ -32,17 +32,14 @@ def test_a_step_is_uphill_where_it_is_too_long(
     weighed = e.system.new_vector()
     step = linear_step(e.system, x, e.axis, 1.0 / (times * half))
     assert step is not None
-    blocks = Blocks(e.system, "full")
+    blocks = Blocks(e.system)
     K = blocks.assemble(x).K
-    own = blocks.rows - step.getOwnershipRange()[0]
-    moved, pulled = K.createVecs()
-    moved.array[:] = step.array_r[own]
-    K.mult(moved, pulled)
+    moved, own = blocks.gathered(step.array_r)[blocks.rows], blocks.own(blocks.rows)[1]
     dual = np.ones(step.local_size, dtype=bool)
     dual[own] = False
     motion = step.copy()
     motion.array[dual] = 0.0
     e.system.metric.mult(motion, weighed)
     found = along(e.system, x, step)
-    assert found == pytest.approx(moved.dot(pulled) + weighed.dot(motion) / (times * half), rel=1e-9)
+    assert found == pytest.approx(moved @ (K @ moved) + weighed.dot(motion) / (times * half), rel=1e-9)
     assert (found > 0) is (times < 6)

@@ -22,7 +22,7 @@ from rodfem.forms import paper
 from rodfem.forms.kinematics import RODS, UNDEFORMED, curvature, strain
 from rodfem.forms.lagrangian import pointwise, reduced
 from rodfem.forms.rotation import product, rotation
-from rodfem.linalg.matrices import gathered
+from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.stability.blocks import Blocks
 
 pytestmark = pytest.mark.alone
@@ -197,11 +197,11 @@ def hamilton(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 # --- on a finite element space ---------------------------------------------------------------------------------
 
 
-def rotated(system: System, blocks: Blocks, x: PETSc.Vec, dq: PETSc.Vec, eps: float) -> PETSc.Vec:
+def rotated(system: System, blocks: Coordinates, x: PETSc.Vec, dq: PETSc.Vec, eps: float) -> PETSc.Vec:
     """``exp(eps theta_i / 2) q_i`` at all nodes, ``dq`` its derivative at eps = 0; all else linear in eps."""
     y = x.copy()
     y.axpy(eps, dq)
-    nodes = blocks.quaternions - system.fields.offset
+    nodes = blocks.blocks.own(blocks.quaternions)[1].reshape(-1, 4)
     q, d = x.array_r[nodes], dq.array_r[nodes]
     size = np.linalg.norm(d, axis=1, keepdims=True)
     y.array[nodes] = np.cos(eps * size) * q + np.sin(eps * size) * d / np.where(size > 0, size, 1.0)
@@ -215,18 +215,18 @@ def rotated(system: System, blocks: Blocks, x: PETSc.Vec, dq: PETSc.Vec, eps: fl
 def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, formulation: str, load: float) -> None:
     """At a discrete equilibrium, to round-off: fourth order differences of the first derivative along the curve."""
     system, x = buckled(name, formulation, 3, 2, load)
-    blocks = Blocks(system)
+    blocks = Coordinates(system)
     pencil = blocks.assemble(x)
-    T, K = gathered(pencil.T), gathered(pencil.K)
+    T, K = pencil.T, pencil.K
     unit_norm = hessian_of_unit_norm(system, blocks, x, T)
-    first, last = pencil.T.getOwnershipRange()
+    mine, places = blocks.blocks.own(blocks.blocks.rows)
     residual, rng = system.new_vector(), np.random.default_rng(2)
 
     def slope(z: np.ndarray, eps: float) -> float:
         """``d/d eps`` of the Lagrangian: the gradient times ``1/2 theta q`` at the rotated state."""
         at = rotated(system, blocks, x, full(z), eps)
         system.at(at).residual(residual)
-        nodes = blocks.quaternions - system.fields.offset
+        nodes = blocks.blocks.own(blocks.quaternions)[1].reshape(-1, 4)
         dq = full(z)
         size = np.linalg.norm(dq.array_r[nodes], axis=1, keepdims=True)
         direction = dq.copy()
@@ -235,7 +235,7 @@ def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, 
 
     def full(z: np.ndarray) -> PETSc.Vec:
         out = system.new_vector()
-        out.array[blocks.rows - system.fields.offset] = (T @ z)[first:last]
+        out.array[places] = (T @ z)[mine]
         return out
 
     for _ in range(2):
@@ -247,7 +247,7 @@ def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, 
             assert abs(z @ (unit_norm @ z)) > 1e-5 * scale  # it would be missed
 
 
-def hessian_of_unit_norm(system: System, blocks: Blocks, x: PETSc.Vec, T: Any) -> Any:
+def hessian_of_unit_norm(system: System, blocks: Coordinates, x: PETSc.Vec, T: Any) -> Any:
     """What the unit norm term contributes: ``T^t K T`` with eta less that without."""
     pencil = blocks.assemble(x)
     without = x.copy()
@@ -255,7 +255,7 @@ def hessian_of_unit_norm(system: System, blocks: Blocks, x: PETSc.Vec, T: Any) -
     numbers = np.unique(f.number[f.dofs["eta"]])
     mine = numbers[(numbers >= f.offset) & (numbers < f.offset + len(f.free_owned))]
     without.array[mine - f.offset] = 0.0
-    return gathered(pencil.K) - gathered(blocks.assemble(without).K)
+    return pencil.K - blocks.assemble(without).K
 
 
 # --- as elements shrink ------------------------------------------------------------------------------------------
@@ -271,7 +271,7 @@ def smooth(s: np.ndarray, length: float, phase: float, components: int) -> np.nd
 def quadratic_forms(name: str, formulation: str, load: float, elements: int, degree: int) -> np.ndarray:
     """The Hessian of smooth perturbations of all fields, by UFL and by hand, (perturbations, 2)."""
     system, x = buckled(name, formulation, elements, degree, load)
-    blocks, f = Blocks(system, "full"), system.fields
+    blocks, f = Blocks(system), system.fields
     blocks.assemble(x)
     w = fem.Function(f.space, dtype=np.float64)
     form, z, state = by_hand(system, w), system.new_vector(), system.at(x)

@@ -23,7 +23,7 @@ LEFT = shutil.ignore_patterns(
     *(".git", ".venv", "results", "build", "dist", "__pycache__", "*.egg-info", ".*_cache", ".jupyter_cache")
 )
 """What tools leave in a working copy: the patterns of ``.gitignore``, and the repository itself."""
-SUFFIXES = {".py", ".pyi", ".c", ".js", ".css", ".html", ".typed", ""}
+SUFFIXES = {".py", ".pyi", ".c", ".js", ".css", ".html", ".md", ".typed", ""}
 """Ends of the names of the files of the package; licences of what the report contains have none."""
 
 pytestmark = pytest.mark.alone

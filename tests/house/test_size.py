@@ -14,14 +14,14 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 39345,
-    "files of Python": 281,
-    "lines of C": 991,
-    "module constants with a number": 515,
-    "functions of a complexity above 10": 122,
-    "functions of six parameters or more": 67,
-    "places that warn": 37,
-    "files that import internals of UFL and FFCx": 12,
+    "lines of Python": 37834,
+    "files of Python": 253,
+    "lines of C": 1426,
+    "module constants with a number": 483,
+    "functions of a complexity above 10": 69,
+    "functions of six parameters or more": 54,
+    "places that warn": 36,
+    "files that import internals of UFL and FFCx": 11,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
 INTERNALS = ("ufl.", "ffcx.")

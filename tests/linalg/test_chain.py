@@ -47,10 +47,6 @@ def test_random_chains(symmetric: bool) -> None:
         found = factors.elimination.solve(right)
         size = abs(dense).sum(axis=1).max() * abs(found).max()
         assert factors.regular and abs(dense @ found - right).max() < 100 * BACKWARD * size
-        if not symmetric:
-            found = factors.elimination.solve_transposed(right)
-            size = abs(dense).sum(axis=0).max() * abs(found).max()
-            assert abs(dense.T @ found - right).max() < 100 * BACKWARD * size
         assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], abs=1e-5)
         assert factors.elimination.growth <= 100.0 or factors.elimination.fronts == 1
         delayed += factors.elimination.delayed

@@ -31,7 +31,7 @@ from rodfem import (
     sliding,
 )
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.methods import METHODS
+from rodfem.stability.registry import METHODS
 
 pytestmark = pytest.mark.alone
 

@@ -26,7 +26,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
 from rodfem.modes.perturbation import Motions
-from rodfem.output.plot_modes import FRAMES, GROWS, amplitude, draw_modes, main
+from rodfem.output.plot_modes import FRAMES, RISING, amplitude, draw_modes, main
 from rodfem.problem.scene import Scene
 
 pytestmark = pytest.mark.alone
@@ -310,7 +310,7 @@ def test_animation_is_a_loop_without_a_jump(root: complex, grows: bool) -> None:
     assert abs(path).max() == pytest.approx(1.0)
     assert abs(np.diff(path)).max() < 0.3
     if grows:
-        start = path[: int(GROWS * FRAMES) + 1]
+        start = path[: int(RISING * FRAMES) + 1]
         np.testing.assert_allclose(start[1:] / start[:-1], start[1] / start[0])  # exponential
 
 

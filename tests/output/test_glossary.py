@@ -10,23 +10,22 @@ import pytest
 from rodfem.app import console
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
-from rodfem.output.files import COLUMNS, MEANING, OPTIONAL, SPECIAL
 from rodfem.output.frequency_curves import COLORS
 from rodfem.output.glossary import ENTRIES, NAMES, explanation
 from rodfem.output.plot_diagram import MARKERS
 from rodfem.output.plot_frequencies import PARTS
 from rodfem.output.plot_locus import POINTS
-from rodfem.output.plot_pieces import STYLES
+from rodfem.output.style import LINES as STYLES
+from rodfem.output.table import COLUMNS, PAGE, SPECIAL
 
 HOME = Path(__file__).parents[2]
 pytestmark = pytest.mark.alone
 
 
 def test_every_word_has_an_entry() -> None:
-    words = {*KINDS, *MEANING, *COLUMNS, *OPTIONAL, *SPECIAL, *MARKERS, *STYLES, *PARTS, *COLORS}
+    words = {*KINDS, *(entry.name for entry in (*COLUMNS, *SPECIAL[1:])), *MARKERS, *STYLES, *PARTS, *COLORS}
     words |= {
         "image, not traced",
-        "stable side",
         "stable, as far as these curves tell",
         "range of flutter",
         "range of divergence",
@@ -44,6 +43,12 @@ def test_entries_of_a_special_point_in_files() -> None:
     part = text[text.index("### `branches[].special[]`") : text.index("## `states.h5`")]
     for name in re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE):
         assert name == "kind" or explanation(name)
+
+
+def test_the_page_of_files_has_the_table() -> None:
+    rows = [line for line in PAGE.splitlines() if line.startswith("| `")]
+    assert len(rows) == len(COLUMNS) + len(SPECIAL) > 40
+    assert [row for row in rows if row not in (HOME / "docs" / "files.md").read_text().splitlines()] == []
 
 
 def test_each_name_has_one_entry() -> None:

@@ -13,7 +13,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from rodfem.continuation.kinds import CROSSES
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
@@ -21,11 +20,10 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
 from rodfem.file_format import LOCUS
 from rodfem.output import plot_diagram
-from rodfem.output.placement import dense
-from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram, figure_of
+from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
+from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, dense, draw_branches, draw_diagram, figure_of
 from rodfem.output.plot_locus import draw_locus
-from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
-from rodfem.output.sheet import PALETTE
+from rodfem.output.style import PALETTE
 from rodfem.problem.scene import Ordinate
 
 pytestmark = pytest.mark.alone
@@ -42,7 +40,7 @@ def diagram(*branches: dict[str, Any]) -> dict[str, Any]:
 
 def legend(*branches: dict[str, Any]) -> list[str]:
     axes = Figure().subplots()
-    return [str(handle.get_label()) for handle in _draw_branches(axes, branches)[0]]
+    return [str(handle.get_label()) for handle in draw_branches(axes, branches)[0]]
 
 
 def pixels(path: Path, color: str, rows: slice = slice(None), columns: slice = slice(0, 1450)) -> np.ndarray:
@@ -68,32 +66,23 @@ def test_nothing_unstable_is_hidden_below_something_stable(folder: Path) -> None
     assert dark > 2000 and blue > 500
 
 
-def test_lines_that_cross_or_touch_hide_nothing() -> None:
-    x = np.arange(0.0, 200.0, 2.0)
-    flat, steep = np.column_stack([x, 0 * x]), np.column_stack([x, x - 100.0])
-    fork = np.column_stack([x, 3 * np.sqrt(x)])  # from the same point, across
-    assert hidden(steep, [flat]) == hidden(fork, [flat]) == []
-    (part,) = hidden(flat, [flat[40:], steep])
-    np.testing.assert_array_equal(part, flat[39:])
-
-
 def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
     """The pitchfork of a planar rod at row 4, which is unstable in space from row 2 on."""
     point = {"kind": "branch point", "row": 4, "load": 4.0, "ordinate": 0.0, "negative_before": 0, "negative_after": 1}
     column = {"negative_in_space": [0, 0, 1, 1, 0, 2, 2]}  # at the branch point itself an eigenvalue is zero
     planar = branch("planar", [0.0] * 7, [0, 0, 0, 0, 0, 1, 1], special=[point], columns=column)
-    found = [(p.kind, p.label, p.curve[:, 0].tolist()) for p in pieces_of(planar, "black")]
+    found = [(p.kind, p.label, p.first, p.last) for p in pieces_of(planar)]
     assert found == [
-        (STABLE, "0 (0)", [0, 1]),
-        (PLANAR, "0 (1)", [1, 2, 3, 4]),
-        (UNSTABLE, "1 (2)", [4, 5, 6]),
+        (STABLE, "0 (0)", 0, 1),
+        (PLANAR, "0 (1)", 1, 4),
+        (UNSTABLE, "1 (2)", 4, 6),
     ]
     assert {STABLE, PLANAR, "negative eigenvalues in the plane (in space)"} <= set(legend(planar))
     del planar["columns"]["negative_in_space"]
-    assert [p.label for p in pieces_of(planar, "black")] == ["0", "1"]
+    assert [p.label for p in pieces_of(planar)] == ["0", "1"]
     assert PLANAR not in legend(planar)
     planar["columns"]["negative_in_space"] = [None] * 7  # end moments have no potential in space
-    assert [p.label for p in pieces_of(planar, "black")] == ["0", "1"]
+    assert [p.label for p in pieces_of(planar)] == ["0", "1"]
 
 
 def test_what_is_unexplained_is_marked(folder: Path) -> None:
@@ -106,7 +95,7 @@ def test_what_is_unexplained_is_marked(folder: Path) -> None:
     seen = pixels(draw_diagram(diagram(warned), folder / "warned.png"), yellow)
     y, x = (places.mean() for places in np.nonzero(seen[300:700, 400:1100]))  # the mark, without the legend
     dots = pixels(folder / "plain.png", PALETTE[0])[300:700, 400:1100]
-    assert abs(y - 200) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
+    assert abs(y - 150) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
 
 
 def test_a_singular_first_state_is_marked() -> None:
@@ -126,29 +115,32 @@ def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) ->
     assert "imperfect bifurcation, unfolding 3e-09 to 2e-07" in legend(two)
     unknown = branch("a", [0.0] * 5, [0, 0, 0, 1, 1], special=[point(2, unfolding=None)])
     assert "imperfect bifurcation" in legend(unknown)
-    assert [(p.negative, len(p.curve)) for p in pieces_of(one, "black")] == [(0, 3), (1, 3)]
+    assert [(p.negative, p.first, p.last) for p in pieces_of(one)] == [(0, 0, 2), (1, 2, 4)]
     assert draw_diagram(diagram(one), folder / "one.png").exists()
 
 
 def words(*branches: dict[str, Any], **more: Any) -> tuple[set[str], set[str]]:
     """What stands inside the axes, and in the legend."""
-    axes = figure_of(diagram(*branches) | more).axes[0]
-    inside, legend = axes.texts, axes.get_legend().get_texts()
+    figure = figure_of(diagram(*branches) | more)
+    inside, legend = figure.axes[0].texts, figure.axes[0].get_legend().get_texts()
     return {text.get_text() for text in inside}, {text.get_text() for text in legend}
 
 
-def test_names_stand_at_the_curves_where_there_is_room() -> None:
+def test_indices_stand_beside_the_curves_and_names_in_the_legend() -> None:
     far = [branch(name, [float(i)] * 9, [i] * 9) for i, name in enumerate(("straight", "branch 1"))]
     inside, legend = words(*far)
-    assert {"straight", "branch 1", "0", "1"} == inside and not {"straight", "branch 1"} & legend
-    close = [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(12)]
-    inside, legend = words(*close)
-    assert "branch 7" not in inside and {f"branch {i}" for i in range(12)} <= legend
+    assert inside == {"0", "1"} and {"straight", "branch 1"} <= legend
+    figure = figure_of(diagram(*far))
+    for text in figure.axes[0].texts:
+        box = text.get_window_extent()
+        for line in far:
+            places = np.column_stack([line["columns"][x] for x in ("load", "ordinate")])
+            assert not box.count_contains(dense(figure.axes[0], places))
 
 
 def test_branches_of_one_hue_have_other_marks() -> None:
     axes = Figure().subplots()
-    handles = _draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
+    handles = draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
     assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
 
 
@@ -182,49 +174,6 @@ def test_the_load_is_named_in_words() -> None:
     assert axes.get_xlabel() == "dead force $P$ [N]" and axes.get_ylabel().endswith(" [m]")
 
 
-def test_the_stable_side_of_a_locus_is_shaded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A curve that turns back: what is below its lower half, where it starts, is above its upper half."""
-    t = np.linspace(-1.0, 1.0, 41)
-    mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
-    columns = {"P": t.tolist(), "A": (1 - t**2).tolist(), "index": [[0, 1]] * 41, "error": [[None, None]] * 41}
-    one = {"kind": "branch point", "parameters": ["P", "A"], "columns": columns, "marks": [], "start": 5, "lower": -1}
-    one |= {"labels": ["P", "A"], "title": "by hand", "discretization": mesh, "format": LOCUS.mark()}
-    drawn: list[Figure] = []
-    monkeypatch.setattr("rodfem.output.plot_locus.save", lambda figure, path: drawn.append(figure))
-    draw_locus([one], folder / "locus.png")
-    (patch,) = drawn[0].axes[0].patches
-    inside = [patch.get_path().contains_point(place) for place in ((0.3, -0.9), (0.3, 0.9), (0.3, -0.78), (0.3, 0.78))]
-    assert inside == [True, True, False, False]
-    for spoiled in (one | {"lower": 0}, one | {"columns": columns | {"index": [[1, 2]] * 41}}):
-        draw_locus([spoiled], folder / "locus.png")
-        assert not drawn[-1].axes[0].patches
-
-
-def test_the_stable_side_is_the_other_one_beyond_a_crossing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """``P^2 < A^2`` is unstable: of the line P = A what is above is stable from A = 0 on, and below before."""
-    t = np.linspace(-1.0, 1.0, 42)
-    mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
-    columns = {"P": t.tolist(), "A": t.tolist(), "index": [[0, 1]] * 42, "error": [[None, None]] * 42}
-    one = {
-        "kind": "branch point",
-        "parameters": ["P", "A"],
-        "columns": columns,
-        "labels": ["P", "A"],
-        "title": "by hand",
-    }
-    one |= {"discretization": mesh, "format": LOCUS.mark(), "bounds": [[-1, 1], [-1, 1]]}
-    drawn: list[Figure] = []
-    monkeypatch.setattr("rodfem.output.plot_locus.save", lambda figure, path: drawn.append(figure))
-    for start, beyond, lower in ((35, 20, 1), (5, 21, -1)):
-        draw_locus(
-            [one | {"start": start, "lower": lower, "marks": [{"row": beyond, "kind": CROSSES}]}], folder / "a.png"
-        )
-        places = [(0.5, 0.55), (0.5, 0.45), (-0.5, -0.45), (-0.5, -0.55)]
-        patches = drawn[-1].axes[0].patches
-        inside = [any(patch.get_path().contains_point(place) for patch in patches) for place in places]
-        assert inside == [True, False, False, True]
-
-
 def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Below a line at P = 2 as far as another one from (0, 0) to (1, 1), which ends there, and then to the bound -1."""
     mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
@@ -243,8 +192,7 @@ def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypat
     places = ((0.5, 1.0), (0.5, 0.4), (0.9, 0.8), (1.5, -0.9), (1.5, 2.1))
     assert [region.get_paths()[0].contains_point(place) for place in places] == [True, False, False, True, False]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$A$", "force $P$")
-    legend = axes.get_legend()
-    assert legend is not None and legend.get_window_extent().y1 < axes.xaxis.label.get_window_extent().y0
+    assert axes.get_legend().get_window_extent().y1 < axes.xaxis.label.get_window_extent().y0
 
 
 def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
@@ -282,7 +230,7 @@ def test_pixels_are_those_of_the_picture(monkeypatch: pytest.MonkeyPatch) -> Non
 
     def counted(axes: Any, curve: np.ndarray) -> Any:
         found = dense(axes, curve)
-        seen.append(len(found[0]))
+        seen.append(len(found))
         return found
 
     monkeypatch.setattr(plot_diagram, "dense", counted)

@@ -17,10 +17,11 @@ from matplotlib.image import imread
 from rodfem.errors import InputError
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
+from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.pieces import typical_state
 from rodfem.output.render import _read, draw_shape_safely
-from rodfem.output.solids import FLATTEST, SIDES, profile_of, round_arrow
-from rodfem.output.typical import typical_state
+from rodfem.output.solids import FLATTEST, SIDES, profile_of, turn
+from rodfem.output.style import DARK, GREY, LOAD, STEEL
 from rodfem.output.view import view_of
 from rodfem.problem.ends import (
     Attachment,
@@ -97,7 +98,7 @@ def old(path: Path) -> Path:
 def colors(path: Path) -> set[str]:
     """Colours of what is drawn at the right end, beside the rod."""
     state = _read(path, "straight", 0)
-    return {x.color for x in state.solids(0.01, state.view())[2:] if x.points[:, 2].mean() > 0.5}
+    return {x.color for x in state.solids(Look(0.01, state.view()))[2:] if x.points[:, 2].mean() > 0.5}
 
 
 @pytest.mark.parametrize("kind", ENDS)
@@ -151,7 +152,7 @@ def test_potentials_that_are_no_springs_are_loads() -> None:
 
 def test_curved_arrow_has_the_sense_of_the_moment() -> None:
     axis = np.array([0.0, 0.6, 0.8])
-    path = round_arrow(E1, axis, 1.0, 0.01, LOAD, E2).points[:-2].reshape(-1, SIDES, 3).mean(axis=1) - E1
+    path = turn(E1, axis, 1.0, E2, LOAD).points[:-2].reshape(-1, SIDES, 3).mean(axis=1) - E1
     turning = np.cross(path[:-1], np.diff(path, axis=0)) @ axis
     assert turning.min() > -1e-12 and 1.5 * pi < turning.sum() < 2 * pi
 
@@ -180,7 +181,7 @@ def test_constraints_keep_distances_and_surfaces(folder: Path) -> None:
     bow = column(constraints=(CONSTRAINTS["sphere"], CONSTRAINTS["all"]))
     state = _read(saved(folder / "states.h5", bow), "straight", 0)
     assert state.setting.notes == ("constraint all along the rod",)
-    string = next(x for x in state.solids(0.01, state.view())[2:] if np.ptp(x.points[:, 2]) > 0.9)
+    string = next(x for x in state.solids(Look(0.01, state.view()))[2:] if np.ptp(x.points[:, 2]) > 0.9)
     np.testing.assert_allclose(string.points[-2:], [0 * E1, E3], atol=1e-6)
 
 
@@ -190,7 +191,7 @@ def test_foundation_is_a_row_of_springs(folder: Path) -> None:
     assert found is not None
     np.testing.assert_allclose(found[1], np.tile(np.diag([300.0, 300.0, 0.0]), (9, 1, 1)), atol=1e-3)
     state = _read(saved(folder / "states.h5", bed), "straight", 0)
-    assert [x.color for x in state.solids(0.01, state.view())].count(STEEL) == 9
+    assert [x.color for x in state.solids(Look(0.01, state.view()))].count(STEEL) == 9
     blown = column(potential=lambda x, c: loads.pressure(x.r, x.dr, c.P))
     state = _read(saved(folder / "states.h5", blown), "straight", 0)
     assert state.setting.notes == ("load by a potential along the rod",)
@@ -200,7 +201,7 @@ def test_what_slides_goes_along_with_a_motion_and_its_rails_stay(folder: Path) -
     state = _read(saved(folder / "states.h5", column(clamped(), ENDS["slide"])), "straight", 0)
     moved = state.centres + 0.1 * np.outer(state.s, E3)
     here, there = (
-        glyphs_of(state.setting, state.s, r, state.directors, 0.01, np.eye(3), state.centres)
+        glyphs_of(state.setting, state.s, (r, state.directors), Look(0.01, np.eye(3)), state.centres)
         for r in (state.centres, moved)
     )
     shift = [(b.color, (b.points - a.points).mean(axis=0)[2]) for a, b in zip(here, there, strict=True)]
@@ -250,7 +251,7 @@ def test_a_load_arrow_has_the_direction_of_the_load(folder: Path) -> None:
     half = sqrt(0.5)
     turned = {"q": np.tile([half, 0, half, 0], (31, 1)), "r": np.outer(S, E1)}  # d3 = e1
     state = _read(saved(folder / "states.h5", column(clamped(), free(follower=push)), **turned), "straight", 0)
-    (arrow,) = [x for x in state.solids(0.01, state.view()) if x.color == LOAD]
+    (arrow,) = [x for x in state.solids(Look(0.01, state.view())) if x.color == LOAD]
     head, tail = (arrow.points[arrow.points[:, 0].argsort()[[0, -1]]]) @ E1
     assert 1.0 < head < tail  # it pushes against the tip, from outside
 
@@ -343,8 +344,8 @@ def test_typical_state_is_well_inside_what_it_is_said_to_be() -> None:
     assert typical_state({"branches": [first, leaves]}) == ("branch 1", 3, "3, stable")
     unstable = branch("branch 1", [0, 2, 1, 1, 1, 1], [singular(0)], parent=["straight", 0])
     assert typical_state({"branches": [first, unstable]}) == ("branch 1", 4, "4, unstable, index 1")
-    planar = branch("straight", [0] * 6, columns={"negative_in_space": [0, 1, 1, 1, 1, 1]})
-    assert typical_state({"branches": [planar | {"name": "x"}]})[2] == "0, stable"
+    planar = branch("straight", [0] * 6, columns={"negative_in_space": [0, 0, 1, 1, 1, 1]})
+    assert typical_state({"branches": [planar | {"name": "x"}]})[2] == "1, stable"
     planar["columns"]["negative_in_space"] = [1] * 6
     assert typical_state({"branches": [planar]})[2] == "3, stable in the plane, unstable in space, index 1"
     with pytest.raises(InputError, match="no states"):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ellipe, ellipk
 
-from rodfem.output.smooth import between, drawn_pieces
+from rodfem.output.smooth import between, drawn
 
 
 def elastica(k: np.ndarray) -> dict[str, Any]:
@@ -21,12 +21,12 @@ def elastica(k: np.ndarray) -> dict[str, Any]:
 
 def test_long_steps_are_no_chords() -> None:
     branch = elastica(np.array([0.0, 0.3, 0.45, 0.6, 0.7]))
-    (piece,) = drawn_pieces(branch, "black")
-    load, height = piece.curve[:10].T
+    ((_, curve),) = drawn(branch)
+    load, height = curve[:10].T
     exact = ellipk((height * np.sqrt(load) / 2) ** 2) ** 2
     chord = np.interp(height, branch["columns"]["ordinate"], branch["columns"]["load"])
     assert abs(load - exact).max() < 2e-3 < 6e-3 < abs(chord - exact).max()
-    assert all(row in piece.curve for row in np.column_stack([branch["columns"][x] for x in ("load", "ordinate")]))
+    assert all(row in curve for row in np.column_stack([branch["columns"][x] for x in ("load", "ordinate")]))
 
 
 def test_rows_close_to_each_other_and_corners_stay_as_they_are() -> None:
@@ -34,6 +34,18 @@ def test_rows_close_to_each_other_and_corners_stay_as_they_are() -> None:
     branch = elastica(np.linspace(0.0, 0.7, 5))
     older = {**branch, "columns": {name: x for name, x in branch["columns"].items() if name != "slope"}}
     assert between(branch, "ordinate") and not between(older, "ordinate")
-    corner = {**branch, "columns": {**branch["columns"], "ordinate": np.array([0.2, 0.1, 0.0, 0.1, 0.2])}}
+    zigzag = abs(np.linspace(-0.2, 0.2, 9))
+    corner = elastica(np.linspace(0.0, 0.7, 9))
+    corner["columns"]["ordinate"] = zigzag
     values = np.concatenate([found[:, 1] for found in between(corner, "ordinate").values()])
-    assert values.min() >= 0.0 and values.max() <= 0.2 + 1e-12
+    assert values.min() >= -1e-12 and values.max() <= 0.2 + 1e-12
+
+
+def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
+    """A parabola of few rows, none at its top, is that parabola."""
+    branch = elastica(np.linspace(0.0, 0.7, 7))
+    s = branch["columns"]["arclength"]
+    branch["columns"]["ordinate"] = s * (0.55 - s)
+    found = between(branch, "ordinate")
+    places = np.concatenate([s[row] + np.arange(1, 8) / 8 * (s[row + 1] - s[row]) for row in found])
+    np.testing.assert_allclose(np.concatenate([x[:, 1] for x in found.values()]), places * (0.55 - places), atol=1e-12)

@@ -532,7 +532,7 @@ NAN = float("nan")
         (lambda: Discretization(elements=np.bool_(True)), "elements is .*True.*: give a whole"),  # type: ignore[arg-type]
         (lambda: Discretization(elements=1, vertices=("0", "1")), r"vertices\[0\] is '0': give a number"),  # type: ignore[arg-type]
         (lambda: Discretization(elements=1, vertices=1.0), "vertices is 1.0: give a tuple of numbers"),  # type: ignore[arg-type]
-        (lambda: StepControl(largest="0.1"), "largest is '0.1': give a number, as in largest=0.05"),  # type: ignore[arg-type]
+        (lambda: StepControl(largest="0.1"), "largest is '0.1': give a number, as in largest=0.1"),  # type: ignore[arg-type]
         (lambda: StepControl(most=10.5), "most is 10.5: give a whole number, as in most=2000"),  # type: ignore[arg-type]
         (lambda: StepControl(first=NAN), "first = nan lead nowhere"),
         (lambda: StepControl(aim=0.0), "aim = 0 lead nowhere"),

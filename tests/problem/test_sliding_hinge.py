@@ -16,8 +16,9 @@ from scipy.spatial.transform import Rotation
 
 from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, hinged, run, sliding_hinge, trace
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.glyphs import STEEL
+from rodfem.output.glyphs import Look
 from rodfem.output.render import _read
+from rodfem.output.style import STEEL
 from rodfem.problem.end import End
 
 pytestmark = pytest.mark.alone
@@ -134,7 +135,7 @@ def test_it_is_stored_and_drawn_as_what_it_is(folder: Path) -> None:
         np.testing.assert_allclose(end["force"][-1], -np.array(INCLINED))
         assert file["branches/straight/fb1"][-1] == pytest.approx(np.tan(TILT))
     state = _read(folder / "states.h5", "straight", 0)
-    rails = [x.points for x in state.solids(0.01, state.view()) if x.color == STEEL]
+    rails = [x.points for x in state.solids(Look(0.01, state.view())) if x.color == STEEL]
     assert len(rails) == 2
     for points in rails:
         longest = np.linalg.svd(points - points.mean(axis=0))[2][0]

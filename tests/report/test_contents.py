@@ -15,17 +15,15 @@ from scipy.integrate import quad
 from rodfem.app.commands.list import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
-from rodfem.output.digits import number
-from rodfem.output.endings import endings
+from rodfem.output.digits import eigenvalue_in_words, number
 from rodfem.output.frequency_curves import curves
-from rodfem.output.solids import ball, box, coil
-from rodfem.report.bodies import CLOSE, Shelf
+from rodfem.output.pieces import endings
+from rodfem.output.solids import between, body_of
+from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.packing import packed, plain, script_json
-from rodfem.report.readings import eigenvalue_in_words, readings_of
 from rodfem.report.shapes import shapes_of, stations
-from rodfem.report.words import words_of
 from rodfem.writhe import writhe
 
 pytestmark = pytest.mark.alone
@@ -232,26 +230,14 @@ def test_stations_stay_within_their_budget() -> None:
     )
 
 
-def test_bodies_are_found_again_where_they_moved() -> None:
-    shelf, turn = Shelf(0.1), np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-    first = box(np.zeros(3), np.eye(3), (1, 2, 3), "#111111")
-    moved = box(np.array([3.0, 1, 2]), turn * np.sign(np.linalg.det(turn)), (1, 2, 3), "#111111")
-    assert [shelf.place(x)[0] for x in (first, ball(np.ones(3), 1.0, "#111111"), moved)] == [0, 1, 0]
-    number, placed = shelf.place(moved)
-    corners = np.column_stack([shelf.bodies[number].solid.points, np.ones(10)]) @ placed
-    assert np.allclose(corners, moved.points)
-    assert shelf.place(box(np.zeros(3), np.eye(3), (1, 2, 3), "#222222"))[0] == 2
-
-
-def test_bodies_of_springs_are_near_enough() -> None:
-    shelf = Shelf(0.1)
-    for length in np.linspace(1.0, 1.6, 25):
-        spring = coil(np.zeros(3), np.array([0, 0, length]), 0.15, 0.02, 6, "#333333")
-        number, placed = shelf.place(spring)
-        body = shelf.bodies[number].solid.points
-        corners = np.column_stack([body, np.ones(len(body))]) @ placed
-        assert np.abs(corners - spring.points).max() <= CLOSE * 0.1
-    assert len(shelf.bodies) < 6
+def test_a_spring_that_is_stretched_is_the_same_body() -> None:
+    """Placed by affine maps, from its one end to the other."""
+    for length in (1.0, 1.6):
+        spring = between("coil", np.zeros(3), np.array([0, 0, length]), 0.1, "#333333")
+        assert spring.points[:, 2].min() == pytest.approx(0.0, abs=0.03) and np.ptp(spring.points[:, 2]) > 0.98 * length
+        assert np.hypot(*spring.points.T[:2]).max() == pytest.approx(0.1 * 1.72, rel=0.01)
+        corners = np.column_stack([body_of("coil")[0], np.ones(len(spring.points))]) @ spring.map
+        np.testing.assert_allclose(corners, spring.points, atol=1e-15)
 
 
 def test_packed_arrays_and_texts() -> None:

@@ -14,8 +14,7 @@ from hard.fuzz import wider
 from rodfem import Discretization, Parameter, Plan, Scene, Solver, trace
 from rodfem.diagram.held import at_load
 from rodfem.linalg.matrices import gathered
-from rodfem.stability.cluster import Measured, closed, cluster_of, measure
-from rodfem.stability.cluster_noise import noise_of
+from rodfem.stability.cluster import Measured, closed, cluster_of, measure, noise_of
 from rodfem.stability.inertia import EPS, NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 

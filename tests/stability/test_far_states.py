@@ -9,7 +9,7 @@ import ufl
 from rodfem import Discretization, Ordinate, Scene, Solver, clamped, free
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import NewtonResult
-from rodfem.stability.round_off import decide
+from rodfem.stability.near_zero import decide
 
 
 def stiffening(load: float) -> Scene:

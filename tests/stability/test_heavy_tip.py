@@ -7,8 +7,8 @@ import pytest
 
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.condensed import SHIFT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.spectrum import SHIFT
 
 
 def pushed(body: float) -> Scene:

@@ -104,8 +104,8 @@ def test_close_eigenvalues_nearest_zero() -> None:
     assert abs(mu[np.argsort(abs(mu))][7]) < 1.01 * abs(expected[-1])
     factored.count()
     f.inertia.vectors = []
-    values, _ = factored.nearest(6, accuracy=1e-8)
-    np.testing.assert_allclose(sorted(values), sorted(expected), rtol=1e-11)
+    values, _ = factored.nearest(6, accuracy=1e-9)
+    np.testing.assert_allclose(sorted(values), sorted(expected), rtol=1e-9)
 
 
 @FORMULATIONS

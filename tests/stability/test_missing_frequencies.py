@@ -9,8 +9,8 @@ from hard.fuzz.comparison import meshes
 from hard.fuzz.oracle import Oracle
 
 from rodfem import Discretization, Plan, Solver, trace
-from rodfem.stability.condensed import SHIFT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.spectrum import SHIFT
 
 pytestmark = pytest.mark.alone
 

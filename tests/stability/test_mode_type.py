@@ -11,9 +11,9 @@ import pytest
 from hard.fuzz import scenes as fuzz
 
 from rodfem import Discretization, Solver
-from rodfem.stability.condensed import SHIFT
-from rodfem.stability.mode_type import STRAIGHT
+from rodfem.stability.motion_names import STRAIGHT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.spectrum import SHIFT
 
 EA = 40.0
 

@@ -10,15 +10,23 @@ import pytest
 import scipy.sparse as sp
 from classics import column
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from rodfem import Attachment, Solver, clamped, free
-from rodfem.linalg.matrices import petsc_matrix, rounding
+from rodfem.linalg.matrices import rounding
 from rodfem.stability.inertia import Index
-from rodfem.stability.round_off import decide, quotient_error, resolve
+from rodfem.stability.near_zero import decide, quotient_error, resolve
 
 pytestmark = pytest.mark.alone
 
 EPS = np.finfo(float).eps
+
+
+def petsc_matrix(comm: MPI.Comm, own: sp.csr_matrix) -> PETSc.Mat:
+    """Block diagonal matrix, one block a rank, all equally large."""
+    n = own.shape[0]
+    csr = (own.indptr.astype(PETSc.IntType), (own.indices + comm.rank * n).astype(PETSc.IntType), own.data)
+    return PETSc.Mat().createAIJ(((n, PETSc.DETERMINE),) * 2, csr=csr, comm=comm)
 
 
 def test_rounding_of_a_product() -> None:

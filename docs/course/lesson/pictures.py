@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.output.plot_pieces import STABLE, STYLES
-from rodfem.output.sheet import DPI, HALO, PALETTE, STYLE, save
-from rodfem.output.smooth import drawn_pieces
+from rodfem.output.pieces import STABLE
+from rodfem.output.smooth import drawn
+from rodfem.output.style import DPI, HALO, LINES, PALETTE, STYLE, save
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Point
@@ -75,8 +75,8 @@ def equilibria(diagrams: Mapping[str, Diagram], x: str, y: str) -> Axes:
     on = axes(x, y)
     for (label, diagram), colour in zip(diagrams.items(), PALETTE, strict=False):
         for branch in diagram.data["branches"]:
-            for piece in drawn_pieces(branch, colour):
-                on.plot(*piece.curve.T, color=colour, **STYLES[piece.kind])
+            for piece, curve in drawn(branch):
+                on.plot(*curve.T, color=colour, **LINES[piece.kind])
         for branch, special in ((b, s) for b in diagram for s in b.special if s.kind in (FOLD, BRANCH_POINT)):
             place, load = (special.point.load, special.point.ordinate), np.mean([p.load for p in branch.points])
             on.plot(*place, linestyle="none", zorder=5, path_effects=HALO, **special.kind.marker)
@@ -84,7 +84,7 @@ def equilibria(diagrams: Mapping[str, Diagram], x: str, y: str) -> Axes:
             text = on.annotate(f"{special.kind}\n{special.point.load:.6g}", place, (10 * side, -5), **BESIDE)
             text.set(ha="left" if side > 0 else "right", path_effects=HALO)
         if len(diagrams) > 1:
-            on.plot([], [], color=colour, lw=STYLES[STABLE]["linewidth"], label=label)
+            on.plot([], [], color=colour, lw=LINES[STABLE]["linewidth"], label=label)
             on.legend(frameon=False, loc="upper left")
     return on
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import inf
 from typing import Any
 
 from rodfem.app.cli import Parser, run_folder
-from rodfem.continuation.kinds import KINDS
 from rodfem.output.contents import read_diagram
-from rodfem.output.digits import number
-from rodfem.output.endings import is_solved
 from rodfem.output.summary import in_sentences
+from rodfem.output.words import table_of
 
 NEEDED = ("parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
 """Entries of a diagram that are printed."""
@@ -32,25 +29,9 @@ def lines(data: Mapping[str, Any]) -> Iterator[str]:
     for mesh in data["meshes"]:
         yield f"  {mesh['elements']} elements of degree {mesh['degree']}, {mesh['unknowns']} unknowns"
     yield f"  {'branch':<12} {'kind':<13} {data['parameter']:<24} {data['ordinate'][:24]:<24} index"
-    scale = max((abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"]), default=0.0)
+    rows = list(table_of(data))
     for branch in data["branches"]:
-        for special in branch["special"]:
-            given = KINDS[special["kind"]].given and not is_solved(branch, special)
-            yield f"  {branch['name']:<12} {special['kind']:<13} {_values(special, scale, given)}"
+        for name, kind, load, ordinate, index, _ in (row for row in rows if row[0] == branch["name"]):
+            yield f"  {name:<12} {kind:<13} {load:<24} {ordinate:<24} {index}"
         yield f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}"
     yield from (f"  {sentence}" for sentence in in_sentences(data))
-
-
-def _values(special: Mapping[str, Any], scale: float, given: bool) -> str:
-    """Load, ordinate and index of a special point; a load that was ``given`` is exact; ``scale`` is of ordinates."""
-    bars = [special.get(name) for name in ("error_estimate", "ordinate_error_estimate")]
-    load, ordinate = (
-        number(special[name], inf if bar is None else bar, special.get("resolved"), scale * (name == "ordinate"))
-        for name, bar in zip(("load", "ordinate"), bars, strict=True)
-    )
-    if given:
-        load = f"{special['load']:.10g}"
-    before, after = special["negative_before"], special["negative_after"]
-    index = f"{before}" if before == after else f"{before}->{after}"
-    zero = f", {special['zero']} zero" if special["zero"] else ""
-    return f"{load:<24} {ordinate:<24} {index}{zero}"

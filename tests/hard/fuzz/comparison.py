@@ -49,8 +49,6 @@ ROWS = 40, 12
 MOST_BRANCHES = 7
 ENDED = ("end of range", "closed loop", "meets another branch", "stretch reaches zero")
 """Beginnings of the reasons for which a branch ends, but for those that depend on steps and meshes."""
-NO_FREQUENCIES = "are not well defined"
-"""What is said of a sweep none of whose frequencies is to be trusted."""
 LESS = 0.1
 """Ratio of differences of energies, on finer meshes and on those compared, of one state with the errors of meshes."""
 OTHER = 0.05
@@ -179,7 +177,7 @@ def check_rows(diagram: Diagram, out: Compared, most: int) -> None:
         branch, i, point = rows[j]
         out.rows += 1
         if not diagram.scene.conservative:
-            doubted = id(point) in special or any(NO_FREQUENCIES in words for words in diagram.warnings)
+            doubted = id(point) in special
             fault = None if doubted else frequencies_of(oracle, point)
         else:
             fault = index_of(oracle, system, point, id(point) in special)

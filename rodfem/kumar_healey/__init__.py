@@ -1,0 +1,9 @@
+"""The method of Kumar & Healey (2010): coordinates, null space of the constraints, reduction, Cayley transform.
+
+Only the registry of methods (:mod:`rodfem.stability.registry`) knows of it.
+"""
+
+from rodfem import libraries  # noqa: F401, before all that computes
+from rodfem.lazy import attributes
+
+__getattr__ = attributes("rodfem.kumar_healey")

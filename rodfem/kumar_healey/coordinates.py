@@ -1,0 +1,194 @@
+r"""The singular pencil of a state, Kumar & Healey (2010), (21), in given coordinates.
+
+The pencil ``(K C; C^t 0) x = mu (M 0; 0 0) x`` of :mod:`rodfem.stability.blocks` in three sets of coordinates:
+
+* ``full``: the unknowns as they are, four components of ``q`` at each node and the multiplier ``eta`` of its norm;
+* ``tangent``: a spin ``theta`` in the space frame at each node, ``dq = 1/2 theta q``.  The sparse map ``T`` takes it to
+  the full coordinates and fulfils the collocated norm conditions, ``C_eta^t T = 0``, so that ``eta`` goes with them.
+  The blocks are ``T^t K T``, ``T^t C``, ``T^t M T``.  ``K`` contains ``eta`` times the second derivative of the norm
+  condition: at an equilibrium ``T^t K T`` is then the second derivative of the energy along
+  ``exp(eps theta / 2) q`` (see :mod:`rodfem.forms.paper`), without it, it is not;
+* ``compatible``: tangent coordinates, and the free strains follow from the motion through the kinematics ``r' = R v``
+  (pointwise formulation only).  In each cell the gradients of its constraints in its own strains are a block ``C_v`` of
+  full column rank; ``dv = -(C_v^t)^+ C_u^t (theta, dr)`` and an orthonormal ``N`` with ``C_v N = 0`` leave ``C_u N``.
+
+A ring is closed by ``q(l) = +-q(0)``.  The norms being fulfilled, three of these four equations are independent: in
+tangent and compatible coordinates those across ``q(0)``, one in the plane.
+
+Sizes for ``N`` elements of degree ``d``, ``f`` free strains, one end clamped (``e = 1``) or both (``e = 2``), ``h``
+held components of the centreline's ends, ``g`` scalar contact forces (reduced formulation):
+
+    coordinates              rows of K and C                                 columns of C
+    full, pointwise          4 (dN + 1 - e) + f dN + 3 (dN + 1) - h          dN + 1 - e + 3 dN
+    full, reduced            4 (dN + 1 - e) + f dN                           dN + 1 - e + g
+    tangent, pointwise       3 (dN + 1 - e) + f dN + 3 (dN + 1) - h          3 dN
+    tangent, reduced         3 (dN + 1 - e) + f dN                           g
+    compatible, pointwise    3 (dN + 1 - e) + 3 (dN + 1) - h                 (3 - f) dN
+
+For ``d = 1`` these are the sizes of the paper with ``n = N`` but for what discontinuous fields change.
+Cord: ``(6n - 5) x (6n - 5)`` and ``3n`` columns.  A continuous multiplier has ``3n + 3`` components less the known
+``n3`` at the end, ``3n + 2``; a discontinuous one has three in each cell, and dead forces enter the load instead.
+Hemitropic, compatible: ``6 (n - 1)`` and ``2n`` columns.  Hemitropic, reduced: ``4n - 3`` rows and 3 columns, where a
+continuous stretch would have one value more, ``4n - 2``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from rodfem.errors import POINTWISE, InputError
+from rodfem.fem.state import State
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import block_matrix
+from rodfem.problem.ring import CLOSING_MOMENT
+from rodfem.stability.blocks import Blocks, Pencil
+from rodfem.stability.pencil import symmetry_modes, weighed_modes
+
+COORDINATES = ("full", "tangent", "compatible")
+
+
+@dataclass(frozen=True)
+class MappedPencil(Pencil):
+    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones.
+
+    It is ``symmetric`` but under a follower load.  The rows of spins are ``where["theta"]``.
+    """
+
+    T: sp.csr_matrix
+    symmetric: bool
+
+    def mapped(self, T: sp.csr_matrix, where: dict[str, np.ndarray]) -> MappedPencil:
+        """The same in coordinates that ``T`` maps to these, with the fields at other rows."""
+        K, M = ((T.T @ A @ T).tocsr() for A in (self.K, self.M))
+        return replace(self, K=K, C=(T.T @ self.C).tocsr(), M=M, where=where, T=self.T @ T)
+
+
+class Coordinates:
+    """Makes the :class:`MappedPencil` of states of one system in one set of coordinates, and vectors of the system.
+
+    ``quaternions`` (nodes, 4) are the global numbers of the components of ``q`` at each free node.
+    """
+
+    def __init__(self, system: System, coordinates: str = "tangent") -> None:
+        """Number rows and columns; raises :class:`InputError` for coordinates that the formulation does not have."""
+        if coordinates not in COORDINATES:
+            raise InputError(f"Unknown coordinates {coordinates!r}: choose one of {', '.join(COORDINATES)}.")
+        if coordinates == "compatible" and not system.fields.formulation.centreline:
+            raise InputError("Compatible coordinates need the centreline", POINTWISE)
+        self.system, self.coordinates = system, coordinates
+        self.blocks = Blocks(system, norms=coordinates == "full")
+        f = system.fields
+        self._dofs = f.dofs["q"].reshape(-1, 4) if "q" in f.dofs else np.zeros((0, 4), dtype=int)
+        every = self.blocks.gathered(f.number[self._dofs])
+        first, chosen = np.unique(every[:, 0], return_index=True)
+        self._nodes = chosen[first >= 0]
+        self.quaternions = every[self._nodes]
+        self._quads = np.searchsorted(self.blocks.rows, self.quaternions)
+        self._map = sp.csr_matrix((0, 0))
+
+    def assemble(self, x: PETSc.Vec, sizes: PETSc.Vec | None = None) -> MappedPencil:
+        """Blocks at the state ``x``, in units of natural ``sizes`` of the unknowns if these are given."""
+        p, state = self.blocks.assemble(x, sizes), self.system.at(x)
+        one = sp.identity(len(self.blocks.rows), format="csr")
+        out = MappedPencil(p.K, p.C, p.M, p.where, p.place, one, self.system.scene.conservative)
+        if self.coordinates != "full":
+            out = self._tangent(out, state)
+        if self.coordinates == "compatible" and "v" in out.where:
+            out = self._compatible(out)
+        self._map = out.T
+        return out
+
+    def without_modes(self, x: PETSc.Vec, sizes: PETSc.Vec) -> MappedPencil:
+        """The same with a constraint ``g.Mx = 0`` more for each symmetry mode ``g``, in units of natural ``sizes``."""
+        modes = symmetry_modes(self.system, x)
+        units = None if self.system.scene.units.ordinary else sizes
+        pencil, images = self.assemble(x, units), []
+        if not modes:
+            return pencil
+        for _, weighed in weighed_modes(self.system, modes, self.blocks.mass).values():
+            if units is not None:
+                weighed.pointwiseMult(weighed, units)
+                weighed.scale(1.0 / weighed.norm())
+            images.append(pencil.T.T @ self.blocks.gathered(weighed.array_r.real)[self.blocks.rows])
+        C = sp.hstack([pencil.C, np.stack(images, axis=1)]).tocsr()
+        return replace(pencil, C=C, place=np.append(pencil.place, np.full(len(modes), np.nan)))
+
+    def lift(self, vectors: np.ndarray, sizes: PETSc.Vec) -> list[PETSc.Vec]:
+        """Vectors of the system from columns in the coordinates of the last pencil, in units of natural ``sizes``."""
+        mine, places = self.blocks.own(self.blocks.rows)
+        out = []
+        for column in (self._map @ vectors)[mine].T:
+            vector = self.system.new_vector()
+            vector.array[places] = column
+            if not self.system.scene.units.ordinary:
+                vector.pointwiseMult(vector, sizes)
+            out.append(vector)
+        return out
+
+    # --- maps --------------------------------------------------------------------------------------------------
+
+    def _tangent(self, full: MappedPencil, state: State) -> MappedPencil:
+        """A spin at each node in the place of its quaternion; that of a planar rod is one already."""
+        where, count = dict(full.where), len(self.blocks.rows)
+        if "angle" in where:
+            where["theta"] = where.pop("angle")
+            return replace(full, where=where)
+        kept = np.delete(np.arange(count), self._quads[:, 0])
+        where |= {name: np.searchsorted(kept, where[name]) for name in {"v", "r", "ends"} & set(where)}
+        where["theta"] = np.searchsorted(kept, np.sort(self._quads[:, 1:].ravel()))
+        del where["q"]
+        pencil = full.mapped(self._spins(state)[:, kept], where)
+        return self._closed(pencil, state) if self.system.scene.closed else pencil
+
+    def _spins(self, state: State) -> sp.csr_matrix:
+        """Square matrix with columns of a spin in the places of q1, q2, q3, and one for each other unknown."""
+        quads, count = self._quads, len(self.blocks.rows)
+        a, b, c, d = self.blocks.gathered(state.local[self._dofs])[self._nodes].T / 2
+        values = np.array([[-b, -c, -d], [a, d, -c], [-d, a, b], [c, -b, a]])  # of 1/2 (0, theta) q
+        same = np.ones(count)
+        same[quads.ravel()] = 0.0
+        spins = block_matrix(np.moveaxis(values, 2, 0), quads, quads[:, 1:], (count, count))
+        return (sp.diags(same) + spins).tocsr()
+
+    def _closed(self, pencil: MappedPencil, state: State) -> MappedPencil:
+        """Keep of the equations that close a ring's rotation the combinations across the quaternion at its start."""
+        f, count = self.system.fields, len(self.blocks.columns)
+        start = np.isclose(f.coordinates(f.discretization.degree), self.system.scene.interval[0])
+        q = self.blocks.gathered(state.values("q")[start])[0]
+        closing = {f.scalars[x.name]: x.component for x in f.unknown_scalars if x.group == CLOSING_MOMENT}
+        columns = np.searchsorted(self.blocks.columns, np.array(list(closing), dtype=int))
+        across = np.linalg.svd(q[list(closing.values())][None])[2][1:].T
+        kept = np.delete(np.arange(count), columns[-1:])
+        chosen = sp.identity(count, format="lil")[:, kept]
+        if len(columns):
+            chosen[np.ix_(columns, np.searchsorted(kept, columns[:-1]))] = across
+        where = dict(pencil.where)
+        for name in {"scalars", *(b.name for b in f.blocks if b.multiplier)} & set(where):
+            where[name] = np.searchsorted(kept, where[name][np.isin(where[name], kept)])
+        return replace(pencil, C=(pencil.C @ chosen).tocsr(), where=where, place=pencil.place[kept])
+
+    def _compatible(self, pencil: MappedPencil) -> MappedPencil:
+        """Let the strains of ``pencil`` (tangent coordinates) follow from the motion."""
+        f, blocks = self.system.fields, self.blocks
+        cells = [f.number[f.dofs[name][: f.owned_cells]].reshape(f.owned_cells, -1) for name in ("v", "n")]
+        rows, columns = (
+            pencil.where[name][np.searchsorted(blocks.numbers[name], blocks.gathered(own))]
+            for name, own in zip(("v", "n"), cells, strict=True)
+        )
+        middle = blocks.gathered(f.vertices[: f.owned_cells].mean(axis=1))
+        (n, a), b, (m, p) = rows.shape, columns.shape[1], pencil.C.shape
+        C_v = pencil.C[rows.ravel()][:, columns.ravel()]  # block diagonal
+        C_v.eliminate_zeros()
+        Q, R = np.linalg.qr(np.swapaxes(C_v.tobsr((a, b)).data, 1, 2), mode="complete")
+        E = -np.linalg.solve(R[:, :a, :], np.swapaxes(Q[:, :, :a], 1, 2))
+        kept = np.delete(np.arange(m), rows.ravel())
+        rest = np.arange(n * (b - a)).reshape(n, b - a)
+        select, N = sp.identity(m, format="csr")[:, kept], block_matrix(Q[:, :, a:], columns, rest, (p, rest.size))
+        T = block_matrix(E, rows, columns, (m, p)) @ (pencil.C.T @ select) + select
+        where = {name: np.searchsorted(kept, pencil.where[name]) for name in ("theta", "r", "ends")}
+        out = pencil.mapped(T.tocsr(), where | {"n": rest.ravel()})
+        return replace(out, C=(out.C @ N).tocsr(), place=np.repeat(middle, b - a))

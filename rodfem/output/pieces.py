@@ -1,0 +1,192 @@
+"""Pieces of the branches of a diagram: consecutive rows of one index, why branches end, and the state that is shown.
+
+An index is that of the step between two rows.  It is the greater one of both rows, but at a special point that is known
+before and after.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby, pairwise
+from typing import Any, NamedTuple
+
+from rodfem.continuation.kinds import FREQUENCY, KINDS
+from rodfem.errors import InputError
+from rodfem.stability.soft_mode import index_range
+
+STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
+UNDECIDED = "stability undecided"
+COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
+"""Kinds whose index before and after is that of the steps beside."""
+COINCIDE = 1e-6
+"""Arclength within which a row of a branch is at the branch point that it leaves."""
+INSIDE = 0.6
+"""Where on a piece the state to show is taken, as a share of the piece's length along the branch."""
+COMPLETE = ("", "end of range", "closed loop", "not traced")
+"""Ends that need no mark."""
+MEETS, SQUEEZED, BEGINS = "meets", "stretch reaches zero", "begins here: "
+"""Beginning of an end on another branch, whose points say so; reason of an end at a load that is solved for; beginning
+of the note at the first row of a branch that was traced to both sides."""
+
+Branch = Mapping[str, Any]
+
+
+class Piece(NamedTuple):
+    """Rows ``first`` to ``last`` of a branch, with one index between them.
+
+    ``negative`` is the index, of a planar rod in its plane, ``in_space`` that among all perturbations (None where it is
+    not known), ``undecided`` the number of eigenvalues that may be negative besides; ``kink`` names functions on a kink
+    of which the states are, where the index is that of one side.
+    """
+
+    first: int
+    last: int
+    negative: int
+    in_space: int | None
+    undecided: int = 0
+    kink: str = ""
+
+    @property
+    def kind(self) -> str:
+        """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`."""
+        if self.kink or (self.undecided and not self.negative):
+            return UNDECIDED
+        return UNSTABLE if self.negative else PLANAR if self.in_space else STABLE
+
+    @property
+    def label(self) -> str:
+        """The index, or its least and greatest value, followed by the index in space in parentheses."""
+        index = index_range(self.negative, self.undecided, self.kink)
+        return index if self.in_space is None else f"{index} ({self.in_space})"
+
+
+def pieces_of(branch: Branch) -> list[Piece]:
+    """Pieces of a branch of ``diagram.json``, in order; raises ValueError where its columns differ in length."""
+    columns = branch["columns"]
+    rows = len(columns["load"])
+    if not rows == len(columns["ordinate"]) == len(columns["negative"]):
+        raise ValueError(f"columns of branch {branch['name']!r} differ in length: try to compute the diagram anew")
+    known = {(row, side): index for row, *sides in _indices(branch) for side, index in enumerate(sides)}
+    kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
+    off, steps = _off_kinks(columns["negative"], kink), []
+    for a, b in pairwise(range(rows)):
+        on = kink[a] if kink[b] else ""
+        own = columns["negative"] if on else off
+        ends = [(known.get(end), own[end[0]], undecided[end[0]]) for end in ((a, 1), (b, 0))]
+        steps.append((*_index(ends), on))
+    return _grouped(steps, _in_space(branch))
+
+
+def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
+    """Least index between two rows, and how many eigenvalues may be negative besides.
+
+    Of either end it is known or not, then the index of the row, and the number of undecided eigenvalues there.
+    """
+    sure, own, undecided = zip(*ends, strict=True)
+    if not any(undecided):
+        return next((known for known in sure if known is not None), max(own)), 0
+    least = [b if a is None else a for a, b in zip(sure, own, strict=True)]
+    more = [0 if known is not None else count for known, count in zip(sure, undecided, strict=True)]
+    return min(least), max(a + b for a, b in zip(least, more, strict=True)) - min(least)
+
+
+def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> list[Piece]:
+    """Pieces of steps that are alike: their index, how many may be negative besides, and what is on a kink."""
+    most = [max(space[i], space[i + 1], step[0]) if space else None for i, step in enumerate(steps)]
+    each = [(least, inside, more, on) for (least, more, on), inside in zip(steps, most, strict=True)]
+    groups = [[step for step, _ in group] for _, group in groupby(enumerate(each), lambda step: step[1])]
+    return [Piece(group[0], group[-1] + 1, *each[group[0]]) for group in groups]
+
+
+def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
+    """Rows at which the index is known before and after, with both.
+
+    They are singular points, and rows beside them at the same load to its error bar: a load asked for may be that of a
+    special point, where the index of the row itself is not decided.  At the branch point that a branch leaves they are
+    undecided rows, too, whose index is that of the next row.
+    """
+    columns = branch["columns"]
+    for point in (point for point in branch.get("special", []) if point["kind"] in COUNTED):
+        yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
+        yield from _beside(columns["load"], point) if point.get("negative_after") is not None else ()
+    if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
+        near = _at_the_origin(columns["arclength"], columns["undecided"])
+        yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
+
+
+def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
+    return [row for row in range(1, len(s) - 1) if s[row] - s[0] < COINCIDE and undecided[row]]
+
+
+def _beside(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
+    """Rows on either side of a special point at its load, to its error bar, with the index there."""
+    row, bar = int(point["row"]), max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0)
+    for step, side in ((-1, "before"), (1, "after")):
+        other = row + step
+        while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= bar:
+            yield other, point[f"negative_{side}"], point[f"negative_{side}"]
+            other += step
+
+
+def _off_kinks(negative: list[int], kink: list[str]) -> list[int]:
+    """Index of each row; of one on a kink, where it is that of one side, that of the row beside it off the kink."""
+    negative, rows = list(negative), range(len(kink))
+    for a, b in (*pairwise(rows), *pairwise(reversed(rows))):
+        negative[a] = negative[b] if kink[a] and not kink[b] else negative[a]
+    return negative
+
+
+def _in_space(branch: Branch) -> list[int]:
+    """Index among all perturbations in each row, none where it is not known.
+
+    That of a singular row leaves out the eigenvalues that vanish there, so that the other rows decide.
+    """
+    column = branch["columns"].get("negative_in_space") or [None]
+    singular = {int(point["row"]) for point in branch.get("special", []) if point["kind"] in COUNTED}
+    return [] if None in column else [0 if row in singular else index for row, index in enumerate(column)]
+
+
+def endings(branch: Branch) -> list[tuple[int, str]]:
+    """First and last row of a branch of ``diagram.json``, each with the reason, where it is not the range that ends."""
+    notes = "".join(str(special.get("note") or "") for special in branch.get("special", []) if special["row"] == 0)
+    begun = notes.partition(BEGINS)[2]
+    ends = (0, begun), (len(branch["columns"]["load"]) - 1, str(branch.get("ended") or ""))
+    reasons = [(row, re.split(r" at |:| any more", sentence)[0]) for row, sentence in ends]
+    return [(row, reason) for row, reason in reasons if not reason.startswith(MEETS) and reason not in COMPLETE]
+
+
+def is_solved(branch: Branch, special: Mapping[str, Any]) -> bool:
+    """Whether the load of the end ``special`` of a branch is solved for: it is not the range that ends there."""
+    return (special["row"], SQUEEZED) in endings(branch)
+
+
+def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
+    """Branch, row and words of the state to draw: a stable one well inside a branch that leaves the first one.
+
+    Where none is stable there, one of another branch but the first; else one of least index on a branch that leaves the
+    first, said to be unstable; on the first branch only where there is no other.  Raises :class:`InputError` for a
+    diagram without states.
+    """
+    branches = [branch for branch in data["branches"] if branch["columns"]["load"]]
+    if not branches:
+        raise InputError("The diagram has no states to draw.")
+    first = data["branches"][0]["name"]
+
+    def rank(place: tuple[Branch, Piece]) -> tuple[bool, bool, int, int, float]:
+        branch, piece = place
+        s, aside = branch["columns"]["arclength"], branch["name"] != first
+        leaves = branch["parent"] is not None and branch["parent"][0] == first
+        length = s[piece.last] - s[piece.first]
+        return piece.kind == STABLE and aside, leaves, -piece.negative, -(piece.in_space or 0), length
+
+    alone = Piece(0, 0, branches[0]["columns"]["negative"][0], None)
+    found = [(branch, piece) for branch in branches for piece in pieces_of(branch)] or [(branches[0], alone)]
+    branch, piece = max(found, key=rank)
+    columns = branch["columns"]
+    s = columns["arclength"]
+    wanted = s[piece.first] + INSIDE * (s[piece.last] - s[piece.first])
+    row = min(range(piece.first, piece.last + 1), key=lambda row: abs(s[row] - wanted))
+    index = index_range(piece.negative, piece.undecided, piece.kink)
+    words = piece.kind + {STABLE: "", PLANAR: f", index {piece.in_space}"}.get(piece.kind, f", index {index}")
+    return branch["name"], row, f"{columns['load'][row]:.4g}, {words}"

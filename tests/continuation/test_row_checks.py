@@ -1,0 +1,173 @@
+"""What is no equilibrium is never a point of a branch: states that are spoilt after Newton's method has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from classics import column, euler
+from golden_cases import cases
+from petsc4py import PETSc
+
+from rodfem import Discretization, Plan, Solver, StepControl, clamped, free, trace
+from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import BranchSolver, Step
+from rodfem.continuation.follow import UNEXPLAINED
+from rodfem.continuation.row_checks import RowCheck, defect
+from rodfem.errors import ConvergenceError
+from rodfem.fem.symmetries import add_change
+from rodfem.fem.system import System
+from rodfem.forms.symmetry import AXES, cross, left
+
+SMALL = 1e-6
+"""Size of the mutations, in the units of a rod of unit length and stiffness."""
+
+
+@cache
+def bent(formulation: str) -> tuple[BranchSolver, Point]:
+    """A cantilever bent by a force across its axis: no component of the contact force or the quaternion is zero."""
+    scene = column("bent", (clamped(), free(lambda c: (c.P, 0.5 * c.P, c.P))), (0.0, 4.0))
+    solver = Solver(scene, Discretization(formulation, 6, 4))
+    point = None
+    for load in (0.5, 1.0, 2.0):
+        point = solver.equilibrium(load, point)
+    equilibria = solver.equilibria
+    assert isinstance(equilibria, BranchSolver) and point is not None
+    return equilibria, point
+
+
+def spoilt(system: System, x: PETSc.Vec, field: str) -> PETSc.Vec:
+    """The state with the values of a field at one node inside an element changed a little."""
+    values = system.at(x).named
+    middle = len(values[field]) // 2
+    values[field] = values[field].copy()
+    values[field][middle, 2] += SMALL
+    return system.vector(system.fields.filled(values), [0.0] * len(system.drifts))
+
+
+@pytest.mark.long
+@pytest.mark.alone
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_mutations_are_caught(formulation: str) -> None:
+    solver, point = bent(formulation)
+    system, check, kept = solver.system, RowCheck(solver), point.x
+    check(point)
+    caught: dict[str, str] = {}
+    for field in (b.name for b in system.fields.blocks):
+        point.x = spoilt(system, kept, field)
+        with pytest.raises(ConvergenceError) as error:
+            check(point)
+        caught[field] = str(error.value)
+    point.x = kept.copy()
+    system.set_load(point.x, point.load * (1 + SMALL))
+    with pytest.raises(ConvergenceError, match="no equilibrium: the equation of"):
+        check(point)
+    point.x = kept
+    check(point)
+    assert "a quaternion has a squared norm that differs from one by" in caught.pop("q")
+    assert all("no equilibrium" in sentence for sentence in caught.values())
+    if formulation == "pointwise":
+        assert set(caught) >= {"r", "n", "eta"}
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("aside", [0.0, 0.1])
+def test_reactions_balance_the_load(aside: float) -> None:
+    """Discrete balance of the whole rod: its equations, clamped ones included, tested with rigid motions.
+
+    Stored energy and constraints are invariant under them, also when discretised.  All rows but those of the clamp
+    vanish at an equilibrium, so that these are the reactions: the opposite of the force, and of its moment about the
+    origin.  ``aside`` of the equilibrium all rows together are: what is missing in the balance is in the free ones.
+    """
+    solver, point = bent("pointwise")
+    x = point.x.copy()
+    x.array[:] += aside * np.sin(np.arange(x.getLocalSize()) ** 2)
+    solver.system.set_load(x, point.load)
+    state, fields = solver.system.at(x), solver.system.fields
+    equations, tested = state.covector(), fields.number != solver.system.load_index
+    if not aside:
+        assert abs(equations[tested & (fields.number >= 0)]).max() < 1e-9
+        tested = fields.number < 0
+    force = point.load * np.array([1.0, 0.5, 1.0])
+    tip = solver.shape.sample(x)["r"][-1]
+    for i, axis in enumerate(AXES):
+        moved, turned = np.zeros((2, len(equations)))
+        add_change(state, "r", np.zeros((3, 3)), axis, moved)
+        for field, matrix in (("q", left(axis)), ("r", cross(axis)), ("n", cross(axis))):
+            add_change(state, field, np.array(matrix), (0.0,) * len(matrix), turned)
+        for motion, work in ((moved, force[i]), (turned, np.cross(tip, force)[i])):
+            assert equations[tested] @ motion[tested] == pytest.approx(-work, abs=1e-9)
+
+
+@pytest.mark.few(1)
+@pytest.mark.alone
+@pytest.mark.parametrize("steps", [StepControl(), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
+def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
+    """States of another branch at nearly the same load, farther than a step away, in place of the last row."""
+    diagram = trace(
+        cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False, steps=steps)
+    )
+    system, most, told = diagram.solvers[0].system, UNEXPLAINED * steps.aim, list[bool]()
+    own = [[p for p in b.points if not any(p is s.point for s in b.special)] for b in diagram.branches]
+    for branch in own:
+        for i in range(2, len(branch)):
+            assert defect(system, branch[max(i - 3, 0) : i + 1]) <= most
+            last, length = branch[i], branch[i].arclength - branch[i - 1].arclength
+            for other in (b for b in own if b is not branch):
+                near = min(other, key=lambda p: abs(p.load - last.load))
+                if abs(near.load - last.load) < 0.5 * length and system.distance(near.x, last.x) > length:
+                    jump = replace(near, arclength=last.arclength)
+                    told.append(defect(system, [*branch[max(i - 3, 0) : i], jump]) > most)
+    assert len(told) > 30 and all(told)
+
+
+@pytest.mark.alone
+def test_a_step_that_has_jumped_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the straight branch beyond the load 2 to the buckled one, with the tangent of the straight one."""
+    scene, mesh, plan = cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False)
+    straight, buckled = trace(scene, mesh, plan).branches[:2]
+    step: Callable[..., Step] = BranchSolver.step
+    jumped = list[float]()
+
+    def jumping(self: BranchSolver, *given: Any) -> Step:
+        made = step(self, *given)
+        near = min(buckled.points[2:], key=lambda p: abs(p.load - made.load))
+        if jumped or made.tangent is None or abs(near.load - made.load) > 0.1:
+            return made
+        jumped.append(near.load)
+        return replace(made, x=near.x.copy(), load=near.load, energies=None)
+
+    monkeypatch.setattr(BranchSolver, "step", jumping)
+    (found,) = trace(scene, mesh, replace(plan, depth=0))
+    assert jumped and found.ended == straight.ended
+    assert [s.point.load for s in found.special] == pytest.approx([s.point.load for s in straight.special], abs=1e-9)
+    assert max(abs(p.ordinate) for p in found.points) == pytest.approx(max(abs(p.ordinate) for p in straight.points))
+
+
+@pytest.mark.few(1)
+@pytest.mark.alone
+@pytest.mark.parametrize("where", [0.0, 5.0])
+def test_a_violation_ends_the_branch_with_a_reason(where: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    step: Callable[..., Step] = BranchSolver.step
+
+    def spoiling(self: BranchSolver, *given: Any) -> Step:
+        made = step(self, *given)
+        if made.load <= where:
+            return made
+        x, f = made.x.copy(), self.system.fields
+        self.system.set_load(x, made.load + SMALL)
+        begin = f.number[f.dofs["q"]].max() // 2
+        x.setValue(int(begin), x.getValue(int(begin)) + SMALL)
+        x.assemble()
+        return replace(made, x=x)
+
+    monkeypatch.setattr(BranchSolver, "step", spoiling)
+    diagram = trace(euler("clamped-pinned"), Discretization("reduced", 4, 4), Plan(depth=0, error_bars=False))
+    (branch,) = diagram
+    assert branch.ended.startswith("no convergence: At P = ")
+    assert max(p.load for p in branch.points) <= max(where, 0.0)
+    assert any(branch.ended.endswith(sentence) for sentence in diagram.warnings)
