@@ -51,11 +51,12 @@ OPERATIONS: dict[Any, Callable[..., Any]] = {
 
 
 class Values:
-    """A scalar ``expression`` of symbols as a function of their values."""
+    """A scalar ``expression`` of symbols as a function of their values; what is no scalar has none."""
 
     def __init__(self, expression: Any) -> None:
         """List the nodes of the expression."""
-        self.expression = expand_indices(expand_derivatives(ufl.as_ufl(expression)))
+        expression = ufl.as_ufl(expression)
+        self.expression = expression if expression.ufl_shape else expand_indices(expand_derivatives(expression))
         self._nodes = list(unique_post_traversal(self.expression))
 
     def __call__(self, places: dict[Any, np.ndarray]) -> np.ndarray:

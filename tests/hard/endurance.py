@@ -38,6 +38,10 @@ def resident() -> float:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024
 
 
+KNOWN = 10
+"""Scenes before those that are measured: the meshes of the last few stay, and were other ones."""
+
+
 def handles() -> tuple[int, int]:
     """Number of open files, and the number that the next communicator gets."""
     comm = MPI.COMM_SELF.Dup()
@@ -103,13 +107,14 @@ def rows(number: int) -> Measured:
 def scenes(number: int) -> Measured:
     """So many columns, each of another bending stiffness, with its buckling load."""
     record = Record()
-    for i in range(number):
-        B1 = 1.0 + i / number
+    for i in range(-KNOWN, number):
+        B1 = 1.0 + i / (number + KNOWN)
         scene = column("many", SUPPORTS["clamped-free"], (0.0, 6.0), constants={"B1": B1, "B2": 5.0})
         (found,) = trace(scene, MESH, Plan(error_bars=False, depth=0))[0].special[:1]
         if abs(found.point.load / (B1 * EULER) - 1) > 1e-4:
             return Measured(inf, 1.0, (), f"{found} where {B1 * EULER} was expected")
         gc.collect()
         compat.destroy_garbage(MPI.COMM_WORLD)
-        record.add()
+        if i >= 0:
+            record.add()
     return record.judged(LEFT)
