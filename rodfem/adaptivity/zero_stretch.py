@@ -11,7 +11,6 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import END
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.system import System
@@ -33,7 +32,7 @@ class Stretch:
         State and smallest stretch at each load so far.
     """
 
-    def __init__(self, solver: StaticSolver, x: PETSc.Vec) -> None:
+    def __init__(self, solver: BranchSolver, x: PETSc.Vec) -> None:
         """Begin with a state ``x`` near those to come."""
         self.solver, self.known = solver, dict[float, tuple[PETSc.Vec, float]]()
         self._last = x
@@ -61,7 +60,7 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
     found: list[tuple[float, float, float, float]] = []
     for factor in (2, 4):
         mesh = d.finer(factor, richer=int(d.degree < HIGHEST))
-        fine = StaticSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
+        fine = BranchSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
         stretch = Stretch(fine, fine.shape.restore(sample))
         load = _bracketed_zero(stretch, coarse, abs(system.scene.span[1] - system.scene.span[0]))
         state, last = stretch.known[load]

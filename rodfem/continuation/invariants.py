@@ -26,7 +26,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.generators import Generators
 from rodfem.fem.symmetries import capable
@@ -42,7 +42,7 @@ UNIT = 1e-8
 class Invariants:
     """Checks the points of one solver; collective over its ranks."""
 
-    def __init__(self, solver: StaticSolver) -> None:
+    def __init__(self, solver: BranchSolver) -> None:
         """Allocate a vector for the residual."""
         self.solver, self.system = solver, solver.system
         self._equations = solver.system.new_vector()

@@ -9,11 +9,11 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import VERTICAL_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.first_equilibrium import STILL
 from rodfem.continuation.normal_form import SEEN
 from rodfem.continuation.singular import SingularSystem
 from rodfem.continuation.singular_points import LEVEL, Change, singular_point
 from rodfem.continuation.states_between import solve_at_load
-from rodfem.continuation.static_solver import STILL
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import across, project_out

@@ -34,7 +34,7 @@ def bent(formulation: str) -> tuple[BranchSolver, Point]:
     for load in (0.5, 1.0, 2.0):
         point = solver.equilibrium(load, point)
     equilibria = solver.equilibria
-    assert isinstance(equilibria, BranchSolver) and point is not None
+    assert point is not None
     return equilibria, point
 
 
@@ -109,7 +109,6 @@ def test_a_balance_that_no_single_equation_misses() -> None:
     scene = column("heavy", ends, (0.0, 4.0), distributed=lambda c: (c.P, 0.0, 0.0))
     solver = Solver(scene, Discretization("pointwise", 1000, 1))
     point, equilibria = solver.equilibrium(1.0), solver.equilibria
-    assert isinstance(equilibria, BranchSolver)
     check = Invariants(equilibria)
     check(point)
     equilibria.system.set_load(point.x, 1 + SMALL)
