@@ -587,7 +587,7 @@ FAULTS = {
         "rodfem/problem/start.py", "if left > TURNED / 2:", "if left > 9:", "tests/problem/test_scene_errors.py"
     ),
     "states-that-cannot-be-counted": Fault(
-        f"{CONTINUATION}static_solver.py",
+        f"{CONTINUATION}first_equilibrium.py",
         "return replace(outcome, converged=False), False",
         "return outcome, True",
         "tests/stability/test_far_states.py",
@@ -629,15 +629,15 @@ FAULTS = {
         "tests/diagram/test_load_steps.py",
     ),
     "first-states-beside-the-start-are-passed": Fault(
-        "rodfem/continuation/static_solver.py",
-        "self._turned(guess, near) < STRAYED",
-        "self._turned(guess, near) < STRAYED / 3",
+        "rodfem/continuation/first_equilibrium.py",
+        "_turned(solver.system, guess, near) < STRAYED",
+        "_turned(solver.system, guess, near) < STRAYED / 3",
         "tests/diagram/test_first_state.py",
     ),
     "first-states-without-forces": Fault(
-        f"{CONTINUATION}static_solver.py",
-        "self.at_load(self._balanced(guess), load)",
-        "self.at_load(guess, load)",
+        f"{CONTINUATION}first_equilibrium.py",
+        "solver.at_load(_balanced(solver, guess), load)",
+        "solver.at_load(guess, load)",
         FOLLOW,
     ),
     "loads-felt-by-their-unit": Fault(
@@ -656,7 +656,7 @@ FAULTS = {
         f"{STABILITY}inertia.py", "\nFAR = 0.1\n", "\nFAR = 1e9\n", "tests/stability/test_round_off.py"
     ),
     "stiffness-that-the-load-takes-away": Fault(
-        f"{CONTINUATION}static_solver.py",
+        f"{CONTINUATION}branch_solver.py",
         "return Convexity(self.system, self.system.scene.load)",
         "return Convexity(self.system)",
         "tests/continuation/test_convexity.py",

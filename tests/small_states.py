@@ -10,7 +10,7 @@ import hemitropic_cases
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
@@ -24,7 +24,7 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def solver(name: str, formulation: str, elements: int, degree: int) -> StaticSolver:
+def solver(name: str, formulation: str, elements: int, degree: int) -> BranchSolver:
     return Solver(scene(name), Discretization(formulation, elements, degree)).equilibria
 
 

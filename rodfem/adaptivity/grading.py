@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.fields import Discretization, Fields, turning_of
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
@@ -74,7 +74,7 @@ class Smoothness:
 class SmoothnessIndicator:
     """Measures how smooth the states of one discretisation are; collective."""
 
-    def __init__(self, solver: StaticSolver, weights: list[tuple[str, np.ndarray]]) -> None:
+    def __init__(self, solver: BranchSolver, weights: list[tuple[str, np.ndarray]]) -> None:
         """Tabulate the transformation from nodal values to Legendre coefficients; ``weights`` by :func:`weights_of`."""
         self.solver, self.weights = solver, weights
         fields = solver.system.fields
@@ -182,7 +182,7 @@ def cost(fields: Fields, elements: int, degree: int) -> float:
     return FIXED + unknowns * (1 + PER_DEGREE * degree)
 
 
-def cheapest(solver: StaticSolver, found: Smoothness, indicator: float) -> Discretization:
+def cheapest(solver: BranchSolver, found: Smoothness, indicator: float) -> Discretization:
     """Cheapest discretisation with which the indicator of a state falls to that value: degree, number, vertices."""
     fields = solver.system.fields
     present = fields.discretization

@@ -17,6 +17,7 @@ from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, pieces_of, weights_of
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import correct
@@ -163,7 +164,7 @@ class Meshes:
         row = target.axis if fixed_load else target.row(guess.tangent)
         outcome = correct(system, x, row, reach=0.5)
         if fixed_load and not outcome.converged:  # too far from a state on a far finer mesh: from the scene's start
-            x, outcome = target.first(point.load)
+            x, outcome = first_equilibrium(target, point.load)
         if not outcome.converged:
             return None
         side = target.row(guess.tangent)

@@ -13,7 +13,6 @@ from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import END
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.system import System
@@ -75,7 +74,7 @@ def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
     sample, found = solver.shape.sample(end.point.x), list[Point]()
     for factor in (2, 4):
         mesh = d.finer(factor, richer=int(d.degree < HIGHEST))
-        fine = StaticSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
+        fine = BranchSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
         x = _vanishing(fine, fine.shape.restore(sample), end.point)
         point = replace(end.point, x=x, tangent=None, load=fine.system.scalar(x), energy=fine.energy(x))
         found.append(replace(point, ordinate=fine.shape.ordinate(x), stretch=fine.shape.stretch(x)))
@@ -89,7 +88,7 @@ def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
     end.note = f"its load was computed with {4 * d.elements} elements of degree {d.degree + 1}"
 
 
-def _vanishing(solver: StaticSolver, x: PETSc.Vec, coarse: Point) -> PETSc.Vec:
+def _vanishing(solver: BranchSolver, x: PETSc.Vec, coarse: Point) -> PETSc.Vec:
     """State of a mesh, near ``x``, at which the smallest stretch vanishes, to round-off."""
     states = {coarse.load: x}
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import USER
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
@@ -28,7 +28,7 @@ def check_method(system: System, plan: Plan) -> None:
 
 
 def assess_all(
-    branches: list[Branch], solvers: Sequence[StaticSolver], plan: Plan, output: Path, report: Report, figures: bool
+    branches: list[Branch], solvers: Sequence[BranchSolver], plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
     """Assess the states at the loads of the plan; save and draw their modes, if they are wanted.
 

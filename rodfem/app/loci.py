@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, SpecialPoint
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.ranks import on_first
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def follow_all(
     branches: list[Branch],
-    solvers: Sequence[StaticSolver],
+    solvers: Sequence[BranchSolver],
     plan: Plan,
     output: Path,
     report: Report,
@@ -65,7 +65,7 @@ class _Loci:
         asked: tuple[str, float, float],
         output: Path,
         report: Report,
-        solvers: Sequence[StaticSolver],
+        solvers: Sequence[BranchSolver],
     ) -> None:
         """Nothing is followed yet."""
         self.solvers, self.output, self.report = solvers, output, report

@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from rodfem.codim2.criteria import FEWER, SPLIT
 from rodfem.codim2.plane import Destroyed, Guess, LocusPoint, Plane
 from rodfem.codim2.unstable import UNSTABLE, unstable
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure, noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -45,7 +45,7 @@ class Collision:
 
     others = UNSTABLE
 
-    def __init__(self, solver: StaticSolver, plane: Plane) -> None:
+    def __init__(self, solver: BranchSolver, plane: Plane) -> None:
         """Allocate the pencil."""
         self.solver, self.plane = solver, plane
         self.eigensolver = NonsymmetricSolver(solver.system)

@@ -16,8 +16,8 @@ from petsc4py import PETSc
 
 from rodfem.codim2.plane import Destroyed, Guess, LocusPoint, Plane
 from rodfem.codim2.unstable import UNSTABLE, VANISHED, unstable
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.singular import Curve, Section, SingularState, SingularSystem
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -49,7 +49,7 @@ class _Frame:
 class Singular:
     """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
 
-    def __init__(self, solver: StaticSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
+    def __init__(self, solver: BranchSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
         """Border with the null vectors of a point ``near`` the curve, and the left ones where there are such.
 
         ``solver`` has the mesh, ``plane`` the two parameters.  At a ``fold`` the single null vector is coupled to the
@@ -149,7 +149,7 @@ class Singular:
         )
 
 
-def null_vectors(solver: StaticSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
+def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
     """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
 
     By borders that are arbitrary at first: each solution is a step of inverse iteration, and the better border.  Of

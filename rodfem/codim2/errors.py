@@ -15,8 +15,8 @@ from rodfem.codim2.collision import Collision
 from rodfem.codim2.criteria import Singular
 from rodfem.codim2.place import place
 from rodfem.codim2.plane import Criterion, LocusPoint, Plane
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FLUTTER, FOLD
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.transfer import Transfer, halved, richer_system
@@ -32,7 +32,7 @@ class Errors(NamedTuple):
     unresolved: list[int]
 
 
-def criterion_of(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
+def criterion_of(solver: BranchSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
     """Defining equations of the locus of a ``kind`` of special points in a ``plane``, one of which is ``near``.
 
     ``solver`` has the mesh.
@@ -43,7 +43,7 @@ def criterion_of(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint
 class RicherMesh:
     """The same locus, of a ``kind`` of special points in a ``plane``, on a discretisation one degree richer."""
 
-    def __init__(self, solver: StaticSolver, kind: str, plane: Plane) -> None:
+    def __init__(self, solver: BranchSolver, kind: str, plane: Plane) -> None:
         """``solver`` has the mesh on which it was found."""
         self.solver, self.kind = type(solver)(richer_system(solver.system)), kind
         self.transfer = Transfer(solver.system, self.solver.system)
@@ -90,7 +90,7 @@ class RicherMesh:
 
 
 def errors_of(
-    solver: StaticSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: Iterable[int]
+    solver: BranchSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: Iterable[int]
 ) -> Errors:
     """Estimate errors at some ``rows``: the distance to the curve of a richer discretisation.
 
@@ -112,7 +112,7 @@ def errors_of(
     return Errors(error, sorted(unresolved | doubtful))
 
 
-def not_integrated(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> str:
+def not_integrated(solver: BranchSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> str:
     """Take the errors away of points at which the mesh does not integrate the equations; a clause on the first.
 
     ``solver`` has found the locus of these ``nodes`` in a ``plane``; ``error`` (n, 2) is changed.

@@ -28,7 +28,6 @@ from rodfem.codim2.unstable import NEAREST, UNSTABLE, unstable
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, KINDS
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.output.files import mesh_of
@@ -44,7 +43,7 @@ COLUMNS = "p", "rest", "ordinate", "omega2", "located_to"
 
 
 def locus(
-    solver: StaticSolver,
+    solver: BranchSolver,
     special: SpecialPoint,
     parameter: str,
     bounds: tuple[Interval, Interval],
@@ -58,8 +57,7 @@ def locus(
     Parameters
     ----------
     solver
-        The :class:`~rodfem.continuation.branch_solver.BranchSolver` that found the special point, or for flutter and
-        divergence the :class:`~rodfem.continuation.static_solver.StaticSolver` of the sweep.  It is left as it was.
+        The solver that found the special point.  It is left as it was.
     special
         A fold, a branch point, a flutter load or a divergence load.
     parameter
@@ -135,12 +133,12 @@ def _crossings(tracer: Tracer, curve: _Curve) -> list[tuple[float, float]]:
     return [(float(n.p[0]), n.ordinate) for n in found]
 
 
-def _check(solver: StaticSolver, special: SpecialPoint) -> None:
+def _check(solver: BranchSolver, special: SpecialPoint) -> None:
     """Raise :class:`InputError` for a special point that has no locus."""
     if special.kind.line is None:
         kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)
         raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
-    if special.kind.singular and not isinstance(solver, BranchSolver):
+    if special.kind.singular and not solver.conservative:
         raise InputError("The locus of a fold or a branch point needs the solver that found it.")
     if special.kind == FLUTTER and (special.cluster is None or special.note):
         raise InputError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
@@ -149,7 +147,7 @@ def _check(solver: StaticSolver, special: SpecialPoint) -> None:
 class _Followed:
     """A special point of a diagram as the ``first`` one of its locus in a plane."""
 
-    def __init__(self, solver: StaticSolver, special: SpecialPoint, plane: Plane) -> None:
+    def __init__(self, solver: BranchSolver, special: SpecialPoint, plane: Plane) -> None:
         """Find it again; raises :class:`InputError` where it has no locus and :class:`ConvergenceError`."""
         _check(solver, special)
         self.solver, self.special, self.plane = solver, special, plane

@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import ROWS, cubic_weights, lagrange
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.parameters import Line, line
 from rodfem.fem.system import System
@@ -162,7 +162,7 @@ class Criterion(Protocol):
     locus has changed.
     """
 
-    solver: StaticSolver
+    solver: BranchSolver
     others: str
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:

@@ -1,4 +1,4 @@
-"""Equilibria along branches: steps, tangents, and the index and records of each state."""
+"""Equilibria at given loads and along branches: steps, tangents, and the index and records of each state."""
 
 from __future__ import annotations
 
@@ -7,25 +7,30 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
+import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Point
+from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.kinds import Kind
 from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.regular_point import RegularPoints
-from rodfem.continuation.static_solver import StaticSolver
-from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import STEPS, NewtonResult, correct
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.convexity import Convexity
+from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
+from rodfem.fem.resultants import Resultants
+from rodfem.fem.shape import Shape
 from rodfem.fem.state import Energies
 from rodfem.fem.system import System
+from rodfem.fem.values import LOAD, NodalValues
+from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors
+from rodfem.problem.units import Units
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.near_zero import decide
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.symmetric import SymmetricSolver
 
-ASIDE = 0.1
-"""How far beside a saddle the way down goes on, in the metric."""
 VERTICAL = 1e-8
 """Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""
 
@@ -55,56 +60,127 @@ class Step:
     length: float = 0.0
 
 
-class BranchSolver(StaticSolver):
-    """Computes equilibria along branches, with their index and records.
+class BranchSolver:
+    """Computes equilibria of one :class:`~rodfem.fem.system.System`, at given loads and along branches.
 
     It owns what such a computation needs once: Newton's factors (in the system), the stability matrix, the shape.
     """
 
     def __init__(self, system: System, spectrum: int = 0) -> None:
-        """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
-        super().__init__(system)
-        self.inertia = Inertia(system)
-        self.regular = RegularPoints(self.inertia)
-        self.modes = spectrum
-        self.spectrum = SymmetricSolver(self.inertia) if spectrum else None
+        """Tabulate the shape; with ``spectrum`` record that many left-most eigenvalues.
+
+        ``mesh`` is the number of this discretisation where there are several.
+        """
+        self.system, self.mesh, self.modes = system, 0, spectrum
+        self.shape, self.axis = Shape(system), system.load_axis()
+
+    @property
+    def conservative(self) -> bool:
+        """Whether all loads have a potential: else ``S`` is not symmetric, and no count is an index."""
+        return self.system.scene.conservative
+
+    @cached_property
+    def inertia(self) -> Inertia:
+        """Second variation and its factors."""
+        return Inertia(self.system)
+
+    @cached_property
+    def regular(self) -> RegularPoints:
+        """Tangent and index of regular points."""
+        return RegularPoints(self.inertia)
+
+    @cached_property
+    def spectrum(self) -> SymmetricSolver | None:
+        """What finds left-most eigenvalues, if they are recorded."""
+        return SymmetricSolver(self.inertia) if self.modes else None
+
+    def factors(self) -> list[Factors]:
+        """Those of Newton's method, and the symmetric ones that count."""
+        return [self.system.lu, self.inertia.factors] if self.conservative else [self.system.lu]
+
+    @cached_property
+    def resultants(self) -> Resultants:
+        """Strains, contact forces and moments of the states, compiled when they are first asked for."""
+        return Resultants(self.shape)
+
+    @cached_property
+    def convexity(self) -> Convexity:
+        """Convexity of the stored energy, where it varies: from state to state, along the rod, or with the load."""
+        return Convexity(self.system, self.system.scene.load)
+
+    def lost_convexity(self, x: PETSc.Vec) -> str:
+        """Why a branch ends at the state ``x``, where the stored energy is not convex any more; empty where it is."""
+        return "" if self.convexity.holds(x) else self.not_convex(x)
+
+    def not_convex(self, x: PETSc.Vec) -> str:
+        """Why a branch ends at a state ``x`` along which the stored energy is not convex."""
+        return f"the stored energy is not convex any more at {self.system.scene.load} = {self.system.scalar(x):.6g}"
+
+    def require_convexity(self, x: PETSc.Vec) -> None:
+        """Raise :class:`SceneError` for a state ``x`` to begin with along which the stored energy is not convex."""
+        if self.lost_convexity(x):
+            raise SceneError(
+                f"The stored energy is not convex somewhere along the state at {self.system.scene.load} = "
+                f"{self.system.scalar(x):g}: choose constants that make it so, or another load."
+            )
+
+    @property
+    def units(self) -> Units:
+        """Natural sizes of the rod's numbers."""
+        return self.system.scene.units
+
+    def given(self, kind: Kind, point: Point) -> SpecialPoint:
+        """Special point at a load that is given."""
+        return SpecialPoint.given(kind, point, self.units.load)
+
+    def start(self, load: float, bent: float = 0.0) -> PETSc.Vec:
+        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces.
+
+        ``bent`` is the size, in radian, of a smooth rotation on top: a taut straight rod is a singular place to start.
+        """
+        system, f = self.system, self.system.fields
+        x = f.coordinates(f.discretization.degree)
+        turned = f.turning.start(system.scene.start, x.ravel(), system.scene.interval)
+        if bent:
+            along = (x.ravel() - system.scene.interval[0]) / system.scene.length
+            turned = f.turning.turned(turned, bent * _bend(along))
+        undeformed = np.array([1.0 if i == 2 else 0.0 for i in system.scene.free_strains])
+        named = {f.turning.name: turned.reshape(*x.shape, -1), "v": undeformed, LOAD: load}
+        return self.shape.with_centreline(NodalValues(f, f.filled(named), system.line))
+
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = FAR) -> tuple[PETSc.Vec, NewtonResult]:
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``, at a distance of ``reach`` at most."""
+        x = guess.copy()
+        self.system.set_load(x, load)
+        outcome = correct(self.system, x, self.axis, reach)
+        self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
+        return x, outcome
+
+    def notices(self) -> list[str]:
+        """Sentences for the record that nobody has read: symmetries that were none, factors by the last resort."""
+        out = self.system.verification.read()
+        for factors in self.factors():
+            if isinstance(factors, Chain) and factors.times:
+                out.append(
+                    f"{factors.times} matrices could not be factored along the rod, too many pivots were delayed: "
+                    "MUMPS factored them."
+                )
+                factors.times = 0
+        return out
+
+    def energies(self, x: PETSc.Vec) -> Energies:
+        """Stored and potential energy of the equilibrium ``x``, and what the load does work on."""
+        return self.system.at(x).energies()
+
+    def energy(self, x: PETSc.Vec) -> float:
+        """Stored energy of the state ``x``."""
+        return self.system.at(x).energy()
 
     @cached_property
     def space(self) -> InSpace | None:
         """Index in space of a planar rod, where all its loads have a potential there."""
         scene = self.system.scene
         return None if scene.planar is None or scene.without_potential(in_space=True) else InSpace(self.system)
-
-    def factors(self) -> list[Factors]:
-        """Those of Newton's method, and the symmetric ones that count."""
-        return [*super().factors(), self.inertia.factors]
-
-    def is_stable(self, x: PETSc.Vec) -> bool:
-        """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero.
-
-        A search asks that of states that may be far from all others: their round-off is that of no other.
-        """
-        try:
-            return decide(self.inertia.at(x)).index.negative == 0
-        finally:
-            self.inertia.forget_band()
-
-    def off(self, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
-        """State beside the saddle ``x``, along its most unstable mode on the side of ``start``.
-
-        Also the longest time step by which that mode grows: half of its time.
-        """
-        modes = SymmetricSolver(self.inertia).at(x).leftmost(1)
-        beside, mode = x.copy(), modes.vectors[0]
-        size = ASIDE / self.system.norm(mode)
-        beside.axpy(size if self.row(mode).dot(start - x) >= 0 else -size, mode)
-        self.system.set_load(beside, self.system.scalar(x))
-        return beside, 0.5 / abs(float(modes.values[0]))
-
-    def may_move(self, x: PETSc.Vec) -> bool:
-        """Whether an equilibrium has more zero eigenvalues than symmetries that it breaks."""
-        found = self.inertia.at(x)
-        return found.count().zero > found.drifts
 
     def point(
         self,
@@ -236,3 +312,8 @@ class BranchSolver(StaticSolver):
         if not increasing:
             tangent.scale(-1.0)
         return tangent
+
+
+def _bend(x: np.ndarray) -> np.ndarray:
+    """Smooth rotation vector of size about one that vanishes at both ends, (m, 3); ``x`` (m,) in [0, 1]."""
+    return np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2))

@@ -20,8 +20,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import ROWS, lagrange
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import EPS
@@ -55,7 +55,7 @@ def defect(system: System, rows: Sequence[Point]) -> float:
 class RowCheck:
     """Checks that points of one solver are equilibria of unit quaternions; collective over its ranks."""
 
-    def __init__(self, solver: StaticSolver) -> None:
+    def __init__(self, solver: BranchSolver) -> None:
         """Allocate a vector for the residual."""
         self.solver, self.system = solver, solver.system
         self._equations = solver.system.new_vector()

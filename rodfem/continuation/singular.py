@@ -53,14 +53,13 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE, Correction, Limits, newton
 from rodfem.fem.parameters import Line
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.inertia import Factored, Inertia
+from rodfem.stability.inertia import Factored
 from rodfem.stability.reduced_stiffness import DIFFERENCE
 from rodfem.tolerances import TINY
 
@@ -186,13 +185,13 @@ class _Step:
 class SingularSystem:
     """The singular system of one mesh, with a border of so many modes."""
 
-    def __init__(self, solver: StaticSolver, modes: Vectors, critical: np.ndarray, *, fold: bool) -> None:
+    def __init__(self, solver: BranchSolver, modes: Vectors, critical: np.ndarray, *, fold: bool) -> None:
         """Border with ``modes``, made orthonormal in M, of which the combinations ``critical`` (m, k) are to vanish.
 
         At a ``fold``, or at a branch point; the ``solver`` has the mesh.
         """
         self.solver, self.system = solver, solver.system
-        self.inertia = solver.inertia if isinstance(solver, BranchSolver) else Inertia(solver.system)
+        self.inertia = solver.inertia
         self.fold, self.Z = fold, critical
         self._bordered, self._transposed = list[Bordered](), PETSc.Mat()
         self._section: Section | None = None

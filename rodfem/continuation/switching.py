@@ -9,8 +9,8 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import VERTICAL_BRANCH, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.first_equilibrium import STILL
 from rodfem.continuation.singular_points import LEVEL
-from rodfem.continuation.static_solver import STILL
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import project_out
 from rodfem.tolerances import TINY

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import assignment
 from rodfem.continuation.flutter import Located, locate_flutter
 from rodfem.continuation.kinds import FLUTTER, Kind
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.held import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
@@ -129,7 +129,7 @@ def others_negative(mine: Spectrum, others: Spectrum) -> bool:
 class Collisions:
     """Tells which eigenvalues of a sweep collide in a step."""
 
-    def __init__(self, solver: StaticSolver, eigensolver: NonsymmetricSolver) -> None:
+    def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver) -> None:
         """Know what computes equilibria (``solver``); the ``eigensolver`` is that of the pencils."""
         self.solver, self.eigensolver = solver, eigensolver
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
@@ -252,7 +252,7 @@ def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]
 class Measuring:
     """How a ``solver`` and its ``eigensolver`` measure a cluster at a load: at the equilibrium near ``guess``."""
 
-    def __init__(self, solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> None:
+    def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> None:
         """Compute nothing yet."""
         self.solver, self.eigensolver, self.guess = solver, eigensolver, guess
 

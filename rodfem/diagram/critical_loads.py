@@ -16,9 +16,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.flutter import SHARP
 from rodfem.continuation.kinds import DIVERGENCE
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Collisions, Critical, Measuring, Near, Side, Told, cluster_at, others_negative
 from rodfem.diagram.divergence_loads import Mean, interpolated_zero
 from rodfem.diagram.held import at_load
@@ -49,7 +49,7 @@ SAME = 1e-2
 class CriticalLoads:
     """Locates the critical loads between two loads of a sweep."""
 
-    def __init__(self, solver: StaticSolver, eigensolver: NonsymmetricSolver, warn: Callable[[str], None]) -> None:
+    def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver, warn: Callable[[str], None]) -> None:
         """Know what computes equilibria (``solver``) and their eigenvalues (``eigensolver``), and whom to ``warn``."""
         self.solver, self.eigensolver, self.warn = solver, eigensolver, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load

@@ -13,7 +13,6 @@ from uuid import uuid4
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import EVENT, KINDS
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.known import equilibria_at
 from rodfem.diagram.plan import Plan
@@ -70,7 +69,7 @@ class Diagram:
         Whether all that was asked for has been done.
     """
 
-    def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
+    def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[BranchSolver]) -> None:
         """Keep what was traced; ``solvers`` may grow."""
         self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
         self.warnings: list[str] = []
@@ -144,7 +143,7 @@ class Diagram:
             )
         finest = self._finest()
         solver = self.solvers[finest]
-        if not isinstance(solver, BranchSolver):
+        if not solver.conservative:
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
         try:

@@ -19,7 +19,6 @@ from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.held import at_load
 from rodfem.diagram.solver import Solver, check_index
@@ -81,7 +80,7 @@ def frequency_mesh(
 
 def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndarray]:
     """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
-    solver = StaticSolver(system)
+    solver = BranchSolver(system)
     eigensolver = NonsymmetricSolver(solver.system)
     x, _ = first_state(solver, float(loads[0]))
     found = []
@@ -100,14 +99,14 @@ def _change(values: np.ndarray, richer: np.ndarray, one: float) -> float:
     return max(float(abs(richer - v).min() / unit(v, one=one)) for v in values)
 
 
-def check_start(solver: StaticSolver, span: tuple[float, float], warn: Callable[[str], None]) -> None:
+def check_start(solver: BranchSolver, span: tuple[float, float], warn: Callable[[str], None]) -> None:
     """Compare the index at the ends of a range of loads with that on twice as many elements, where a mesh has few.
 
     ``span`` is the range, and ``warn`` hears of an index that is the mesh's.  Of a rod that bends from the start on,
     only the first load is looked at.  Raises :class:`InputError` where the mesh of the ``solver`` cannot hold the
     half-waves at all, :class:`SceneError` where constraints depend on one another.  Collective.
     """
-    if not isinstance(solver, BranchSolver):
+    if not solver.conservative:
         return
     scene, mesh = solver.system.scene, solver.system.fields.discretization
     nodes = mesh.elements * mesh.degree
@@ -118,7 +117,6 @@ def check_start(solver: StaticSolver, span: tuple[float, float], warn: Callable[
         if NODES * index > nodes:
             check_index(scene, load, index, nodes)
             finer = Solver(scene, mesh.finer(2), solver.system.comm).equilibria
-            assert isinstance(finer, BranchSolver)
             there = _index(finer, load)
             if there not in (None, index):
                 warn(

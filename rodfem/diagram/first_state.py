@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
@@ -22,15 +23,15 @@ AHEAD = 0.1
 """Distance along the first tangent, in the metric, at which the centreline is looked at as well."""
 
 
-def first_state(solver: StaticSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
-    """Equilibrium at ``load`` from the scene's start, and the iteration that led to it; see :meth:`StaticSolver.first`.
+def first_state(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
+    """Equilibrium at ``load`` from the scene's start, and the iteration that led to it; see :func:`first_equilibrium`.
 
     Raises :class:`~rodfem.errors.SceneError` where constraints depend on one another: of those a matrix tells nothing,
     its factors are round-off.  Where nothing was found they are looked at in the start.
     """
     start = solver.start(load)
     try:
-        x, outcome = solver.first(load)
+        x, outcome = first_equilibrium(solver, load)
     except ConvergenceError:
         require_independent_constraints(solver.shape, start)
         raise

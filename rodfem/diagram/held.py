@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from petsc4py import PETSc
 
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError, SceneError
 
 PARTS = (1, 2, 4, 8)
@@ -13,7 +13,7 @@ DRIVEN = 1e-7
 """Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 
 
-def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+def at_load(solver: BranchSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     """Equilibrium at a load from a ``guess`` nearby, in more and more steps; there may be none.
 
     That raises :class:`ConvergenceError`.  ``solver`` has the mesh.
@@ -33,7 +33,7 @@ def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
 
 
-def require_held(solver: StaticSolver, x: PETSc.Vec) -> None:
+def require_held(solver: BranchSolver, x: PETSc.Vec) -> None:
     """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
     system = solver.system
     if system.drift(x) > DRIVEN * system.stiffness_scale:

@@ -7,7 +7,7 @@ the same energies and indices, at the same loads.  A diagram shows that image wh
 from __future__ import annotations
 
 from rodfem.continuation.branch import Branch, Point
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.deflation.discrete_symmetries import candidates, mirrors
 from rodfem.tolerances import NEGLIGIBLE
 
@@ -19,7 +19,7 @@ SHARES = (0.5, 1.0)
 """Places along a branch, as shares of its rows, at whose states an image is asked for."""
 
 
-def image_of(branch: Branch, solver: StaticSolver) -> str:
+def image_of(branch: Branch, solver: BranchSolver) -> str:
     """The symmetry, in words, that carries a branch to one with the opposite ordinate; empty where there is none.
 
     It is one of the equations at the loads of two states, one within the ``branch`` and its last one, and takes the
@@ -44,7 +44,7 @@ def image_of(branch: Branch, solver: StaticSolver) -> str:
     return found[0].in_words() if found else ""
 
 
-def other_ordinates(branch: Branch, first: Point, image: Point, solver: StaticSolver) -> str:
+def other_ordinates(branch: Branch, first: Point, image: Point, solver: BranchSolver) -> str:
     """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty where it keeps them, or signs.
 
     It carries the ``first`` state after the branch point to the state ``image`` on the other side.  States of other

@@ -17,8 +17,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import ROWS, across_orbit, predict_at_load
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.held import require_held
 from rodfem.errors import ConvergenceError
 
@@ -37,7 +37,7 @@ BESIDE = 1e-2
 class LoadSteps:
     """Equilibria on one path, load by load."""
 
-    def __init__(self, solver: StaticSolver, first: Point, span: tuple[float, float]) -> None:
+    def __init__(self, solver: BranchSolver, first: Point, span: tuple[float, float]) -> None:
         """Begin at the ``first`` point of a sweep over a ``span`` of loads, on the mesh of the ``solver``."""
         self.solver, self.least = solver, LEAST * abs(span[1] - span[0])
         self.known = [first]

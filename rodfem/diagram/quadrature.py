@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from math import isfinite
 
 from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.quadrature_check import QuadratureCheck
 
 
 class Quadrature:
     """Examines branches on the meshes of several ``solvers``, and tells an ``observer`` what is left open."""
 
-    def __init__(self, solvers: Sequence[StaticSolver], observer: Observer, load: str) -> None:
+    def __init__(self, solvers: Sequence[BranchSolver], observer: Observer, load: str) -> None:
         """Examine nothing yet; ``load`` is the name of the load."""
         self.solvers, self.observer, self.load = solvers, observer, load
         self._by_mesh: dict[int, QuadratureCheck] = {}

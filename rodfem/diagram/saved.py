@@ -12,7 +12,6 @@ from mpi4py import MPI
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import EQUATIONS, Plan, not_held, plan_without
 from rodfem.diagram.solver import RANKS, SCENE, Solver
@@ -110,18 +109,18 @@ def _check_equations(data: dict[str, Any], system: System, folder: Path) -> None
         )
 
 
-def _solver(scene: Scene, formulation: str, mesh: dict[str, Any], comm: MPI.Comm) -> StaticSolver:
+def _solver(scene: Scene, formulation: str, mesh: dict[str, Any], comm: MPI.Comm) -> BranchSolver:
     vertices = None if mesh["vertices"] is None else tuple(mesh["vertices"])
     made = Discretization(formulation, mesh["elements"], mesh["degree"], vertices)
     return Solver(scene, made, comm).equilibria
 
 
-def _branch(entry: dict[str, Any], solvers: Sequence[StaticSolver], states: Path) -> Branch:
+def _branch(entry: dict[str, Any], solvers: Sequence[BranchSolver], states: Path) -> Branch:
     columns, parent = entry["columns"], entry["parent"]
     points = [_point(columns, row, entry["name"], solvers, states) for row in range(len(columns["load"]))]
     for before, point, after in zip([*points[:1], *points[:-1]], points, [*points[1:], *points[-1:]], strict=True):
         solver = solvers[point.mesh]
-        if isinstance(solver, BranchSolver) and before.mesh == point.mesh == after.mesh and len(points) > 1:
+        if solver.conservative and before.mesh == point.mesh == after.mesh and len(points) > 1:
             chord = after.x - before.x  # the tangent to second order of the step
             point.tangent = chord / solver.system.norm(chord)
     branch = Branch(entry["name"], (parent[0], parent[1]) if parent else None, 0, points, ended=entry["ended"])
@@ -132,7 +131,7 @@ def _branch(entry: dict[str, Any], solvers: Sequence[StaticSolver], states: Path
     return branch
 
 
-def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[StaticSolver], states: Path) -> Point:
+def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[BranchSolver], states: Path) -> Point:
     values = point_values(columns, row)
     solver = solvers[values["mesh"]]
     x, load = load_state(states, branch, row, solver), values["load"]
@@ -144,11 +143,11 @@ def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Sta
     return Point(x=x, tangent=None, **values)
 
 
-def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[StaticSolver]) -> SpecialPoint:
+def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[BranchSolver]) -> SpecialPoint:
     """Special point of a row; its null vectors are those of the eigenvalues nearest zero there."""
     point = points[entry["row"]]
     solver = solvers[point.mesh]
     special = SpecialPoint(KINDS[entry["kind"]], point, **special_values(entry))
-    if isinstance(solver, BranchSolver) and special.kind.singular and entry["multiplicity"]:
+    if solver.conservative and special.kind.singular and entry["multiplicity"]:
         special.null_vectors = solver.inertia.modes_near_zero(point.x, entry["multiplicity"])
     return special

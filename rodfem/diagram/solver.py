@@ -16,7 +16,6 @@ from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.plan import Plan
@@ -78,8 +77,7 @@ class Solver:
     Attributes
     ----------
     equilibria
-        What the numerics work with: a :class:`~rodfem.continuation.branch_solver.BranchSolver`, or an
-        :class:`~rodfem.continuation.static_solver.StaticSolver` where a load has no potential.
+        What the numerics work with: a :class:`~rodfem.continuation.branch_solver.BranchSolver`.
     """
 
     @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=count(4), clock=a(Clock, "a Clock"))
@@ -115,10 +113,10 @@ class Solver:
         if form_compiler.ALONE:
             compile_ahead("linalg/chain", "fem/assembly", "fem/newton")
         system = System(scene, discretization or Discretization(), comm, clock)
-        self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
+        self.equilibria = BranchSolver(system, spectrum)
 
     @classmethod
-    def of(cls, equilibria: StaticSolver) -> Solver:
+    def of(cls, equilibria: BranchSolver) -> Solver:
         """Solver that shares what another computation has set up."""
         solver = cls.__new__(cls)
         solver.equilibria = equilibria
@@ -132,7 +130,7 @@ class Solver:
         that it does not allow.
         """
         system = self.equilibria.system
-        spectrum = self.equilibria.modes if isinstance(self.equilibria, BranchSolver) else 0
+        spectrum = self.equilibria.modes
         scene = system.scene.varying(**constants)
         return Solver(scene, system.fields.asked, system.comm, spectrum=spectrum, clock=system.clock)
 
@@ -156,7 +154,6 @@ class Solver:
     @cached_property
     def _soft(self) -> SoftStates:
         solver = self.equilibria
-        assert isinstance(solver, BranchSolver)
         return SoftStates(solver, lambda: Enriched(solver))
 
     @cached_property
@@ -177,7 +174,7 @@ class Solver:
     @checked(x=a(PETSc.Vec, "a state, as in point.x"))
     def point(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
-        if not isinstance(self.equilibria, BranchSolver):
+        if not self.equilibria.conservative:
             return replace(self._sweep.at(x), kink=self._quadrature.kink(x))
         return self.examined(self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True)))
 
@@ -187,7 +184,7 @@ class Solver:
         ``special`` is the fold or branch point that is there, if any.
         """
         point.kink = self._quadrature.kink(point.x)
-        if isinstance(self.equilibria, BranchSolver):
+        if self.equilibria.conservative:
             # by itself a state is on no branch: a tangent at a singular one is any null vector
             tangent, point.tangent = point.tangent, None if special is None else special.point.tangent
             vanishing = () if special is None else special.null_vectors
@@ -226,7 +223,7 @@ class Solver:
         if guess is not None and may_depend(found.shape, x):
             require_independent_constraints(found.shape, x, found.start(load))
         point, mesh = self.point(x), self.equilibria.system.fields.discretization
-        if isinstance(found, BranchSolver):
+        if found.conservative:
             check_index(scene, load, point.index, mesh.elements * mesh.degree)
         return point
 
@@ -252,7 +249,7 @@ class Solver:
         x = self._state(point)
         check_number(self.scene, self.equilibria.system.fields.discretization, number)
         verdict = assess(self.equilibria, x, method, number)
-        if not isinstance(self.equilibria, BranchSolver):
+        if not self.equilibria.conservative:
             return replace(verdict, kink=self._quadrature.kink(x))
         special = point if isinstance(point, SpecialPoint) and point.kind.singular else None
         found = self.examined(self.equilibria.point(x, 0.0, None), compare=True, special=special)
@@ -286,7 +283,7 @@ class Solver:
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known equilibria at another
         one, and where a load has no potential.  ``seed`` is that of the random guesses.
         """
-        if not isinstance(self.equilibria, BranchSolver):
+        if not self.equilibria.conservative:
             raise InputError(
                 "A search by deflation needs a scene whose loads all have a potential: "
                 f"{', '.join(self.scene.without_potential())} has none."

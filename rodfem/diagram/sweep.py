@@ -17,11 +17,11 @@ from petsc4py import PETSc
 
 from rodfem.continuation.arc import lost_between
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.row_checks import RowCheck
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Side
 from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.first_state import first_state, name_of_first
@@ -56,7 +56,7 @@ class Row(NamedTuple):
 class Sweep:
     """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
 
-    def __init__(self, solver: StaticSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
+    def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
         """Allocate the pencil; the plan must have passed its check.
 
         ``solver`` has the mesh, the ``observer`` hears of the progress, ``finished()`` is called when the sweep is
@@ -80,7 +80,7 @@ class Sweep:
         self._load = solver.system.scene.load
 
     @property
-    def solvers(self) -> Sequence[StaticSolver]:
+    def solvers(self) -> Sequence[BranchSolver]:
         """The one solver, as the points' mesh number 0 names it."""
         return [self.solver]
 

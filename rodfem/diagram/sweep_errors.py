@@ -7,8 +7,8 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.collisions import Measuring, Near, located_flutter
 from rodfem.diagram.divergence_loads import Mean, zero_near
 from rodfem.diagram.held import at_load
@@ -27,11 +27,11 @@ MEAN = 10.0
 class SweepErrors:
     """Estimates the errors of special points on the mesh of one solver, over a ``span`` of loads."""
 
-    def __init__(self, solver: StaticSolver, span: tuple[float, float]) -> None:
+    def __init__(self, solver: BranchSolver, span: tuple[float, float]) -> None:
         """Make the richer discretisation."""
         self.solver, self.span, self.units = solver, span, solver.system.scene.units
         system = solver.system
-        self.richer = StaticSolver(richer_system(system))
+        self.richer = BranchSolver(richer_system(system))
         self.eigensolver = NonsymmetricSolver(self.richer.system)
         self.transfer = Transfer(system, self.richer.system)
         self.rho = halved(system.fields.discretization.degree)

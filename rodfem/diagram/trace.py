@@ -8,7 +8,6 @@ from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
@@ -115,7 +114,7 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
             recorder.complete(diagram)
 
         tracer: Explorer | Sweep
-        if isinstance(found, BranchSolver):
+        if found.conservative:
             tracer = Explorer(found, plan, recorder, complete)
         else:
             tracer = Sweep(found, plan, recorder, complete)

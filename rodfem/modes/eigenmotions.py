@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import SYMMETRY
@@ -43,7 +43,7 @@ class Turned(NamedTuple):
 class Eigenmotions:
     """Finds the motions of states of one :class:`~rodfem.fem.system.System`."""
 
-    def __init__(self, solver: StaticSolver) -> None:
+    def __init__(self, solver: BranchSolver) -> None:
         """Keep the solver of the equilibria."""
         self.assessor, self.motions, self.system = Assessor(solver), Motions(solver.system), solver.system
         self._functionals = np.zeros((0, 0))

@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.ordinate_bound import bound
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import InputError
 from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.transfer import Transfer, halved, richer_system
@@ -28,12 +28,12 @@ FLOOR = 5e-12
 class ModeFinder(Eigenmotions):
     """Finds the modes of states of one :class:`~rodfem.fem.system.System`."""
 
-    def __init__(self, solver: StaticSolver, error_bars: bool = True) -> None:
+    def __init__(self, solver: BranchSolver, error_bars: bool = True) -> None:
         """Keep the solver of the equilibria; ``error_bars`` are from a second, richer discretisation."""
         super().__init__(solver)
         self.error_bars = error_bars
         self._quadrature = QuadratureCheck(solver.system)
-        self._richer: tuple[StaticSolver, Assessor, Transfer] | None = None
+        self._richer: tuple[BranchSolver, Assessor, Transfer] | None = None
 
     def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
         """Assess the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
@@ -87,7 +87,7 @@ class ModeFinder(Eigenmotions):
         """Bounds by the eigenvalues of the same state on a richer mesh, and their ``noise``; inf where it has none."""
         if self._richer is None:
             richer = richer_system(self.system)
-            solver = StaticSolver(richer)
+            solver = BranchSolver(richer)
             self._richer = solver, Assessor(solver), Transfer(self.system, richer)
         solver, assessor, transfer = self._richer
         guess = transfer(x, state=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rodfem.continuation.branch import Branch
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
 from rodfem.modes.eigenmotions import Eigenmotions
@@ -30,13 +30,13 @@ def typical_rows(branch: Branch) -> dict[int, int]:
     return {row: min(max(FEWEST, wanted[row]), MOST) for row in sorted(wanted)}
 
 
-def typical_modes(branches: Sequence[Branch], solvers: Sequence[StaticSolver]) -> list[list[Typical]]:
+def typical_modes(branches: Sequence[Branch], solvers: Sequence[BranchSolver]) -> list[list[Typical]]:
     """Modes at the typical states of each of the ``branches``: see :func:`of_branch`, also for the ``solvers``."""
     with solvers[0].system.clock.scope("modes"):
         return [of_branch(branch, solvers) for branch in branches]
 
 
-def of_branch(branch: Branch, solvers: Sequence[StaticSolver]) -> list[Typical]:
+def of_branch(branch: Branch, solvers: Sequence[BranchSolver]) -> list[Typical]:
     """Modes at the typical states of a ``branch``, each on the mesh of its point; collective.
 
     They depend on nothing but the branch.  None of a rod without inertia.  ``solvers`` are those of the meshes by

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rodfem.continuation.branch import Branch, not_followed
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import InputError
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
@@ -123,7 +123,7 @@ def load_json(path: Path | str) -> dict[str, Any]:
 def save_run(
     data: dict[str, Any],
     branches: Sequence[Branch],
-    solvers: Sequence[StaticSolver],
+    solvers: Sequence[BranchSolver],
     folder: Path,
     *,
     first: bool,
@@ -144,7 +144,7 @@ def save_run(
     on_first(solvers[0].system.comm, lambda: write_whole({folder / "diagram.json": as_json(data), states: image}))
 
 
-def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, first: bool) -> None:
+def save_states(branch: Branch, solvers: Sequence[BranchSolver], path: Path, first: bool) -> None:
     """Add one ``branch`` to an HDF5 file, or write the ``first`` one; collective, written on rank 0.
 
     ``solvers`` and ``path`` are as in :func:`states_of`.
@@ -155,7 +155,7 @@ def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, fir
 
 def states_of(
     branches: Sequence[Branch],
-    solvers: Sequence[StaticSolver],
+    solvers: Sequence[BranchSolver],
     path: Path,
     *,
     first: bool,
@@ -196,7 +196,7 @@ def states_of(
     return b"" if system.comm.rank else with_added(path, add, first=first)
 
 
-def _sampled(branch: Branch, solvers: Sequence[StaticSolver]) -> tuple[list[dict[str, np.ndarray]], list[list[Motion]]]:
+def _sampled(branch: Branch, solvers: Sequence[BranchSolver]) -> tuple[list[dict[str, np.ndarray]], list[list[Motion]]]:
     """Samples of the states of a branch, and the null vectors of its special points as motions; collective."""
     samples = [solvers[p.mesh].shape.sample(p.x) | solvers[p.mesh].resultants.at(p.x) for p in branch.points]
     motions = {i: Motions(solvers[i].system) for i in sorted({s.point.mesh for s in branch.special})}
@@ -229,7 +229,7 @@ def mesh_of(system: System) -> dict[str, Any]:
     return {"formulation": d.formulation, **sizes}
 
 
-def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc.Vec:
+def load_state(path: Path, branch: str, row: int, solver: BranchSolver) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
     Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rodfem.continuation.branch import Branch, Point
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.output.files import save_states
 from rodfem.output.folder import picture_at
 from rodfem.problem.arguments import checked
@@ -40,7 +40,7 @@ class Snapshot:
 
 def snapshot(
     branches: Sequence[Branch],
-    solvers: Sequence[StaticSolver],
+    solvers: Sequence[BranchSolver],
     point: Point,
     path: Path | str | None,
     caption: str | None,

@@ -47,7 +47,6 @@ def explored(scene: Scene, mesh: tuple[int, int] | float, at: tuple[float, ...] 
 
 def branch_solver(diagram: Diagram) -> BranchSolver:
     """Solver of the first mesh."""
-    assert isinstance(diagram.solvers[0], BranchSolver)
     return diagram.solvers[0]
 
 

@@ -10,8 +10,8 @@ import ufl
 from classics import SUPPORTS, WIDE, column
 
 from rodfem import Discretization, Plan, StepControl, elastic, pinned, trace
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT
-from rodfem.continuation.static_solver import StaticSolver
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
@@ -26,13 +26,13 @@ def stretched(v: Any, k: Any, c: Any) -> Any:
 def test_no_state_is_computed_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     """``v3 = 1 - P (1 + a sin(3 s))/2`` vanishes first at ``s = pi/6``, inside of an element, and ``P = 2/(1 + a)``."""
     asked: Counter[tuple[int, float]] = Counter()
-    at_load = StaticSolver.at_load
+    at_load = BranchSolver.at_load
 
-    def counted(self: StaticSolver, guess: Any, load: float, reach: float = 1e3) -> Any:
+    def counted(self: BranchSolver, guess: Any, load: float, reach: float = 1e3) -> Any:
         asked[self.system.fields.discretization.elements, load] += 1
         return at_load(self, guess, load, reach)
 
-    monkeypatch.setattr(StaticSolver, "at_load", counted)
+    monkeypatch.setattr(BranchSolver, "at_load", counted)
     more: dict[str, Any] = {"rod": "unshearable", "energy": stretched, "constants": {"a": 0.7}}
     rod = column("pressed", SUPPORTS["clamped-free"], (0.0, 3.0), **more)
     (branch,) = trace(rod, Discretization(elements=2, degree=3), Plan(depth=0, steps=WIDE)).branches

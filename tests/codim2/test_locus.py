@@ -28,7 +28,7 @@ from rodfem.app.run import run
 from rodfem.codim2.follow import STEPS, locus
 from rodfem.codim2.locus import Locus
 from rodfem.continuation.branch import Branch, SpecialPoint
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
@@ -252,7 +252,7 @@ def test_a_load_that_does_not_change_has_no_turning_points(monkeypatch: pytest.M
     assert found.omega2 * found.values[:, 1] == pytest.approx(double(20.0, 120.0, 0.0)[1], rel=1e-8)
 
 
-def swept(scene: Scene) -> tuple[StaticSolver, Branch]:
+def swept(scene: Scene) -> tuple[BranchSolver, Branch]:
     """Frequencies over the range of a scene, and what computed them."""
     diagram = trace(scene, Discretization("pointwise", 4, 6), Plan(error_bars=False))
     return diagram.solvers[0], diagram[0]

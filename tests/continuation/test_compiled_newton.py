@@ -8,6 +8,7 @@ from golden_cases import cases, single_branches
 
 import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.compiled_newton import CompiledNewton
@@ -69,7 +70,7 @@ def test_an_iteration_is_that_of_petsc(name: str, fresh: bool) -> None:
     solver = Solver(cases()[name](), Discretization("auto", 4, 6)).equilibria
     system, scene = solver.system, solver.system.scene
     low, high = scene.span
-    x = solver.first(low + 0.1 * (high - low))[0]
+    x = first_equilibrium(solver, low + 0.1 * (high - low))[0]
     guess = solver.start(low + 0.12 * (high - low), 0.1)
     moved, made = [], []
     for compiled in (system.compiled, None):

@@ -16,6 +16,7 @@ from numpy.polynomial.legendre import leggauss
 
 import rodfem
 from rodfem import Branch, Discretization, Plan, Point
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.continuation.step_control import IndexStepControl, StepControl
 from rodfem.errors import InputError, SceneError
 from rodfem.output.files import load_state, save_states
@@ -200,7 +201,7 @@ def test_an_equilibrium_is_a_first_state_that_stays(mesh: tuple[int, int], facto
     discretization = Discretization("pointwise", *mesh, factors=factors)
     for load in (0.2, 1.0):
         solver = rodfem.Solver(pressed("dead", (load, 5.0)), discretization).equilibria
-        x, outcome = solver.first(load)
+        x, outcome = first_equilibrium(solver, load)
         assert outcome.converged
         assert solver.inertia.at(x).count().negative == 1
         r = solver.shape.sample(x)["r"]

@@ -34,7 +34,6 @@ def rows(name: str, formulation: str) -> tuple[BranchSolver, list[Point]]:
     """A solver and all rows of a scene."""
     found = traced(name, formulation)
     solver = found.solvers[0]
-    assert isinstance(solver, BranchSolver)
     points = [point for branch in found.branches for point in branch.points if point.mesh == 0]
     assert len(points) > 40
     return solver, points

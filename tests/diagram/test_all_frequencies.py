@@ -14,6 +14,7 @@ from literature.test_free_rods import floating
 from scipy.linalg import eigvals
 
 from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, trace
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.held import at_load
 from rodfem.forms.energy import bending_and_twist
 from rodfem.linalg.matrices import gathered
@@ -45,7 +46,7 @@ def test_against_qz(name: str, part: float) -> None:
     scene = SCENES[name]()
     solver = Solver(scene, Discretization("pointwise", 3, 5)).equilibria
     low, high = scene.span
-    x = at_load(solver, solver.first(low)[0], low + part * (high - low))
+    x = at_load(solver, first_equilibrium(solver, low)[0], low + part * (high - low))
     pencil = NonsymmetricSolver(solver.system).at(x)
     found, exact = pencil.spectrum.values[:20], dense(pencil, 20)
     for one, other in ((found, exact), (exact, found)):

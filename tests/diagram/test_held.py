@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rodfem import Discretization, Solver
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.held import at_load
 from rodfem.errors import ConvergenceError
 
@@ -16,7 +17,7 @@ from rodfem.errors import ConvergenceError
 def test_a_load_that_takes_several_steps() -> None:
     """A cantilever with a lateral force of up to 50 at its tip."""
     solver = Solver(classics.lateral(), Discretization("reduced", 6, 6)).equilibria
-    first, _ = solver.first(0.0)
+    first, _ = first_equilibrium(solver, 0.0)
     x = first
     for _, load in pairwise(np.linspace(0.0, 50.0, 101).tolist()):
         x, outcome = solver.at_load(x, load)

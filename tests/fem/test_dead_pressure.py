@@ -14,7 +14,7 @@ import ufl
 
 import rodfem.fem.system
 from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, StepControl, trace
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.newton import relax
 from rodfem.fem.symmetries import Symmetry, elementary_generators
 from rodfem.fem.system import System
@@ -36,7 +36,7 @@ def ring(planar: str | None = None, B2: float = 1.0, C: float = 1.0, load: Any =
 
 
 @cache
-def solver(planar: str | None, B2: float, C: float) -> StaticSolver:
+def solver(planar: str | None, B2: float, C: float) -> BranchSolver:
     return Solver(ring(planar, B2, C), Discretization("pointwise", 8, 6)).equilibria
 
 
@@ -72,7 +72,7 @@ def ritz(p: float, B: tuple[float, float, float], planar: bool, modes: int = 12)
     return np.linalg.eigvalsh(np.linalg.solve(root, half.T))
 
 
-def circle_at(found: StaticSolver, p: float) -> Any:
+def circle_at(found: BranchSolver, p: float) -> Any:
     """The circle under the load p, to which Newton's method leads from the start."""
     x = found.start(p)
     found.system.set_phase(x)

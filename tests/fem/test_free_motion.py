@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from rodfem import Discretization, End, Plan, Scene, SceneError, Solver, trace
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram import sweep
 from rodfem.stability.assessment import assess
 
@@ -28,12 +29,12 @@ def scene(kind: str, balanced: bool = True) -> Scene:
 
 
 @cache
-def solver(kind: str) -> StaticSolver:
+def solver(kind: str) -> BranchSolver:
     return Solver(scene(kind), Discretization("auto", 4, 6)).equilibria
 
 
-def straight(found: StaticSolver, load: float) -> Any:
-    x, outcome = found.first(load)
+def straight(found: BranchSolver, load: float) -> Any:
+    x, outcome = first_equilibrium(found, load)
     assert outcome.converged
     return x
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from small_states import plain
 
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.parameters import line
 from rodfem.fem.state import State
@@ -85,7 +85,7 @@ def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> 
     )
     moved = replace(rod, parameters={"d": Parameter(0.1), "e": Parameter(0.7), "B": Parameter(3.0)})
     discretization = Discretization(formulation, 4, 3)
-    given, expected = (StaticSolver(System(scene, discretization)) for scene in (rod, moved))
+    given, expected = (BranchSolver(System(scene, discretization)) for scene in (rod, moved))
     x = expected.start(0.2)
     assert abs(given.shape.ordinate(x) - expected.shape.ordinate(x)) > 0.5
     given.system.line = line(rod, {"d": 0.15, "e": 0.7, "B": 3.0}, {"d": 0.25})

@@ -11,6 +11,7 @@ from demo_cases import scene
 from hemitropic_cases import DEFAULT
 from hemitropic_cases import scene as hemitropic
 
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
@@ -157,10 +158,10 @@ def test_first_equilibrium_far_from_the_start() -> None:
         span=(0.0, 20.0),
     )
     solver = Solver(coiled, Discretization("reduced", 8, 6)).equilibria
-    x, outcome = solver.first(0.0)
+    x, outcome = first_equilibrium(solver, 0.0)
     assert outcome.converged
     assert solver.energy(x) == pytest.approx(0.0, abs=1e-12)  # without tension it takes its own shape, a helix
-    x, outcome = solver.first(20.0)
+    x, outcome = first_equilibrium(solver, 20.0)
     assert outcome.converged
     assert solver.energy(x) > 5
 

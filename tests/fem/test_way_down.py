@@ -8,24 +8,25 @@ from hard.fuzz import wider
 from petsc4py import PETSc
 
 from rodfem import Discretization, Solver
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.first_equilibrium import beside_saddle
 from rodfem.fem.newton import along, linear_step
 from rodfem.stability.blocks import Blocks
 
 
 @pytest.fixture(scope="module")
-def beside_a_saddle() -> tuple[StaticSolver, PETSc.Vec, float]:
+def beside_a_saddle() -> tuple[BranchSolver, PETSc.Vec, float]:
     """A solver, a state beside a saddle, and the longest time step of the way down from there."""
     solver = Solver(wider.scene(3, 144)[0], Discretization("pointwise", 5, 6))
     e, load = solver.equilibria, solver.scene.span[0]
     saddle, _ = e.at_load(e.start(load), load)
-    return e, *e.off(saddle, e.start(load))
+    return e, *beside_saddle(e, saddle, e.start(load))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("times", [1, 4, 8, 100])
 def test_a_step_is_uphill_where_it_is_too_long(
-    times: float, beside_a_saddle: tuple[StaticSolver, PETSc.Vec, float]
+    times: float, beside_a_saddle: tuple[BranchSolver, PETSc.Vec, float]
 ) -> None:
     """``dx.(K + M/tau) dx`` by the blocks of the state; past the growth of the unstable mode it is negative."""
     e, x, half = beside_a_saddle

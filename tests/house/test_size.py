@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 37271,
+    "lines of Python": 37266,
     "files of Python": 251,
     "lines of C": 966,
     "module constants with a number": 480,

@@ -19,7 +19,8 @@ from scipy.spatial.transform import Rotation
 from small_states import buckled, plain, scene
 from small_states import solver as solver_of
 
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
@@ -36,17 +37,17 @@ METHODS = ("shift-invert", "cayley", "slicing", "reduction")
 """That work on all ranks."""
 
 
-def state(given: Scene, discretization: Discretization, load: float, steps: int = 1) -> tuple[StaticSolver, PETSc.Vec]:
+def state(given: Scene, discretization: Discretization, load: float, steps: int = 1) -> tuple[BranchSolver, PETSc.Vec]:
     """Equilibrium that Newton's method finds from the scene's start, in ``steps`` of the load."""
     solver = Solver(given, discretization).equilibria
-    x, outcome = solver.first(load / steps)
+    x, outcome = first_equilibrium(solver, load / steps)
     for part in np.linspace(0, load, steps + 1)[2:]:
         x, outcome = solver.at_load(x, part)
     assert outcome.converged
     return solver, x
 
 
-def modes_of(solver: StaticSolver, x: PETSc.Vec, number: int, method: str = "auto", error_bars: bool = False) -> Modes:
+def modes_of(solver: BranchSolver, x: PETSc.Vec, number: int, method: str = "auto", error_bars: bool = False) -> Modes:
     return ModeFinder(solver, error_bars)(x, number, method)[1]
 
 

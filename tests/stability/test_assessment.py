@@ -15,6 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from small_states import buckled, plain, scene
 
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, InputError, SceneError
@@ -96,7 +97,7 @@ def test_methods_agree_with_other_ends_and_constraints(name: str, formulation: s
     """Moving ends are rows, their moments and multipliers of constraints columns of C; eigenvalues come in pairs."""
     given = getattr(classics, name)()
     solver = Solver(given, Discretization(formulation, 4, 3)).equilibria
-    x, outcome = solver.first(0.9 * given.span[0] + 0.1 * given.span[1])
+    x, outcome = first_equilibrium(solver, 0.9 * given.span[0] + 0.1 * given.span[1])
     assert outcome.converged
     assessor = Assessor(solver.system)
     expected = assessor(x, "dense", 3)
@@ -293,7 +294,7 @@ def test_fields_without_mass(name: str, mass: float, rotary: tuple[float, float,
     inertia = Inertia(rho_A=lambda c: mass, rho_I=lambda c: rotary)
     solver = Solver(replace(scene(name), inertia=inertia), Discretization("pointwise", *SMALL)).equilibria
     load = {"cord": 20.0, "ruler": 2.0}[name]
-    x, outcome = solver.first(load)
+    x, outcome = first_equilibrium(solver, load)
     assert outcome.converged
     assessor = Assessor(solver.system)
     expected = assessor(x, "dense", 4)
@@ -311,7 +312,7 @@ def test_an_unstable_direction_without_mass(method: str) -> None:
     """Its eigenvalue is minus infinity."""
     inertia = Inertia(rho_I=lambda c: (0.0, 1.0, 0.0))
     solver = Solver(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)).equilibria
-    x, _ = solver.first(20.0)
+    x, _ = first_equilibrium(solver, 20.0)
     with pytest.raises(ConvergenceError, match="no lower end"):
         Assessor(solver.system)(x, method, 2)
     assert Assessor(solver.system)(x, "count").negative == 1
@@ -323,7 +324,7 @@ def test_no_mass_at_all(method: str) -> None:
     """One sentence: infinite eigenvalues are none."""
     inertia = Inertia(rho_I=lambda c: (0.0, 0.0, 0.0))
     solver = Solver(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)).equilibria
-    x, _ = solver.first(60.0)
+    x, _ = first_equilibrium(solver, 60.0)
     with pytest.raises(SceneError, match="give it a mass or a rotary inertia"):
         Assessor(solver.system)(x, method, 2)
     assert Assessor(solver.system)(x, "count").stable

@@ -12,6 +12,7 @@ import rescaled
 from hard.fuzz import wider
 
 from rodfem import Discretization, Parameter, Plan, Scene, Solver, trace
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.held import at_load
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.cluster import Measured, closed, cluster_of, measure, noise_of
@@ -26,7 +27,7 @@ RELATIVE, DRAWS = 1e-9, 60
 def nearly_met(scene: Scene, load: float, size: int) -> tuple[NonsymmetricPencil, Measured]:
     """The ``size`` left-most eigenvalues of a rod a little below its flutter load."""
     solver = Solver(scene, Discretization("pointwise", 2, 4)).equilibria
-    x, _ = solver.first(load)
+    x, _ = first_equilibrium(solver, load)
     pencil = NonsymmetricSolver(solver.system).at(at_load(solver, x, load))
     found = pencil.near(size + 2, 0.0)
     return pencil, measure(pencil, cluster_of(pencil, found, list(range(size))))

@@ -21,7 +21,8 @@ from rodfem import (
     sliding,
     trace,
 )
-from rodfem.continuation.static_solver import StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import SceneError
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.dependence import _distance, require_independent_constraints, smallest_singular
@@ -46,7 +47,7 @@ def shortened(far: Any = clamped, near: Any = clamped, rod: str = "unshearable a
     return Scene("shortened", (0.0, 1.0), rod, energy, {"P": 0.0}, "P", ends, middle, **({"span": (0.0, 0.3)} | more))
 
 
-def solver_of(scene: Scene, formulation: str, mesh: tuple[int, int], factors: str = "chain") -> StaticSolver:
+def solver_of(scene: Scene, formulation: str, mesh: tuple[int, int], factors: str = "chain") -> BranchSolver:
     """Solver on a mesh of so many elements of that degree."""
     return Solver(scene, Discretization(formulation, *mesh, factors=factors)).equilibria
 
@@ -88,7 +89,7 @@ def test_a_range_that_ends_where_the_rod_is_taut(planar: str | None) -> None:
 def test_the_distance_of_a_slack_rod_from_the_taut_one(formulation: str, mesh: tuple[int, int], slack: float) -> None:
     """Its turning in closed form, ``2 sqrt(P) sin(2 pi s)``: a bound that neither the mesh nor its degree changes."""
     solver = solver_of(shortened(planar="e2"), formulation, mesh)
-    x, _ = solver.first(1e-3)
+    x, _ = first_equilibrium(solver, 1e-3)
     for load in 10.0 ** np.arange(-4, np.log10(slack) - 0.5, -1):
         x, outcome = solver.at_load(x, load)
         assert outcome.converged

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import Attachment, Solver, clamped, free
+from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.linalg.matrices import rounding
 from rodfem.stability.inertia import Index
 from rodfem.stability.near_zero import decide, quotient_error, resolve
@@ -75,5 +76,5 @@ def test_a_band_wider_than_the_lowest_eigenvalue(place: float) -> None:
                  attachments=(Attachment(place, force=push),))  # fmt: skip
     solver = Solver(rod).equilibria
     for load, index in ((1.0, 0), (3.0, 1), (6.0, 2)):
-        found = solver.inertia.at(solver.first(load)[0])
+        found = solver.inertia.at(first_equilibrium(solver, load)[0])
         assert (decide(found).index.negative, *resolve(found)) == (index, index, index)

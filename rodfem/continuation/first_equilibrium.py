@@ -1,0 +1,162 @@
+"""The equilibrium that a computation begins with: from the scene's start by Newton's method, or by going downhill."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+
+from petsc4py import PETSc
+
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import NewtonResult, linear_step, relax
+from rodfem.fem.system import System
+from rodfem.stability.near_zero import decide
+from rodfem.stability.symmetric import SymmetricSolver
+
+STILL = 1e-6
+"""Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
+HOLDS = 1e6
+"""Damping that holds a state while the multipliers of its constraints are found, over the lowest bending eigenvalue."""
+STRAYED = 0.3
+"""If Newton's method moves the initial guess farther than this (metric norm), the result is not accepted as the first
+state; an equilibrium nearer than this to the start is the one that is meant."""
+HELD = 1e-8
+"""Drift scalar, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
+ASIDE = 0.1
+"""How far beside a saddle the way down goes on, in the metric."""
+
+
+def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
+    """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
+
+    Newton's method begins without forces.  Where it strays from a start that has an equilibrium right beside it,
+    found from the forces that balance the start best, that is the first one, stable or not.  The way down is also
+    taken where Newton's method ends at an unstable equilibrium that is nowhere near the start.  Of a family of
+    equilibria it is the one next to the start, whatever round-off would make of it.
+    """
+    guess = solver.start(load)
+    x, outcome = solver.at_load(guess, load)
+    if not (outcome.converged and _turned(solver.system, guess, x) < STRAYED):
+        near, found = solver.at_load(_balanced(solver, guess), load)
+        if found.converged and _turned(solver.system, guess, near) < STRAYED:
+            x, outcome = near, found
+    if outcome.converged and _turned(solver.system, guess, x) >= STRAYED:
+        outcome, good = examined(solver, x, outcome)
+    else:
+        good = outcome.converged
+    if good and not _may_move(solver, x):
+        return x, outcome
+    damping, solver.system.damping = solver.system.damping, STILL * solver.system.stiffness_scale
+    still, found = solver.at_load(guess, load)  # the start may be one of a family, along which it need not move
+    solver.system.damping = damping
+    if found.converged and _turned(solver.system, guess, still) < STRAYED:
+        return still, found
+    if good:
+        return x, outcome
+    other = downhill(solver, load)
+    return other if other[1].converged else (x, outcome)
+
+
+def _balanced(solver: BranchSolver, x: PETSc.Vec) -> PETSc.Vec:
+    """The state ``x`` with the multipliers of its constraints that balance it best, a least-squares estimate.
+
+    One step of Newton's method with so much damping that nothing else moves.  Without the forces in it, rotations
+    of a free rod under dead loads cost nothing: Newton's method leaves even an equilibrium, in any direction.
+    """
+    system = solver.system
+    system.set_phase(x)
+    step = linear_step(system, x, solver.axis, HOLDS * system.stiffness_scale)
+    return x.copy() if step is None else x - step
+
+
+def _turned(system: System, guess: PETSc.Vec, x: PETSc.Vec) -> float:
+    """Distance of two states without that of their strains, in the metric: a straight rod may stretch far."""
+    difference, f = x - guess, system.fields
+    if "v" in f.dofs:
+        begin, end = difference.getOwnershipRange()
+        strains = f.number[f.dofs["v"]].ravel()
+        difference.array[strains[(begin <= strains) & (strains < end)] - begin] = 0.0
+    return system.norm(difference)
+
+
+def downhill(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
+    """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.
+
+    A stable state is preferred.  From a symmetrical start the way down may end on a saddle, and where it passes one
+    slowly it depends on the mesh whether it stays there: from a saddle it goes on, along its most unstable mode.
+    """
+    saddle: tuple[PETSc.Vec, NewtonResult] | None = None
+    for bent in (0.0, 0.4, 0.8):
+        x, outcome = _relaxed(solver, solver.start(load, bent))
+        outcome, stable = examined(solver, x, outcome)
+        if stable:
+            return x, outcome
+        if saddle is None or (outcome.converged and not saddle[1].converged):
+            saddle = x, outcome
+    assert saddle is not None
+    if not saddle[1].converged:
+        return saddle
+    beside, longest = beside_saddle(solver, saddle[0], solver.start(load))
+    found = _relaxed(solver, beside, longest, lambda x: examined(solver, x, saddle[1])[1])
+    return found if found[1].converged else saddle
+
+
+def examined(solver: BranchSolver, x: PETSc.Vec, outcome: NewtonResult) -> tuple[NewtonResult, bool]:
+    """The iteration that led to ``x``, and whether that is stable.
+
+    It has not converged where eigenvalues cannot be counted: a state so far away that it is round-off is none.
+    """
+    if not outcome.converged:
+        return outcome, False
+    try:
+        return outcome, is_stable(solver, x)
+    except ConvergenceError:
+        return replace(outcome, converged=False), False
+
+
+def _relaxed(
+    solver: BranchSolver, x: PETSc.Vec, longest: float = inf, accepts: Callable[[PETSc.Vec], bool] = lambda x: True
+) -> tuple[PETSc.Vec, NewtonResult]:
+    """Equilibrium downhill from the state ``x``, which moves there, at its load; see :func:`relax`."""
+    load = solver.system.scalar(x)
+    outcome = relax(solver.system, x, solver.axis, longest=longest, accepts=accepts)
+    for _ in range(3):  # phase conditions taken far away may hold a state off the equilibrium
+        if outcome.converged and solver.system.drift(x) > HELD * solver.system.stiffness_scale:
+            x, outcome = solver.at_load(x, load)
+    return x, outcome
+
+
+def is_stable(solver: BranchSolver, x: PETSc.Vec) -> bool:
+    """Whether the index of an equilibrium is zero, as far as there is one: of loads with a potential.
+
+    A search asks that of states that may be far from all others: their round-off is that of no other.
+    """
+    if not solver.conservative:
+        return True
+    try:
+        return decide(solver.inertia.at(x)).index.negative == 0
+    finally:
+        solver.inertia.forget_band()
+
+
+def _may_move(solver: BranchSolver, x: PETSc.Vec) -> bool:
+    """Whether an equilibrium is one of a family: it has more zero eigenvalues than symmetries that it breaks."""
+    if not solver.conservative:
+        return False
+    found = solver.inertia.at(x)
+    return found.count().zero > found.drifts
+
+
+def beside_saddle(solver: BranchSolver, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
+    """State beside the saddle ``x``, along its most unstable mode on the side of ``start``.
+
+    Also the longest time step by which that mode grows: half of its time.
+    """
+    modes = SymmetricSolver(solver.inertia).at(x).leftmost(1)
+    beside, mode = x.copy(), modes.vectors[0]
+    size = ASIDE / solver.system.norm(mode)
+    beside.axpy(size if solver.row(mode).dot(start - x) >= 0 else -size, mode)
+    solver.system.set_load(beside, solver.system.scalar(x))
+    return beside, 0.5 / abs(float(modes.values[0]))
