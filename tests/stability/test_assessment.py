@@ -27,6 +27,7 @@ from rodfem.problem.scene import Inertia
 from rodfem.stability.assessment import Assessor, assess
 from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.dependence import rank_of, smallest_singular
+from rodfem.stability.inertia import Factored
 from rodfem.stability.inertia import Inertia as Count
 from rodfem.stability.methods import Method
 from rodfem.stability.near_zero import decide
@@ -375,21 +376,22 @@ def test_small_eigenvalues_on_many_elements(formulation: str, elements: int) -> 
     solver.system.set_phase(None)
     count = Count(solver.system)
 
-    def decision(load: float):  # type: ignore[no-untyped-def]
-        return decide(count.at(solver.at_load(solver.start(load), load)[0]))
+    def at(load: float) -> Factored:
+        return count.at(solver.at_load(solver.start(load), load)[0])
 
     loads = 49.348 + np.array([-0.5, 0.5])
     values = []
     for load in loads:
-        decision(load)
-        values.append(count.held.nearest(1, accuracy=1e-8)[0][0])
+        there = at(load)
+        decide(there)
+        values.append(there.nearest(1, accuracy=1e-8)[0][0])
     slope = (values[1] - values[0]) / 1.0
-    solver_state, _ = solver.at_load(solver.start(49.348), 49.348)
-    decide(count.at(solver_state))
-    middle = count.held.nearest(1, accuracy=1e-8)[0][0]
+    there = at(49.348)
+    decide(there)
+    middle = there.nearest(1, accuracy=1e-8)[0][0]
     critical = 49.348 - middle / slope
     for mu in (1e-3, -1e-4, 1e-5, -3e-6, 3e-6, -1e-8, 1e-10, -1e-12):
-        found = decision(critical + mu / slope)
+        found = decide(at(critical + mu / slope))
         if abs(mu) > 2e-6:
             assert (found.index.negative, found.index.zero) == (int(mu < 0), 0)
         else:
@@ -405,9 +407,10 @@ def test_quotients_decide_within_a_wide_band() -> None:
     count = Count(solver.system)
     for load, negative in ((49.3475, 1), (49.3485, 0), (40.0, 1), (55.0, 0)):
         x, _ = solver.at_load(solver.start(load), load)
-        exact = decide(count.at(x)).index
+        there = count.at(x)
+        exact = decide(there).index
         assert (exact.negative, exact.zero) == (negative, 0)
-        value = abs(float(count.held.nearest(1, accuracy=1e-8)[0][0]))
+        value = abs(float(there.nearest(1, accuracy=1e-8)[0][0]))
         given, count.tolerance, count.resolution = (count.tolerance, count.resolution), 3 * value, 3 * value
         found = decide(count.at(x))
         count.tolerance, count.resolution = given
