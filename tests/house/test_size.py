@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 37840,
+    "lines of Python": 37839,
     "files of Python": 253,
     "lines of C": 1426,
     "module constants with a number": 483,
