@@ -14,9 +14,9 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 37839,
+    "lines of Python": 37815,
     "files of Python": 253,
-    "lines of C": 1426,
+    "lines of C": 1417,
     "module constants with a number": 483,
     "functions of a complexity above 10": 69,
     "functions of six parameters or more": 54,
