@@ -759,7 +759,7 @@ FAULTS = {
     ),
     "pictures-draw-chords": Fault(
         "rodfem/output/smooth.py",
-        "SEEN = 1e-3",
+        "SEEN = 2e-4",
         "SEEN = 1e3",
         "tests/output/test_smooth.py",
     ),

@@ -59,8 +59,7 @@ typedef struct chain {
     size_t dense_room, schur_room, forward_room, back_room;
     Pile order, panel, pivot;
     int negative, zero, scaled;
-    long exponents;          /* of the scale, their sum */
-    double determinant, growth;
+    double growth;
 } chain;
 
 static int resize(Pile *pile, size_t room)
@@ -305,8 +304,6 @@ static void equilibrate(chain *c, const double *values, double least)
         if ((serves && sweep >= SWEEPS) || sweep == MOST) break;
         for (int i = 0; i < c->n; i++) if (!c->of_border[i]) s[i] = lowered(s[i], c->work[i], 2);
     }
-    c->exponents = 0;
-    for (int i = 0; i < c->n; i++) c->exponents += ilogb(s[i]);
     c->scaled = 1;
 }
 
@@ -383,7 +380,6 @@ static int eliminate_symmetric(chain *c, double *a, int m, int full, int *unknow
             double pivot = A(k, k), inverse = 1.0 / pivot;
             d[2 * k] = pivot; d[2 * k + 1] = 0;
             c->negative += pivot < 0;
-            c->determinant += log(fabs(pivot));
             for (int j = k + 1; j < m; j++) {
                 double x = A(j, k) * inverse;
                 if (x != 0) for (int i = j; i < m; i++) A(i, j) -= x * A(i, k);
@@ -397,7 +393,6 @@ static int eliminate_symmetric(chain *c, double *a, int m, int full, int *unknow
             double e = A(k, k), f = A(k + 1, k + 1), g = A(k + 1, k), det = e * f - g * g;
             d[2 * k] = e; d[2 * k + 1] = g; d[2 * k + 2] = f; d[2 * k + 3] = 0;
             c->negative += det < 0 ? 1 : 2 * (e < 0);
-            c->determinant += log(fabs(det));
             A(k + 1, k) = 0;
             for (int j = k + 2; j < m; j++) {
                 double x = A(j, k), y = A(j, k + 1);
@@ -446,7 +441,6 @@ static int eliminate_general(chain *c, double *a, int m, int full, int *rows, in
             for (int i = 0; i < m; i++) { double x = A(i, q); A(i, q) = A(i, k); A(i, k) = x; }
         }
         double inverse = 1.0 / A(k, k);
-        c->determinant += log(fabs(A(k, k)));
         for (int i = k + 1; i < m; i++) A(i, k) *= inverse;
         for (int j = k + 1; j < m; j++) {
             double x = A(k, j);
@@ -473,7 +467,6 @@ PUBLIC int chain_factor(chain *c, const double *values)
     if (!isfinite(sum)) return 3;
     c->order.used = c->panel.used = c->pivot.used = 0;
     c->negative = c->zero = 0;
-    c->determinant = 0;
     c->growth = 0;
     equilibrate(c, values, NOTHING * most);
     const double *s = c->scale;
@@ -530,7 +523,6 @@ PUBLIC int chain_factor(chain *c, const double *values)
         memcpy(c->right, columns + done, remaining * sizeof(int));
         delayed = full - done;
     }
-    c->determinant -= 2 * log(2.0) * (double)c->exponents;
     return c->zero ? 1 : 0;
 }
 
@@ -652,7 +644,6 @@ PUBLIC int chain_solve(chain *c, int k, const double *b, double *x)
 PUBLIC int chain_negative(const chain *c) { return c->negative; }
 PUBLIC int chain_zero(const chain *c) { return c->zero; }
 PUBLIC int chain_fronts(const chain *c) { return c->fronts; }
-PUBLIC double chain_determinant(const chain *c) { return c->determinant; }
 PUBLIC double chain_growth(const chain *c) { return c->growth; }
 PUBLIC int chain_delayed(const chain *c)
 {

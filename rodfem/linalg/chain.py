@@ -9,7 +9,6 @@ times as long, most of it for finding its way.
 from __future__ import annotations
 
 from functools import lru_cache
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -155,10 +154,6 @@ class Elimination:
         """Number of negative pivots of the symmetric matrix last factored, and of those that are zero."""
         return int(self.lib.chain_negative(self._chain)), int(self.lib.chain_zero(self._chain))
 
-    def determinant(self) -> float:
-        """Logarithm of the size of the product of the pivots of the matrix last factored; -inf where one is zero."""
-        return float(self.lib.chain_determinant(self._chain)) if self.regular else -inf
-
     @property
     def growth(self) -> float:
         """Largest multiplier of the last factors."""
@@ -240,7 +235,3 @@ class Chain:
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
         return (self.resort if self.resort and self.resorted else self.elimination).inertia()
-
-    def determinant(self) -> float:
-        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
-        return (self.resort if self.resort and self.resorted else self.elimination).determinant()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import inf, log
 from typing import Any, Protocol
 
 import numpy as np
@@ -72,9 +71,6 @@ class Factors(Protocol):
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
 
-    def determinant(self) -> float:
-        """Logarithm of the size of the determinant of the symmetric matrix last factored."""
-
 
 class Mumps:
     """Factors by MUMPS, on all ranks of a matrix.
@@ -102,7 +98,7 @@ class Mumps:
         natural sizes of the unknowns when a matrix is factored; None where they are one.
         """
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
-        self.sizes, self._shift = sizes, 0.0
+        self.sizes = sizes
         self._scaled: PETSc.Mat | None = None
         self._scaled_from = 0
         self.prefix = prefix or f"rodfem_{kind}_"
@@ -166,12 +162,6 @@ class Mumps:
         negative, zero, _ = self.ksp.getPC().getFactorMatrix().getInertia()
         return int(negative), int(zero)
 
-    def determinant(self) -> float:
-        """Logarithm of the size of the determinant of the symmetric matrix last factored; -inf where it is zero."""
-        factor = self.ksp.getPC().getFactorMatrix()
-        mantissa = abs(factor.getMumpsRinfog(12))
-        return log(mantissa) + factor.getMumpsInfog(34) * log(2.0) - self._shift if mantissa else -inf
-
     def _in_units(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Matrix for unknowns in units of their natural sizes: itself where those are one."""
         if self.sizes is None:
@@ -182,8 +172,6 @@ class Mumps:
         else:  # a new pattern would make PETSc forget all controls
             matrix.copy(self._scaled, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self._scaled.diagonalScale(sizes, sizes)
-        own = 2 * float(np.log(abs(sizes.array_r)).sum())
-        self._shift = matrix.comm.tompi4py().allreduce(own)
         return self._scaled
 
     def _prepare(self, matrix: PETSc.Mat) -> None:
@@ -201,7 +189,6 @@ class Mumps:
         self.factor.setOptionsPrefix(self.prefix)  # made before PETSc's own set-up, it has none
         self.factor.setMumpsIcntl(14, self.room)
         if self.kind == "cholesky":
-            self.factor.setMumpsIcntl(33, 1)  # the determinant
             self.factor.setMumpsIcntl(13, 1)  # the root of the tree is on one rank, which counts
         for control, value in self.controls.items():
             self.factor.setMumpsIcntl(control, value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -64,10 +64,11 @@ class Shared:
     values: np.ndarray
     pattern: sp.csr_matrix
 
-    @property
+    @cached_property
     def matrix(self) -> sp.csr_matrix:
-        """The matrix, with the values that it has now."""
-        return sp.csr_matrix((self.values, self.pattern.indices, self.pattern.indptr), shape=self.pattern.shape)
+        """The matrix, with the values that it has at any time."""
+        pattern = self.pattern
+        return sp.csr_matrix((self.values, pattern.indices, pattern.indptr), shape=pattern.shape, copy=False)
 
 
 def shared_matrix(comm: MPI.Comm, pattern: sp.csr_matrix) -> PETSc.Mat:

@@ -41,19 +41,17 @@ class Basis:
         self.vectors: list[PETSc.Vec] = []
         self.duals: list[PETSc.Vec] = []
 
-    def add(self, vector: PETSc.Vec, least: float = 0.0) -> None:
-        """Add what a vector has across the others, in place; nothing where less than ``least`` of it is left."""
-        size = np.sqrt(vector.dot(self.metric * vector).real) if least else 0.0
+    def add(self, vector: PETSc.Vec) -> None:
+        """Add what a vector has across the others, in place."""
         for _ in range(2):
             if self.vectors:
                 vector.maxpy([-dual.dot(vector) for dual in self.duals], self.vectors)
         dual = self.metric * vector
         left = np.sqrt(max(vector.dot(dual).real, 0.0))
-        if left >= least * size:
-            vector.scale(1.0 / max(left, TINY))
-            dual.scale(1.0 / max(left, TINY))
-            self.vectors.append(vector)
-            self.duals.append(dual)
+        vector.scale(1.0 / max(left, TINY))
+        dual.scale(1.0 / max(left, TINY))
+        self.vectors.append(vector)
+        self.duals.append(dual)
 
 
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:

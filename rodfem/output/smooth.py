@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 SHARES = np.linspace(0.0, 1.0, 9)[1:-1]
 """Where a step has points, in parts of its arclength."""
-SEEN = 1e-3
+SEEN = 2e-4
 """Distance from the chord above which a step is no straight line, in parts of the branch's range."""
 CORNER = 0.5
 """Change of a slope at a row, over the slopes beside it, from which on it is a corner; distance of a curve from the
@@ -49,7 +49,7 @@ def between(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
     for rows, curve in zip((loads, values), curves, strict=True):
         off = abs(curve - rows[:-1, None] - SHARES * np.diff(rows)[:, None]).max(axis=1)
         seen |= off > SEEN * np.ptp(rows)
-        smooth &= off <= np.maximum(CORNER * abs(np.diff(rows)), 30 * SEEN * np.ptp(rows))
+        smooth &= off <= np.maximum(CORNER * abs(np.diff(rows)), 150 * SEEN * np.ptp(rows))
     return {int(row): np.column_stack([curve[row] for curve in curves]) for row in np.flatnonzero(seen & smooth)}
 
 
@@ -71,7 +71,7 @@ def _corners(s: Floats, values: Floats) -> list[int]:
     left, right = left[:-1], right[1:]  # at rows 2, 3, ..., of parabolas that end and begin there
     step = np.minimum(np.diff(s)[1:-2], np.diff(s)[2:-1])
     apart = abs(left - right)
-    corner = (apart > CORNER * np.maximum(abs(left), abs(right))) & (apart * step > 10 * SEEN * np.ptp(values))
+    corner = (apart > CORNER * np.maximum(abs(left), abs(right))) & (apart * step > 50 * SEEN * np.ptp(values))
     return [int(row) + 2 for row in np.flatnonzero(corner)]
 
 

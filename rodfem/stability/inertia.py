@@ -42,9 +42,10 @@ NULL, ROUGH = 1e-8, 1e-2
 DEPTH, RESTARTS = 5, 20
 """Blocks of a Krylov space, and how often it is begun anew, at most."""
 ROUNDED = 1e-13
-"""Residual, over the largest eigenvalue of the inverse, that is round-off."""
+"""Residual over the largest eigenvalue of the inverse, and square of the part of a vector across others, that is
+round-off."""
 DEPENDENT = 1e-10
-"""Part of a vector that is left across a space, and square of that among others, below which it spans nothing new."""
+"""Part of a vector that is left across a space, below which it spans nothing new."""
 FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
 FAR = 0.1
@@ -232,17 +233,15 @@ class Inertia:
         Both are orthonormal in the metric, ``duals`` are its products with the ``basis``.  What is less than
         :data:`DEPENDENT` of a vector spans nothing new.
         """
-        size = self.sizes(own) if basis.shape[1] else np.ones(own.shape[1])
-        for _ in range(2 if basis.shape[1] else 0):
+        size = self.sizes(own)
+        own = own[:, size > 0] / size[size > 0]
+        for least in (DEPENDENT, 0.5):  # what little is left of a vector has round-off of all of it: again
             own = own - basis @ self.sum(duals.T @ own)
-        images = self.weighed(own)
-        left = np.sqrt(np.maximum(self.sum((own * images).sum(axis=0)), 0.0))
-        new = left > DEPENDENT * size
-        own, images = own[:, new] / left[new], images[:, new] / left[new]
-        for _ in range(2):
+            images = self.weighed(own)
+            left = np.sqrt(np.maximum(self.sum((own * images).sum(axis=0)), TINY))
+            own, images = own[:, left > least] / left[left > least], images[:, left > least] / left[left > least]
             squares, turn = np.linalg.eigh(self.sum(own.T @ images))
-            kept = squares > DEPENDENT
-            turn = turn[:, kept] / np.sqrt(squares[kept])
+            turn = turn[:, squares > ROUNDED] / np.sqrt(squares[squares > ROUNDED])
             own, images = own @ turn, images @ turn
         return own, images
 

@@ -84,6 +84,7 @@ class Condensation:
         """Begin without a border; the ``inertia`` has the saddle matrix."""
         self.system, self.inertia = inertia.system, inertia
         self._bordered: dict[int, Bordered] = {}
+        self._columns = np.zeros((0, 0)), np.zeros((0, 0))
 
     def border(self, x: PETSc.Vec, count: int = MODES) -> np.ndarray:
         """Modes nearest zero at a state ``x``, (own rows, ``count``), fewer if there are no more."""
@@ -99,26 +100,28 @@ class Condensation:
 
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
         """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
-        inertia, B = self.inertia, self.inertia.weighed(phi)
-        found = inertia.at(x)
+        inertia, found = self.inertia, self.inertia.at(x)
+        if self._columns[0] is not phi:
+            self._columns = phi, inertia.weighed(phi)
+        B = self._columns[1]
         try:
             below = found.below(0.0)
             Z = found.factors.solve_all(B)
-            H = np.linalg.inv(_symmetric(inertia.sum(B.T @ Z)))
-            near = not abs(np.linalg.eigvalsh(_symmetric(H))).min() > NEAR * inertia.scale
+            H = _symmetric(np.linalg.inv(_symmetric(inertia.sum(B.T @ Z))))
+            values, vectors = np.linalg.eigh(H)
+            near = not abs(values).min() > NEAR * inertia.scale
         except (ConvergenceError, np.linalg.LinAlgError):
             near = True
         if near:
             far, H, W = self._by_the_bordered_matrix(x, B)
+            values, vectors = np.linalg.eigh(H)
         else:
-            H = _symmetric(H)
-            far, W = below - negative(H), Z @ H
-        values, vectors = np.linalg.eigh(H)
+            far, W = below - int((values < 0).sum()), Z @ H
         soft = int(abs(values).argmin())
         doubt = TOLERANCE * inertia.scale
         if abs(values[soft]) < SOFT * inertia.scale:
             doubt = max(doubt, quotient_error(inertia.at(x).matrix, inertia.vector(W @ vectors[:, soft])))
-        rotated = float(np.linalg.norm(inertia.sum(W.T @ inertia.weighed(W)) - np.eye(W.shape[1]), 2))
+        rotated = float(abs(np.linalg.eigvalsh(inertia.sum(W.T @ inertia.weighed(W))) - 1.0).max())
         return ReducedStiffness(H, self._rate(x, tangent, H, W), far, W, rotated, doubt)
 
     def _by_the_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:

@@ -86,5 +86,5 @@ def test_nothing_has_changed(name: str) -> None:
 def test_index_of_every_row(name: str) -> None:
     """By three other methods; ``python -m tests.every_row`` does the same for all conservative scenes."""
     rows, wrong = disagreements(name)
-    assert rows > 50
+    assert rows > 40
     assert not wrong

@@ -21,5 +21,5 @@ def test_the_derivative_of_tanh_of_large_numbers() -> None:
         return (1.5 - 0.5 * ufl.tanh((c.s - c.k) / c.w)) * bending_and_twist(k, (c.B1, c.B2, c.C))
 
     scene = column("sharp", SUPPORTS["clamped-free"], (0.0, 6.0), energy=energy, constants={"k": 1e-7, "w": 1e-8})
-    with pytest.raises(SceneError, match=r"are no numbers at any of the 12 states .* overflows"):
+    with pytest.raises(SceneError, match=r"are no numbers at any of the 3 states .* overflows"):
         Solver(scene, Discretization("auto", 2, 3))

@@ -14,9 +14,9 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 37266,
+    "lines of Python": 37245,
     "files of Python": 251,
-    "lines of C": 966,
+    "lines of C": 957,
     "module constants with a number": 480,
     "functions of a complexity above 10": 68,
     "functions of six parameters or more": 48,

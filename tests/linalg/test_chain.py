@@ -47,7 +47,6 @@ def test_random_chains(symmetric: bool) -> None:
         found = factors.elimination.solve(right)
         size = abs(dense).sum(axis=1).max() * abs(found).max()
         assert factors.regular and abs(dense @ found - right).max() < 100 * BACKWARD * size
-        assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], abs=1e-5)
         assert factors.elimination.growth <= 100.0 or factors.elimination.fronts == 1
         delayed += factors.elimination.delayed
         if symmetric:
@@ -61,7 +60,7 @@ def test_what_cannot_be_factored() -> None:
     dense = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     factors = Chain("cholesky", 0)
     factors(petsc(dense, dense != 0))
-    assert not factors.regular and factors.inertia()[1] == 1 and factors.determinant() == -np.inf
+    assert not factors.regular and factors.inertia()[1] == 1
     with pytest.raises(ConvergenceError, match="no numbers"):
         factors(petsc(np.diag([1.0, np.nan]), np.eye(2, dtype=bool)))
     factors(petsc(np.diag([1.0, -2.0]), np.eye(2, dtype=bool)))
@@ -93,9 +92,6 @@ class Both:
         self.other(matrix)
         if self.symmetric:
             assert self.along.inertia() == self.other.inertia()
-            assert self.along.determinant() == pytest.approx(
-                self.other.determinant(), abs=1e-2
-            )  # nearly singular ones, too
         right, out = matrix.createVecs()
         right.array[:] = np.random.default_rng(0).normal(size=right.size)
         self.along.solve(right, out)

@@ -45,11 +45,10 @@ def whole(vector: PETSc.Vec) -> np.ndarray:
 
 
 def check(factors: Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
-    """Compare inertia, determinant and a solution with dense linear algebra."""
+    """Compare inertia and a solution with dense linear algebra."""
     dense, out = gathered(matrix).toarray(), right.duplicate()
     factors(matrix)
     assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
-    assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-9)
     factors.solve(right, out)
     expected = np.linalg.solve(dense, whole(right))
     np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
@@ -98,7 +97,7 @@ def test_many_right_hand_sides() -> None:
 
 @pytest.mark.versions
 def test_natural_sizes() -> None:
-    """What is factored in units of the unknowns has the inertia, the determinant and the solutions of the matrix."""
+    """What is factored in units of the unknowns has the inertia and the solutions of the matrix."""
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
     inertia, sizes = Inertia(system), system.new_vector()
     sizes.array[:] = 10.0 ** np.random.default_rng(system.comm.rank).uniform(-3, 3, sizes.local_size)
