@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
+from types import ModuleType
 
 COMPLEX = "dolfinx-solver-complex"
 """Name on PyPI of the dolfinx with a PETSc for complex numbers."""
@@ -31,6 +32,18 @@ def _load() -> None:
     except ImportError as mixed:
         reason = str(mixed).partition(". ")[0]
         raise SetupError(f"The libraries here are of several builds ({reason}): {BEGIN_ANEW}") from mixed
+
+
+def optional(name: str, extra: str) -> ModuleType:
+    """Import a library that only a part of rodfem needs, of an ``extra``; raises :class:`SetupError` without it."""
+    try:
+        return import_module(name)
+    except ImportError as missing:
+        from rodfem.errors import SetupError
+
+        raise SetupError(
+            f'{name} is not installed: apt install python3-{name}, or pip install "rodfem[{extra}]".'
+        ) from missing
 
 
 def _is_installed(name: str) -> bool:

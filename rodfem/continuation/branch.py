@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.kinds import Kind
-from rodfem.errors import SMALLER_STEPS
+from rodfem.errors import SMALLER_STEPS, InputError
+from rodfem.libraries import optional
+from rodfem.problem.arguments import SHORT
 from rodfem.stability.soft_mode import SoftMode, index_range, is_stable
 from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
+    from rodfem.continuation.branch_solver import BranchSolver
+    from rodfem.fem.reactions import Reactions
+    from rodfem.fem.resultants import Profile
     from rodfem.problem.events import Event
     from rodfem.stability.cluster import Cluster
 
@@ -61,8 +68,8 @@ class Point:
         load.
     negative_in_space
         Index in space of a planar rod; None: not computed.
-    mesh
-        Number of the discretisation that ``x`` belongs to.
+    mesh, solver
+        Number of the discretisation that ``x`` belongs to, and its solver.
     estimate
         Error of the discretisation in load and ordinate, where an accuracy was asked for.
     soft
@@ -97,6 +104,7 @@ class Point:
     potential: float = float("nan")
     conjugate: float = float("nan")
     kink: str = ""
+    solver: BranchSolver | None = field(default=None, compare=False)
 
     @property
     def index(self) -> int:
@@ -110,6 +118,81 @@ class Point:
         Zero ones, which :attr:`zero` counts, are those of symmetries, or leave it undecided beyond that.
         """
         return is_stable(self.negative, self.undecided, self.kink)
+
+    # --- along the rod ---------------------------------------------------------------------------------------------
+
+    def profile(self, s: Sequence[float] | np.ndarray | None = None) -> Profile:
+        """Shape, strains, contact force and moment at arclengths ``s`` (m,), by default at the nodes; collective.
+
+        Raises :class:`~rodfem.errors.InputError` for a place that is not on the rod.
+        """
+        scene, resultants = self._solver.system.scene, self._solver.resultants
+        if s is None:
+            return resultants.profile(self.x)
+        places, (first, last) = np.atleast_1d(np.asarray(s, dtype=float)), scene.interval
+        if not ((places >= first) & (places <= last)).all():
+            raise InputError(f"The arclengths {SHORT.repr(s)} leave the rod: give some from {first:g} to {last:g}.")
+        return resultants.profile(self.x, places)
+
+    @property
+    def _solver(self) -> BranchSolver:
+        if self.solver is None:
+            raise InputError("This point has no solver: take one of a diagram, or of a Solver.")
+        return self.solver
+
+    @cached_property
+    def _nodal(self) -> Profile:
+        return self.profile()
+
+    @property
+    def s(self) -> np.ndarray:
+        """Arclengths of the nodes (m,)."""
+        return self._nodal.s
+
+    @property
+    def r(self) -> np.ndarray:
+        """Centreline at :attr:`s`, components in space (m, 3)."""
+        return self._nodal.r
+
+    @property
+    def directors(self) -> np.ndarray:
+        """Directors d1, d2, d3 at :attr:`s` as rows, components in space (m, 3, 3)."""
+        return self._nodal.directors
+
+    @property
+    def strain(self) -> np.ndarray:
+        """Strains ``v`` at :attr:`s`, along the directors (m, 3)."""
+        return self._nodal.strain
+
+    @property
+    def curvature(self) -> np.ndarray:
+        """Curvatures and twist ``k`` at :attr:`s`, along the directors (m, 3)."""
+        return self._nodal.curvature
+
+    @property
+    def force(self) -> np.ndarray:
+        """Contact force at :attr:`s`, along the directors (m, 3)."""
+        return self._nodal.force
+
+    @property
+    def force_in_space(self) -> np.ndarray:
+        """Contact force at :attr:`s`, components in space (m, 3)."""
+        return self._nodal.force_in_space
+
+    @property
+    def moment(self) -> np.ndarray:
+        """Contact moment at :attr:`s`, along the directors (m, 3)."""
+        return self._nodal.moment
+
+    @property
+    def moment_in_space(self) -> np.ndarray:
+        """Contact moment at :attr:`s`, components in space (m, 3)."""
+        return self._nodal.moment_in_space
+
+    @cached_property
+    def reactions(self) -> Reactions:
+        """Forces and moments of the supports and of what is attached: ``point.reactions.left.force``; collective."""
+        return self._solver.reactions(self.x)
 
     def backwards(self, total: float) -> Point:
         """The same equilibrium on the branch of length ``total`` followed the other way."""
@@ -271,6 +354,24 @@ class Unexplained:
         )
 
 
+COLUMNS = (
+    "arclength",
+    "load",
+    "ordinate",
+    "energy",
+    "potential",
+    "conjugate",
+    "stretch",
+    "negative",
+    "zero",
+    "undecided",
+    "negative_in_space",
+    "stable",
+    "slope",
+)
+"""Attributes of a point of which a branch has a column."""
+
+
 @dataclass(repr=False)
 class Branch:
     """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
@@ -298,6 +399,20 @@ class Branch:
     def __repr__(self) -> str:
         """Name, size and end."""
         return f"<Branch {self.name!r}: {len(self.points)} points, {len(self.special)} special, ended: {self.ended}>"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Column of an attribute of its points, a number or a yes or no for each: ``branch["load"]``, (P,).
+
+        What is not computed is nan.  Raises :class:`KeyError` for what points do not have.
+        """
+        values = [getattr(p, name, KeyError) for p in self.points]
+        if KeyError in values or not all(x is None or isinstance(x, int | float) for x in values):
+            raise KeyError(f"points have no number {name!r}: there are {', '.join(COLUMNS)}")
+        return np.array([np.nan if x is None else x for x in values])
+
+    def to_dataframe(self) -> Any:
+        """All numbers of its rows as a ``pandas.DataFrame``; raises :class:`~rodfem.errors.SetupError` without it."""
+        return optional("pandas", "tables").DataFrame({name: self[name] for name in COLUMNS})
 
     def start_in_words(self, load: str) -> str:
         """Sentence on a first state that is singular, for a load of that name; empty where it is not."""

@@ -17,6 +17,7 @@ from rodfem.continuation.regular_point import RegularPoints
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
+from rodfem.fem.reactions import Reactions, reactions
 from rodfem.fem.resultants import Resultants
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import Energies
@@ -102,6 +103,10 @@ class BranchSolver:
     def resultants(self) -> Resultants:
         """Strains, contact forces and moments of the states, compiled when they are first asked for."""
         return Resultants(self.shape)
+
+    def reactions(self, x: PETSc.Vec) -> Reactions:
+        """Reactions of supports and attachments at the equilibrium ``x``."""
+        return reactions(self.resultants, x)
 
     @cached_property
     def convexity(self) -> Convexity:
@@ -216,6 +221,7 @@ class BranchSolver:
             negative_in_space=None if self.space is None else self.space.negative(x),
             mesh=self.mesh,
             nearest=index.nearest,
+            solver=self,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:

@@ -284,7 +284,7 @@ class Diagram:
         if point.mesh == mesh:
             return point
         x = self.solvers[mesh].shape.restore(self.solvers[point.mesh].shape.sample(point.x))
-        return replace(point, x=x, tangent=None, mesh=mesh)
+        return replace(point, x=x, tangent=None, mesh=mesh, solver=self.solvers[mesh])
 
     # --- how it is kept and shown ------------------------------------------------------------------------------------
 

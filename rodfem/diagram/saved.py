@@ -140,7 +140,7 @@ def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Bra
             f"{states} has another load in row {row} of the branch {branch!r} than diagram.json beside it: give the "
             "two files of one run."
         )
-    return Point(x=x, tangent=None, **values)
+    return Point(x=x, tangent=None, solver=solver, **values)
 
 
 def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[BranchSolver]) -> SpecialPoint:

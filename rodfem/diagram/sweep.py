@@ -249,6 +249,7 @@ class Sweep:
             slope=float("nan"),
             drift=0.0,
             error=0.0,
+            solver=solver,
         )
 
     def _record(self, row: Row, *, on_the_way: bool) -> None:

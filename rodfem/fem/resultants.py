@@ -13,6 +13,7 @@ neighbours, where nothing acts between them.  Force and moment are the polynomia
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,51 @@ from rodfem.problem.roles import derived
 
 NAMES = ("strain", "curvature", "force", "moment")
 """Of the fields, as files have them."""
-AXES = np.eye(4)[1:]
-"""Unit vectors as quaternions."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """An equilibrium along the rod, at m arclengths.
+
+    Attributes
+    ----------
+    s
+        Arclengths (m,).
+    r
+        Centreline, components in space (m, 3).
+    directors
+        Directors d1, d2, d3 as rows, components in space (m, 3, 3).
+    strain, curvature
+        Components along the directors (m, 3): ``v``, nondimensional, and ``k``, one over length.
+    force, moment
+        Contact force ``n`` and moment ``m`` by which what is beyond s acts, components along the directors (m, 3).
+    """
+
+    s: np.ndarray
+    r: np.ndarray
+    directors: np.ndarray
+    strain: np.ndarray
+    curvature: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+    @property
+    def force_in_space(self) -> np.ndarray:
+        """Contact force, components in space (m, 3)."""
+        return self.in_space(self.force)
+
+    @property
+    def moment_in_space(self) -> np.ndarray:
+        """Contact moment, components in space (m, 3)."""
+        return self.in_space(self.moment)
+
+    def in_space(self, components: np.ndarray) -> np.ndarray:
+        """Components in space of vectors (m, 3) along the directors."""
+        return np.asarray(np.einsum("sij,si->sj", self.directors, components))
+
+    def __repr__(self) -> str:
+        """Places and ends."""
+        return f"<Profile at {len(self.s)} arclengths from {self.s[0]:.6g} to {self.s[-1]:.6g}>"
 
 
 class Resultants:
@@ -56,16 +100,46 @@ class Resultants:
         points = self.shape.from_left(self.shape.start[:, None] + self.shape.size[:, None] * self.places)
         return {"points": points} | self._values(x, self.places)
 
+    def profile(self, x: PETSc.Vec, s: np.ndarray | None = None) -> Profile:
+        """Shape, strains, force and moment at the state ``x``, at the nodes or at arclengths ``s`` (m,).
+
+        Where two elements meet it is the mean of both: force and moment have half of what acts there.
+        """
+        ends = self.shape.from_left(self.shape.start)
+        s = self.shape.sample(x)["s"] if s is None else np.asarray(s, dtype=float)
+        lower, upper = (np.clip(np.searchsorted(ends, s, side) - 1, 0, None) for side in ("left", "right"))
+        return self.on_elements(x, s, np.array([lower, upper]))
+
+    def on_elements(self, x: PETSc.Vec, s: np.ndarray, elements: np.ndarray) -> Profile:
+        """The same at places of given ``elements`` (k, m), of which it is the mean."""
+        shape, sample, whole = self.shape, self.shape.sample(x), self._table(x)
+        start, size = (shape.from_left(y) for y in (shape.start, shape.size))
+        degree, first = len(shape.nodes) - 1, elements[0]
+        basis = _basis(shape.nodes, (s - start[first]) / size[first])
+        own = degree * first[:, None] + np.arange(degree + 1)
+        r, q = (np.einsum("mn,mni->mi", basis, sample[name][own]) for name in ("r", "q"))
+        strains, forces = np.zeros((2, len(s), 2, 3))
+        for e in elements:
+            t = (s - start[e]) / size[e]
+            strains += np.einsum("mn,mnij->mij", _basis(self.nodes[1:-1], t), whole[e, 1:-1, :2]) / len(elements)
+            forces += np.einsum("mn,mnij->mij", _basis(self.nodes, t), whole[e, :, 2:]) / len(elements)
+        return Profile(s, r, np.swapaxes(directors(q), -1, -2), *strains.swapaxes(0, 1), *forces.swapaxes(0, 1))
+
     def _values(self, x: PETSc.Vec, places: np.ndarray) -> dict[str, np.ndarray]:
         """All fields at ``places`` (p,) in [0, 1] of each element from left to right, (elements, p, 3)."""
-        values = self.shape.system.at(x).evaluate(self._evaluate)
-        whole = self.shape.from_left(values.reshape(len(values), -1, len(NAMES), 3))
-        for i, ends in enumerate(self.ends(x)):
-            whole[:, [0, -1], 2 + i] = np.where(np.isfinite(ends), ends, whole[:, [0, -1], 2 + i])
+        whole = self._table(x)
         inside, every = _basis(self.nodes[1:-1], places), _basis(self.nodes, places)
         strains = np.einsum("pn,enij->epij", inside, whole[:, 1:-1, :2])
         forces = np.einsum("pn,enij->epij", every, whole[:, :, 2:])
         return dict(zip(NAMES, np.moveaxis(np.concatenate([strains, forces], axis=2), 2, 0), strict=True))
+
+    def _table(self, x: PETSc.Vec) -> np.ndarray:
+        """All fields at the nodes of the polynomials of each element from left to right, (elements, nodes, 4, 3)."""
+        values = self.shape.system.at(x).evaluate(self._evaluate)
+        whole = self.shape.from_left(values.reshape(len(values), -1, len(NAMES), 3))
+        for i, ends in enumerate(self.ends(x)):
+            whole[:, [0, -1], 2 + i] = np.where(np.isfinite(ends), ends, whole[:, [0, -1], 2 + i])
+        return whole
 
     def ends(self, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
         """Contact force and moment at both ends of each element by its residual, (elements, 2, 3); nan: not known.
@@ -80,7 +154,7 @@ class Resultants:
         rows = pieces.rows[fields.turning.name][order]
         q = fields.turning.quaternion(local[:, rows])
         weights = fields.turning.functional(local[:, rows], residual[:, rows])
-        turned = product(q[..., None, :], AXES)  # changes of q, doubled, with turns about the directors
+        turned = product(q[..., None, :], turns())  # changes of q, doubled, with turns about the directors
         moment = outwards * np.einsum("ceij,cej->cei", turned, weights) / 2
         if (normal := system.scene.normal) is not None:
             moment[..., [i for i in range(3) if i != normal]] = np.nan
@@ -104,6 +178,11 @@ class Resultants:
             force += ufl.diff(density, along.dr)
         force, moment = ufl.dot(ufl.transpose(along.R), force), ufl.diff(density, along.k)
         return [vector[i] for vector in (along.v, along.k, force, moment) for i in range(3)]
+
+
+def turns() -> np.ndarray:
+    """Unit vectors as quaternions (3, 4): ``product`` with one is twice the change of a quaternion by that turn."""
+    return np.eye(4)[1:]
 
 
 def _basis(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:

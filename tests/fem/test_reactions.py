@@ -1,0 +1,170 @@
+"""Reactions and profiles against statics and a shooting solution: forces and moments of the whole rod balance."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+
+import rodfem
+from rodfem import Attachment, Discretization, Ordinate, Parameter, Plan, Scene, clamped, elastic, free, hinged, pinned
+from rodfem.forms.energy import bending_and_twist, hemitropic
+
+pytestmark = pytest.mark.alone
+TIP = (0.15, 0.1, 0.9)
+FORCE = (0.4, -0.3, 0.2)
+
+
+def turned(angle: Any) -> tuple[Any, ...]:
+    return (ufl.cos(angle / 2), 0.0, ufl.sin(angle / 2), 0.0)
+
+
+LEFT: dict[str, Any] = {
+    "clamped": clamped(),
+    "pinned": pinned(lambda c: (0.0, 0.0, 0.0)),
+    "hinged": hinged((0.0, 1.0, 0.0), lambda c: (0.0, 0.0, 0.0)),
+    "sprung": elastic(lambda c: 1e3, lambda c: 5.0),
+}
+RIGHT: dict[str, Any] = {
+    "clamped": clamped(lambda c: TIP, lambda c: turned(0.5 * c.P)),
+    "pinned": pinned(lambda c: (TIP[0], TIP[1] + 0.05 * c.P, TIP[2])),
+    "guided": rodfem.sliding_hinge((0.0, 1.0, 0.0), (0.6, 0.0, 0.8), lambda c: TIP, lambda c: turned(0.3 + 0 * c.P)),
+    "sliding": rodfem.sliding(lambda c: (0.15, 0.1, None), force=lambda c: (0.0, 0.0, -c.P)),
+}
+
+
+def rod(left: Any, right: Any, formulation: str = "auto") -> rodfem.Point:
+    """The rod between two ends, pulled aside at 0.4, at the end of its range."""
+    scene = Scene(
+        "reactions",
+        (0.0, 1.0),
+        "flexible",
+        lambda v, k, c: (
+            bending_and_twist(k, (1.0, 1.5, 0.8)) + 50.0 * (v[0] ** 2 + v[1] ** 2 + 2.0 * (v[2] - 1.0) ** 2)
+        ),
+        {"P": Parameter(0.0)},
+        "P",
+        (left, right),
+        Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
+        (0.0, 1.5),
+        attachments=() if formulation == "reduced" else (Attachment(0.4, force=lambda c: [c.P * x for x in FORCE]),),
+        start=lambda s: np.stack([np.cos(0.25 * s), 0 * s, np.sin(0.25 * s), 0 * s], axis=1),
+    )
+    diagram = rodfem.trace(scene, Discretization(formulation), Plan(depth=0, error_bars=False))
+    return diagram[0].points[-1]
+
+
+def about_the_origin(r: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    return np.append(force, moment + np.cross(r, force))
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize(
+    ("left", "right"), [("clamped", "clamped"), ("clamped", "pinned"), ("hinged", "guided"), ("hinged", "sliding")]
+)
+def test_forces_and_moments_balance(left: str, right: str, formulation: str) -> None:
+    point = rod(LEFT[left], RIGHT[right], formulation)
+    found, r = point.reactions, point.profile([0.0, 0.4, 1.0]).r
+    push = np.array([0.0, 0.0, -point.load]) if right == "sliding" else np.zeros(3)
+    total = about_the_origin(r[0], *found.left) + about_the_origin(r[2], found.right.force + push, found.right.moment)
+    for attached in found.attached:
+        assert np.allclose(np.concatenate(attached), [*(point.load * np.array(FORCE)), 0.0, 0.0, 0.0], atol=1e-8)
+        total += about_the_origin(r[1], *attached)
+    assert len(found.attached) == (formulation == "pointwise") and np.allclose(total, 0.0, atol=1e-8)
+    assert abs(found.left.force).max() > 0.1
+
+
+def test_supports_resist_what_they_hold_alone() -> None:
+    """A pin has no moment, a hinge none about its axis, a guide no force along it, a spring end no support."""
+    pin = rod(LEFT["pinned"], RIGHT["guided"]).reactions
+    hinge = rod(LEFT["hinged"], RIGHT["sliding"]).reactions
+    assert abs(pin.left.moment).max() < 1e-8 and abs(hinge.left.moment[1]) < 1e-8 < abs(hinge.left.moment).max()
+    assert abs(pin.right.force @ [0.6, 0.0, 0.8]) < 1e-8 < abs(pin.right.force).max()
+    assert abs(hinge.right.force[2]) < 1e-8
+    sprung = rod(LEFT["sprung"], RIGHT["clamped"])
+    assert np.allclose(np.concatenate(sprung.reactions.left), 0.0, atol=1e-7)
+    assert abs(sprung.force[0]).max() > 0.1  # the spring is a load
+
+
+def test_a_turning_clamp_has_the_moment_that_does_its_work() -> None:
+    """``dV = moment . dangle``: the difference of the potential of two states at neighbouring angles of the clamp."""
+    scene = Scene(
+        "turning",
+        (0.0, 1.0),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist(k, (1.0, 1.5, 0.8)),
+        {"a": Parameter(0.0)},
+        "a",
+        (clamped(lambda c: (0.0, 0.0, 0.0), lambda c: turned(c.a)), clamped(lambda c: (0.2, 0.0, 0.9))),
+        Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
+        (0.0, 1.0),
+        start=lambda s: np.stack([np.cos(0.5 * np.sin(pi * s)), 0 * s, np.sin(0.5 * np.sin(pi * s)), 0 * s], axis=1),
+    )
+    solver, h = rodfem.Solver(scene), 1e-4
+    middle = solver.equilibrium(0.5, solver.equilibrium(0.25, solver.equilibrium(0.0)))
+    above, below = solver.equilibrium(0.5 + h, middle), solver.equilibrium(0.5 - h, middle)
+    work = (above.potential - below.potential) / (2 * h)
+    assert middle.reactions.left.moment[1] == pytest.approx(work, rel=1e-6)
+    assert abs(work) > 0.1
+
+
+def cable() -> Scene:
+    """Power cable of 300 m: EI = 1e4 N m2, EA = 3e8 N, 250 N/m, clamped level at the sea bed, pinned 90 m up."""
+    turn = lambda s: 0.6 - 1.05 * np.cos(pi * s / 300.0)  # noqa: E731
+    return Scene(
+        "cable",
+        (0.0, 300.0),
+        "unshearable",
+        lambda v, k, c: 1.5e8 * (v[2] - 1) ** 2 + 5e3 * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
+        {"x": Parameter(170.0)},
+        "x",
+        (clamped(), pinned(lambda c: (90.0, 0.0, c.x))),
+        Ordinate("height", s=150.0, of=lambda r, q: r[0]),
+        (170.0, 171.0),
+        distributed=lambda c: (-250.0, 0.0, 0.0),
+        planar="e2",
+        start=lambda s: np.stack([np.cos(turn(s)), 0 * s, np.sin(turn(s)), 0 * s], axis=1),
+    )
+
+
+def test_the_moment_at_a_clamp_of_a_boundary_layer() -> None:
+    """A layer of 0.8 m in an element of 6 m; right by scipy's solve_bvp, tolerance 1e-8."""
+    right, errors = -18267.15072958902, []
+    for elements in (24, 48):
+        diagram = rodfem.trace(cable(), Discretization(elements=elements), Plan(at=(170.0,), depth=0, error_bars=False))
+        point = diagram.at(170.0)[0]
+        assert point.moment[0, 1] == pytest.approx(-point.reactions.left.moment[1], rel=1e-12)
+        errors.append(abs(point.moment[0, 1] / right - 1))
+    assert errors[0] < 0.035 and errors[1] < 0.002  # 0.19 and 0.023 by the curvature there
+
+
+def test_profiles_of_a_helix() -> None:
+    """A hemitropic rod that is free at one end, under a moment along its axis, is straight: by Hooke's law alone."""
+    scene = Scene(
+        "twisted",
+        (0.0, 2.0),
+        "flexible",
+        lambda v, k, c: (
+            hemitropic(v, k, stretching=10.0, coupling=-1.0, twisting=1.0, bending=1.0) + 50.0 * (v[0] ** 2 + v[1] ** 2)
+        ),
+        {"P": Parameter(0.0)},
+        "P",
+        (clamped(), free(lambda c: (0.0, 0.0, c.P))),
+        Ordinate("end", s=2.0, of=lambda r, q: r[2]),
+        (0.0, 1.0),
+    )
+    point = rodfem.Solver(scene).equilibrium(1.0)
+    stretch, twist = np.linalg.solve([[10.0, -1.0], [-1.0, 1.0]], [1.0, 0.0])
+    places = np.array([0.0, 0.3, 1.1, 2.0])
+    found = point.profile(places)
+    assert np.allclose(found.r, places[:, None] * [0.0, 0.0, 1.0 + stretch], atol=1e-9)
+    assert np.allclose(found.curvature, [0.0, 0.0, twist], atol=1e-9)
+    assert np.allclose(found.force_in_space, [0.0, 0.0, 1.0], atol=1e-9) and abs(found.moment).max() < 1e-9
+    turn = twist * places
+    assert np.allclose(found.directors[:, 0], np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1), atol=1e-8)
+    assert point.s[[0, -1]].tolist() == [0.0, 2.0] and np.allclose(point.r[-1], found.r[-1])
+    with pytest.raises(rodfem.InputError, match="from 0 to 2"):
+        point.profile([2.1])
