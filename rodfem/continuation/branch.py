@@ -68,8 +68,8 @@ class Point:
         load.
     negative_in_space
         Index in space of a planar rod; None: not computed.
-    mesh, solver
-        Number of the discretisation that ``x`` belongs to, and its solver.
+    mesh, solver, branch
+        Number of the discretisation that ``x`` belongs to, its solver, and the name of the branch.
     estimate
         Error of the discretisation in load and ordinate, where an accuracy was asked for.
     soft
@@ -105,6 +105,7 @@ class Point:
     conjugate: float = float("nan")
     kink: str = ""
     solver: BranchSolver | None = field(default=None, compare=False)
+    branch: str = field(default="", compare=False)
 
     @property
     def index(self) -> int:
@@ -458,9 +459,11 @@ class Branch:
             special.point = others.get(id(special.point), special.point)
 
     def renumber(self) -> None:
-        """Sort points and special points along the branch and set their rows."""
+        """Sort points and special points along the branch, set their rows, and name the branch of the points."""
         self.points.sort(key=lambda p: p.arclength)
         row = {id(p): i for i, p in enumerate(self.points)}
+        for point in self.points:
+            point.branch = self.name
         self.special.sort(key=lambda s: s.point.arclength)
         for special in self.special:
             special.row = row[id(special.point)]

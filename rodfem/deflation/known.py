@@ -3,13 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.errors import ConvergenceError
 from rodfem.tolerances import APART
+
+
+class Coexisting(NamedTuple):
+    """An equilibrium with its symmetric copies: so many mirror images, itself among them.
+
+    Continuous symmetries that it breaks, ``freedoms`` of them, make a circle (a torus, a line) of each.
+    """
+
+    point: Point
+    images: int
+    freedoms: int
+
+
+def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
+    """An equilibrium with the number of its copies."""
+    system, known, phase = solver.system, Orbits(solver.system), solver.system.phase
+    known.add(point.x)
+    images = [mirror(system, point.x) for mirror in mirrors(system, point.x)]
+    system.phase, count = phase, 1
+    for x in images:
+        if all(apart >= APART for apart, _ in known.nearest(x)):
+            known.add(x)
+            count += 1
+    return Coexisting(point, count, system.active_drifts(point.x))
 
 
 def equilibria_at(
@@ -25,6 +51,7 @@ def equilibria_at(
     for branch in branches:
         for point in _along(solver, [here(p) for p in branch.points], load, singular_states(branch)):
             if all(apart >= APART for apart, _ in known.nearest(point.x)):
+                point.branch = branch.name
                 found.append(point)
                 known.add(point.x)
     return found

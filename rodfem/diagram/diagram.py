@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from html import escape
 from numbers import Integral
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
@@ -14,7 +15,8 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import EVENT, KINDS
 from rodfem.continuation.step_control import StepControl
-from rodfem.deflation.known import equilibria_at
+from rodfem.deflation.known import Coexisting, equilibria_at, with_copies
+from rodfem.diagram import tables
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
 from rodfem.errors import ConvergenceError, InputError
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 
     from rodfem.codim2.locus import Locus
     from rodfem.output.snapshot import Snapshot
+    from rodfem.report.page import Page
 
 
 class Diagram:
@@ -157,6 +160,14 @@ class Diagram:
                 "finest, which has it at another load: take its own point, or ask for a load beside it."
             ) from trouble
         return [self.solver(point).examined(point, special=self._special_at(point)) for point in found]
+
+    @checked(load=number(1.0))
+    def states(self, load: float) -> list[Coexisting]:
+        """All equilibria at a load, as :meth:`at` finds them, each with the number of its symmetric copies.
+
+        A diagram has one of mirror images, and of a circle of states: ``.images`` and ``.freedoms`` count them.
+        """
+        return [with_copies(self.solvers[point.mesh], point) for point in self.at(load)]
 
     @checked(point=POINT)
     def solver(self, point: Point | SpecialPoint) -> Solver:
@@ -301,6 +312,30 @@ class Diagram:
         from rodfem.output.summary import in_sentences
 
         return "\n".join(in_sentences(self.data))
+
+    def to_dataframe(self) -> Any:
+        """All rows as a ``pandas.DataFrame``; raises :class:`~rodfem.errors.SetupError` without pandas."""
+        return tables.dataframe(self)
+
+    def to_xarray(self) -> Any:
+        """All rows as an ``xarray.Dataset``: their numbers, shape, strains, forces and moments, with coordinates.
+
+        Raises :class:`~rodfem.errors.SetupError` without xarray.  Collective.
+        """
+        return tables.dataset(self)
+
+    def view(self) -> Page:
+        """Make the page that ``rodfem view`` opens: a notebook shows it, ``.open()`` a browser; collective."""
+        from rodfem.report.page import Page, page_of
+        from rodfem.report.payload import payload_of
+
+        comm = self.solvers[0].system.comm
+        with TemporaryDirectory() as folder:
+            shared = Path(comm.bcast(folder))
+            self.save(shared)
+            html = page_of(payload_of(shared)) if comm.rank == 0 else ""
+            comm.barrier()
+        return Page(html)
 
     @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:

@@ -6,13 +6,16 @@ Modules stand in an import map as data URLs, so that they need no bundler and wo
 from __future__ import annotations
 
 import re
+import webbrowser
 from base64 import b64encode
 from collections.abc import Mapping
+from dataclasses import dataclass
 from hashlib import sha256
 from html import escape
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 from rodfem.report.packing import script_json
@@ -23,6 +26,31 @@ STATIC = files("rodfem.report") / "static"
 LIBRARIES = {"three": "three.module.min.js", "three/orbit": "OrbitControls.js"}
 PLACE = re.compile(r"\{\{(\w+)\}\}")
 """A place in the template."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report as one page, which a notebook shows; empty on all ranks but the first."""
+
+    html: str
+
+    def __repr__(self) -> str:
+        """Size."""
+        return f"<Page of {len(self.html) / 1e6:.1f} MB: .open() shows it in a browser, .save(path) keeps it>"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{escape(self.html)}" width="100%" height="800" style="border: 0"></iframe>'
+
+    def save(self, path: Path | str) -> Path:
+        """Write it; raises :class:`~rodfem.errors.InputError` where it cannot be written."""
+        path = Path(path)
+        write_whole({path: self.html.encode()})
+        return path
+
+    def open(self) -> None:
+        """Show it in the browser, from a temporary file."""
+        if self.html:
+            webbrowser.open(self.save(Path(mkdtemp()) / "report.html").as_uri())
 
 
 def write_report(folder: Path, path: Path | None = None) -> Path:
