@@ -34,11 +34,11 @@ class Reaction(NamedTuple):
 class Reactions(NamedTuple):
     """Reactions of the supports of the ``left`` and ``right`` end, and of what is attached inside, from left to right.
 
-    A closed rod has no ends: None.
+    A closed rod has no supports: zero.
     """
 
-    left: Reaction | None
-    right: Reaction | None
+    left: Reaction
+    right: Reaction
     attached: tuple[Reaction, ...]
 
 
@@ -48,7 +48,7 @@ def reactions(resultants: Resultants, x: PETSc.Vec) -> Reactions:
     s = np.array(scene.interval)
     ends = resultants.on_elements(x, s, np.array([[0, len(starts) - 1]]))
     contact = np.array([[-1.0], [1.0]]) * np.stack([ends.force_in_space, ends.moment_in_space])  # (2, side, 3)
-    left, right = (None if scene.closed else _of_support(resultants, x, i, contact[:, i]) for i in range(2))
+    left, right = (_of_support(resultants, x, i, contact[:, i]) for i in range(2))
     places = np.array(sorted({a.s for a in scene.attachments if scene.is_inside(a.s)}))
     after = np.searchsorted(starts, places - SAME_PLACE * scene.length)
     below, above = (resultants.on_elements(x, places, after[None] - back) for back in (1, 0))
@@ -63,6 +63,8 @@ def _of_support(resultants: Resultants, x: PETSc.Vec, side: int, contact: np.nda
     """
     shape = resultants.shape
     system, fields, scene = shape.system, shape.system.fields, shape.system.scene
+    if scene.closed:
+        return Reaction(np.zeros(3), np.zeros(3))
     state, local, (force, moment) = system.at(x), system.at(x).local.copy(), contact.copy()
     for unknown, copies in zip(fields.unknown_scalars, fields.copies.T, strict=False):
         if unknown.group.name in {letter + LETTERS[side] for letter in SUPPORTS}:

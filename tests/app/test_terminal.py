@@ -175,7 +175,7 @@ def test_modules_are_attributes() -> None:
     """In an interpreter that has loaded nothing else, as ``import rodfem; help(rodfem.modes.modes)``."""
     if not FIRST:
         return
-    pages = ["README.md", "docs/rods.md", "rodfem/__init__.py"]
+    pages = ["README.md", "docs/running.md", "docs/rods.md", "rodfem/__init__.py"]
     text = "".join((HOME / page).read_text() for page in pages)
     named = {name for name in re.findall(r"\b(rodfem\.[a-zA-Z_.]*[a-zA-Z_])", text) if "XX" not in name}
     paths = re.findall(r"`([a-z_0-9]+(?:/[a-z_0-9]+)+)\.py`", (HOME / "docs" / "architecture.md").read_text())
@@ -201,7 +201,8 @@ def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, cap
     monkeypatch.setattr("rodfem.app.run.draw", lambda *_: None)
     monkeypatch.chdir(folder)
     names: dict[str, Any] = {}
-    for block in re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL):
+    pages = "".join((HOME / page).read_text() for page in ("README.md", "docs/python.md"))
+    for block in re.findall(r"```python\n(.*?)```", pages, flags=re.DOTALL):
         exec(block, names)
     solver, straight, buckled = names["solver"], names["straight"], names["buckled"]
     assert (straight.index, buckled.index, buckled.zero, buckled.load) == (2, 0, 1, 0.52)

@@ -99,15 +99,16 @@ def test_source_distribution_is_the_repository(built: dict[str, Path]) -> None:
     assert found - added == files(built["tree"])
 
 
-def test_wheel_in_a_bare_environment_runs_the_example_of_the_readme(built: dict[str, Path], tmp_path: Path) -> None:
-    """The cord of the README, by a Python that has dolfinx and the wheel alone, in a folder of its own."""
+def test_wheel_in_a_bare_environment_runs_an_example(built: dict[str, Path], tmp_path: Path) -> None:
+    """The cord of docs/python.md, by a Python that has dolfinx and the wheel alone, in a folder of its own."""
     venv.create(tmp_path / "bare", system_site_packages=True, symlinks=True)
     python = tmp_path / "bare" / "bin" / "python"
     subprocess.run(
         [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--disable-pip-version-check",
          "--no-index", "--no-deps", str(built["wheel"])], check=True, cwd=tmp_path,
     )  # fmt: skip
-    blocks = re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL)
+    page = (HOME / "docs" / "python.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     cord = next(block for block in blocks if 'name="cord"' in block)
     cord = re.sub(r"^picture = .*$", "", cord, flags=re.M)  # needs the extra viz
     (tmp_path / "example.py").write_text(cord + "\nprint(rodfem.__file__)\n")

@@ -1,4 +1,4 @@
-"""Every command of the README, as it stands and in its order: what a reader types, one after the other."""
+"""Every command of README and docs/running.md, in their order: what a reader types, one after the other."""
 
 from __future__ import annotations
 
@@ -33,10 +33,15 @@ OURS |= {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg", "HWLOC_HIDE_ERRORS": "2", 
 pytestmark = pytest.mark.alone
 
 
+def pages() -> str:
+    """Text of the pages without their Python."""
+    text = "\n".join((HOME / page).read_text() for page in ("README.md", "docs/running.md"))
+    return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+
+
 def commands() -> list[str]:
-    """Lines of the README that are indented by four spaces and begin with a program, without their comments."""
-    text = re.sub(r"```.*?```", "", (HOME / "README.md").read_text(), flags=re.DOTALL)
-    lines = [line[4:].partition("  # ")[0].strip() for line in text.splitlines() if line.startswith("    ")]
+    """Lines of these pages that are indented by four spaces and begin with a program, without their comments."""
+    lines = [line[4:].partition("  # ")[0].strip() for line in pages().splitlines() if line.startswith("    ")]
     return [DEMO, *(line for line in lines if line.partition(" ")[0] in PROGRAMS)]
 
 
@@ -46,12 +51,16 @@ def own_rod() -> str:
 
 
 def test_all_commands_are_found() -> None:
-    text = re.sub(r"```.*?```", "", (HOME / "README.md").read_text(), flags=re.DOTALL)
-    lines = re.findall(r"^    ((?:rodfem|python|mpirun|make|docker|tools/).*)", text, flags=re.MULTILINE)
+    lines = re.findall(r"^    ((?:rodfem|python|mpirun|make|docker|tools/).*)", pages(), flags=re.MULTILINE)
     here = [line for line in lines if not line.startswith(ELSEWHERE)]
     assert len(here) == len(commands()) - 1 > 20
-    pages = [HOME / "README.md", *(HOME / "docs" / "course").glob("*.md"), *(HOME / "demos").glob("*.py")]
-    named = [page.name for page in pages if BY_HAND.search(page.read_text())]
+    found = [
+        HOME / "README.md",
+        *(HOME / "docs").glob("*.md"),
+        *(HOME / "docs" / "course").glob("*.md"),
+        *(HOME / "demos").glob("*.py"),
+    ]
+    named = [page.name for page in found if BY_HAND.search(page.read_text())]
     assert not named, "one way to call a program: without a path"
 
 

@@ -53,12 +53,13 @@ def installed(folder: Path) -> Path:
 
 @pytest.mark.long
 def test_types_of_an_installed_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The README's scripts are accepted by ``mypy --strict`` elsewhere, and no public name is ``Any`` there."""
+    """README and docs/python.md are accepted by ``mypy --strict`` elsewhere, and no public name is ``Any`` there."""
     api = pytest.importorskip("mypy.api", reason="mypy is not installed: `make lint` does that")
     for variable in ("PYTHONPATH", "MYPYPATH"):
         monkeypatch.delenv(variable, raising=False)
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL)
+    pages = "".join((HOME / page).read_text() for page in ("README.md", "docs/python.md"))
+    blocks = re.findall(r"```python\n(.*?)```", pages, flags=re.DOTALL)
     Path("readme.py").write_text("".join(blocks))
     revealed = [f"reveal_type(rodfem.{name})" for name in rodfem._HOMES]
     wrong = "rodfem.Parameter('one')"
