@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import Kind
+from rodfem.continuation.natural_shape import natural_shape, sampled, uniform_turn
 from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.regular_point import RegularPoints
 from rodfem.errors import ConvergenceError, SceneError
@@ -141,17 +142,36 @@ class BranchSolver:
     def start(self, load: float, bent: float = 0.0) -> PETSc.Vec:
         """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces.
 
-        ``bent`` is the size, in radian, of a smooth rotation on top: a taut straight rod is a singular place to start.
+        Without one it is straight, and turned as its ends are.  ``bent`` is the size, in radian, of a smooth rotation
+        on top: a taut straight rod is a singular place to start.
         """
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
-        turned = f.turning.start(system.scene.start, x.ravel(), system.scene.interval)
+        start = system.scene.start or uniform_turn(system.scene, load)
+        turned = f.turning.start(start, x.ravel(), system.scene.interval)
         if bent:
             along = (x.ravel() - system.scene.interval[0]) / system.scene.length
             turned = f.turning.turned(turned, bent * _bend(along))
         undeformed = np.array([1.0 if i == 2 else 0.0 for i in system.scene.free_strains])
-        named = {f.turning.name: turned.reshape(*x.shape, -1), "v": undeformed, LOAD: load}
-        return self.shape.with_centreline(NodalValues(f, f.filled(named), system.line))
+        return self._shaped(turned, undeformed, load)
+
+    def natural(self, load: float) -> PETSc.Vec | None:
+        """The rod at rest at ``load`` as a first guess; None with a start of the scene, or if it does not fit."""
+        system, f = self.system, self.system.fields
+        found = None if system.scene.start is not None else natural_shape(system.scene, load)
+        if found is None:
+            return None
+        x, v = (f.coordinates(degree) for degree in (f.discretization.degree, f.discretization.degree - 1))
+        turned = f.turning.start(lambda s: sampled(found.s, found.q, s), x.ravel(), system.scene.interval)
+        strains = sampled(found.s, found.v[:, list(system.scene.free_strains)], v.ravel())
+        return self._shaped(turned, strains.reshape(*v.shape, -1), load)
+
+    def _shaped(self, turned: np.ndarray, v: np.ndarray, load: float) -> PETSc.Vec:
+        """State of these rotations and strains at the nodes, and the centreline that they integrate to."""
+        f = self.system.fields
+        nodes = f.coordinates(f.discretization.degree).shape
+        named = {f.turning.name: turned.reshape(*nodes, -1), "v": v, LOAD: load}
+        return self.shape.with_centreline(NodalValues(f, f.filled(named), self.system.line))
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = FAR) -> tuple[PETSc.Vec, NewtonResult]:
         """Equilibrium at exactly ``load`` by Newton's method from ``guess``, at a distance of ``reach`` at most."""

@@ -29,13 +29,18 @@ ASIDE = 0.1
 
 
 def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
-    """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
+    """First equilibrium at ``load``: the rod at rest if that is near one, else from the scene's start.
 
-    Newton's method begins without forces.  Where it strays from a start that has an equilibrium right beside it,
-    found from the forces that balance the start best, that is the first one, stable or not.  The way down is also
-    taken where Newton's method ends at an unstable equilibrium that is nowhere near the start.  Of a family of
-    equilibria it is the one next to the start, whatever round-off would make of it.
+    From there by Newton's method, or else by going downhill.  Newton's method begins without forces.  Where it strays
+    from a start that has an equilibrium right beside it, found from the forces that balance the start best, that is the
+    first one, stable or not.  The way down is also taken where Newton's method ends at an unstable equilibrium that is
+    nowhere near the start.  Of a family of equilibria it is the one next to the start, whatever round-off would make of
+    it.
     """
+    if (natural := solver.natural(load)) is not None:
+        x, outcome = solver.at_load(natural, load, reach=1.0)
+        if _turned(solver.system, natural, x) < STRAYED and examined(solver, x, outcome)[1]:
+            return x, outcome
     guess = solver.start(load)
     x, outcome = solver.at_load(guess, load)
     if not (outcome.converged and _turned(solver.system, guess, x) < STRAYED):

@@ -1,0 +1,163 @@
+r"""Where a computation begins without a scene's own start: the natural shape of the rod, or a straight one.
+
+The natural strains minimise the stored energy: ``W(v0, k0) <= W(v, k)`` at each arclength, by Newton's method with the
+second derivative at the undeformed state: exactly, if the energy is quadratic.  They are those of a shape,
+``q' = q k0/2``, ``r' = R v0``, which a rigid motion brings to the ends of the rod.  If it fits there, it is the start:
+the rod at rest.
+
+A straight rod is turned as its ends are: from the rotation of the left one to that of the right one, uniformly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from rodfem.errors import SceneError
+from rodfem.forms.kinematics import UNDEFORMED
+from rodfem.forms.rotation import IDENTITY
+from rodfem.problem.kinds import plain
+from rodfem.problem.quaternions import CONJUGATE, directors, of_vector, product
+from rodfem.problem.scene import Scene
+
+SAMPLES = 33
+"""Arclengths at which natural strains are computed, if they vary."""
+STEPS = 2000
+"""Steps of the integration along the rod."""
+SETTLED, STEP = 1e-8, 1e-5
+"""Change of the natural strains, in natural units, at which Newton's method ends; step of its difference quotients."""
+FITS = 1e-6
+"""Distance from the ends, over the rod's length and in radian, within which a shape fits."""
+
+
+class NaturalShape(NamedTuple):
+    """Arclengths ``s`` (m,), quaternions ``q`` (m, 4) and strains ``v`` (m, 3) of a rod at rest."""
+
+    s: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+
+
+def natural_shape(scene: Scene, load: float) -> NaturalShape | None:
+    """The unstressed shape between the ends of a scene at a ``load``; None if it is straight, or does not fit there."""
+    if scene.closed or (strains := _natural_strains(scene, load)) is None:
+        return None
+    s = np.linspace(*scene.interval, STEPS + 1)
+    middle = strains((s[1:] + s[:-1]) / 2)
+    q = np.empty((STEPS + 1, 4))
+    q[0] = IDENTITY
+    for i, turn in enumerate(of_vector(middle[:, 3:] * np.diff(s)[:, None])):
+        q[i + 1] = product(q[i], turn)
+    halfway = directors(product(q[:-1], of_vector(middle[:, 3:] * np.diff(s)[:, None] / 2)))
+    slopes = np.einsum("sij,sj->si", halfway, middle[:, :3])
+    r = np.vstack([np.zeros(3), np.cumsum(slopes * np.diff(s)[:, None], axis=0)])
+    turned = _placed(scene, load, q, r)
+    return None if turned is None else NaturalShape(s, turned, strains(s)[:, :3])
+
+
+def _natural_strains(scene: Scene, load: float) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Natural strains (m, 6) as a function of arclengths (m,); None if they are the undeformed ones."""
+    places = np.linspace(*scene.interval, SAMPLES) if scene.depends_on_s() else np.array([scene.interval[0]])
+    found = [x for x in (_least(scene, load, float(s)) for s in places) if x is not None]
+    if len(found) < len(places) or not np.array(found).any():
+        return None
+    values = np.array([*UNDEFORMED, 0.0, 0.0, 0.0]) + found
+    if len(places) == 1:
+        return lambda s: np.tile(values, (len(s), 1))
+    return PchipInterpolator(places, values, axis=0)
+
+
+def _least(scene: Scene, load: float, s: float) -> np.ndarray | None:
+    """Change (6,) of the undeformed strains that minimises the energy at ``s``; None if Newton's method finds none."""
+    every, normal = [*scene.free_strains, 3, 4, 5], scene.normal
+    free = [i for i in every if normal is None or (i - 3 == normal if i > 2 else i != normal)]  # in its plane
+    chosen = [every.index(i) for i in free]
+    c, unit = scene.constants(load, s), np.where(np.arange(6) < 3, 1.0, 1.0 / scene.length)
+    stiffness = scene.stiffness(s if scene.depends_on_s() else None)[np.ix_(chosen, chosen)]
+    x = np.zeros(6)
+    for _ in range(20):
+        try:
+            slope = [_slope(scene, x, i, unit[i], c) for i in free]
+        except SceneError:  # the energy is not defined there
+            return None
+        step = np.linalg.solve(stiffness, slope)
+        x[free] -= step
+        if not np.isfinite(x).all():
+            return None
+        if (abs(step) <= SETTLED * unit[free]).all():
+            return np.where(abs(x) <= SETTLED * unit, 0.0, x)
+    return None
+
+
+def _slope(scene: Scene, x: np.ndarray, i: int, h: float, c: Any) -> float:
+    """Derivative of the energy in strain ``i`` by a central difference, which is exact for a quadratic energy."""
+    ahead, back = x.copy(), x.copy()
+    ahead[i], back[i] = x[i] + STEP * h, x[i] - STEP * h
+    return (scene.energy_at(ahead[:3], ahead[3:], c) - scene.energy_at(back[:3], back[3:], c)) / (2 * STEP * h)
+
+
+def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> np.ndarray | None:
+    """Quaternions of a shape turned to where the ends are held; None if it does not fit."""
+    frames = [rotation_of(scene, load, side) for side in range(2)]
+    held = [_positions(scene, load, side) for side in range(2)]
+    chord = np.array([np.nan if a is None or b is None else b - a for a, b in zip(*held, strict=True)])
+    if frames[0] is not None:
+        turn = frames[0]
+    elif frames[1] is not None:
+        turn = product(frames[1], q[-1] * CONJUGATE)
+    else:
+        turn = _aligned(r[-1], chord)
+    turned = product(turn, q)
+    far = directors(turn) @ r[-1] - chord
+    off = abs(far[np.isfinite(far)]).max(initial=0.0) / scene.length
+    if frames[0] is not None and frames[1] is not None:
+        off = max(off, 2 * np.sqrt(max(1.0 - float(turned[-1] @ frames[1]) ** 2, 0.0)))
+    return turned if off < FITS else None
+
+
+def _aligned(chord: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Shortest rotation of a ``chord`` into the direction that is ``wanted``; none if that is not known."""
+    sizes = np.linalg.norm(chord) * np.linalg.norm(wanted)
+    if not sizes > 0:
+        return np.array(IDENTITY)
+    cosine, axis = float(chord @ wanted / sizes), np.cross(chord, wanted) / sizes
+    if cosine <= -1 + FITS:
+        return np.array(IDENTITY)
+    out = np.array([1 + cosine, *axis])
+    return np.asarray(out / np.linalg.norm(out))
+
+
+def rotation_of(scene: Scene, load: float, side: int) -> np.ndarray | None:
+    """Unit quaternion at which an end is held in all directions; None if it is not."""
+    end = scene.sides[side]
+    frame = None if scene.closed or end.hinge is not None else end.frame(scene.constants(load))
+    if frame is None:
+        return None
+    q = np.array([plain(x) for x in frame])
+    return np.asarray(q / np.linalg.norm(q))
+
+
+def _positions(scene: Scene, load: float, side: int) -> list[float | None]:
+    return [None if x is None else plain(x) for x in scene.sides[side].held(scene.constants(load))]
+
+
+def uniform_turn(scene: Scene, load: float) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Rotations of a straight rod, from that of the left end to that of the right one; None if neither is turned."""
+    frames = [q for q in (rotation_of(scene, load, side) for side in range(2)) if q is not None]
+    if all(abs(q[0]) == 1.0 for q in frames):
+        return None
+    first, last = frames[0], frames[-1]
+    apart = product(first * CONJUGATE, last)
+    apart = -apart if apart[0] < 0 else apart
+    size = np.linalg.norm(apart[1:])
+    vector = apart[1:] * (2 * np.arctan2(size, apart[0]) / size if size > 0 else 0.0)
+    a, b = scene.interval
+    return lambda s: product(first, of_vector((s - a)[:, None] / (b - a) * vector))
+
+
+def sampled(s: np.ndarray, values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Values (m, k) at arclengths ``s`` (m,), interpolated at ``places`` (p,): (p, k)."""
+    return np.array([np.interp(places, s, column) for column in values.T]).reshape(-1, len(places)).T
