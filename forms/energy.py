@@ -54,3 +54,15 @@ def hemitropic(v: Expr, k: Expr, *, stretching: Expr, coupling: Expr, twisting: 
 def logarithmic_stretch(v: Expr, stiffness: Expr) -> Expr:
     """Energy ``stiffness (v3 log v3 - v3 + 1)`` of stretch, which keeps ``v3`` positive: ``n3 = stiffness log v3``."""
     return stiffness * (v[2] * ufl.ln(v[2]) - v[2] + 1)
+
+
+def tendon(v: Expr, k: Expr, tension: Expr, at: tuple[Expr, Expr]) -> Expr:
+    """Potential ``T |v + k x d|`` per unit length of a tendon that slides through the rod at ``d = (at[0], at[1], 0)``.
+
+    ``T`` is its ``tension``, and ``|v + k x d|`` its length per length of the rod: what a tendon pulled with a given
+    force shortens by is the work of that force (Rucker & Webster, IEEE Trans. Robot. 27 (2011) 1033-1044).  ``v`` (3,)
+    and ``k`` (3,) are the strains, ``at`` components along ``d1`` and ``d2``, functions of the arclength if wanted.
+    """
+    x, y = at
+    slope = (v[0] - k[2] * y, v[1] + k[2] * x, v[2] + k[0] * y - k[1] * x)
+    return tension * ufl.sqrt(sum(component**2 for component in slope))
