@@ -1058,7 +1058,7 @@ FAULTS = {
         f"{KILLS} {FILES}",
     ),
     "earlier-branches-are-lost": Fault(
-        "rodfem/app/run_terminal.py", "first=not self._saved", "first=True", f"{FILES} {KILLS} {DIAGRAM}"
+        "rodfem/app/run.py", "first=not self._saved", "first=True", f"{FILES} {KILLS} {DIAGRAM}"
     ),
     "another-row-is-restored": Fault(
         "rodfem/output/files.py", "_trimmed(value[row])", "_trimmed(value[row - 1])", f"{FILES} {DIAGRAM}"

@@ -1,61 +1,57 @@
-"""The command line of a rod: options of its constants, and those that all rods have."""
+"""The command ``rodfem run``: the rod of a file, with its constants, and what all rods have, as options."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from inspect import isfunction, signature
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from rodfem.app.cli import Parser, complain, sentences, start_petsc
-from rodfem.app.constants import Statement
-from rodfem.app.options import add_options, mesh_of, plan_of
+from rodfem.app.options import Statement, add_options, discretization_of, plan_of
+from rodfem.app.persons_file import load
 from rodfem.errors import InputError
+from rodfem.problem.scene import Scene
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Discretization
-    from rodfem.problem.scene import Scene
 
 Mesh = Callable[..., "Discretization"]
 KEPT = "the branches that were finished are in"
 """What there is in the folder of a run that was interrupted."""
 NOTED = ("-rodfem_", "-mat_", "-vec_", "-eps_", "-st_", "-ksp_", "-pc_")
 """Beginnings of options of solvers, all of which have the prefix ``rodfem_`` here, of matrices and of vectors."""
+HELP = """usage: rodfem run FILE.py [--scene NAME] [OPTIONS]
+
+Trace the rod of a file: a Scene, or a function with '-> Scene' whose arguments have defaults and are the rod's
+constants. Where the file has several, --scene names one. A function with '-> Discretization' of the same constants is
+its mesh, where no option asks for another.
+
+rodfem run FILE.py --help lists all options of the rod.
+"""
 
 
-def main(
-    rod: Callable[..., Scene] | Scene,
-    mesh: Mesh | None = None,
-    arguments: Sequence[str] | None = None,
-    program: str | None = None,
-) -> None:
-    """Parse the command line, state the rod, run it; bad input ends with one sentence and status 2.
+def main(words: Sequence[str]) -> None:
+    """State the rod of a file and run it; bad input ends with one sentence and status 2.
 
     An interrupt is raised as KeyboardInterrupt, with the sentence that the program ends with.
-
-    Parameters
-    ----------
-    rod
-        A scene, or a function of constants that returns one.  Each argument of the function has a default and is an
-        option; its words are those of the section Parameters of the docstring.  Of a scene the parameters beside the
-        load are options.
-    mesh
-        Function of the same constants that returns the discretisation where no option asks for another.
-    arguments
-        Replace those of the command line.
-    program
-        Name for the help, by default that of the script.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
-    try:
-        statement = Statement(rod)
-        usual = statement.scene()
-        parser = parser_of(statement, usual, program or Path(sys.argv[0]).name)
-    except InputError as trouble:
-        complain(str(trouble))
+    if not words or words[0] in ("-h", "--help"):
+        print(HELP, end="")
+        sys.exit(0)
+    file, *rest = words
+    name = None
+    if rest[:1] == ["--scene"]:
+        name, rest = (rest[1] if len(rest) > 1 else ""), rest[2:]
+    module = load(Path(file))
+    statement, mesh = Statement(rod_of(module, name)), mesh_of(module)
+    ours, petsc = (rest[: rest.index("--")], rest[rest.index("--") + 1 :]) if "--" in rest else (rest, [])
+    usual = statement.scene()
+    parser = parser_of(statement, usual, f"rodfem run {file}")
     varied = f"--{usual.load}"
     if varied in [word.split("=")[0] for word in ours] and varied not in parser._option_string_actions:
         complain(f"{usual.load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
@@ -129,7 +125,8 @@ def _run(
     if petsc:  # once more, for a PETSc that was running already
         PETSc.Options().insertString(" ".join(petsc))
     constants = statement.values(options)
-    scene, discretization, plan = statement.scene(**constants), _mesh(mesh, options, constants), plan_of(options)
+    own = None if mesh is None else mesh(**constants)
+    scene, discretization, plan = statement.scene(**constants), discretization_of(options, own), plan_of(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
     run(scene, discretization, plan, options.output, figures=options.figures, words=words)
@@ -137,5 +134,36 @@ def _run(
         Report().warn(f"PETSc did not read the option {', '.join(ignored)}: see whether it is spelled right.")
 
 
-def _mesh(mesh: Mesh | None, options: argparse.Namespace, constants: Mapping[str, Any]) -> Discretization:
-    return mesh_of(options, None if mesh is None else mesh(**constants))
+def rod_of(module: ModuleType, name: str | None) -> Callable[..., Scene] | Scene:
+    """Scene of a module, or the function that states it; raises :class:`InputError` unless there is one to choose."""
+    scenes = {n: x for n, x in vars(module).items() if isinstance(x, Scene)} | _returning(module, "Scene")
+    choice = ", ".join(scenes)
+    if name is not None:
+        if name not in scenes:
+            raise InputError(f"{module.__file__} has no scene {name!r}: choose one of {choice or 'those you add'}.")
+        return scenes[name]
+    if not scenes:
+        raise InputError(f"{module.__file__} states no rod: give it a Scene, or a function with '-> Scene'.")
+    if len(scenes) > 1:
+        raise InputError(f"{module.__file__} has the scenes {choice}: choose one by --scene NAME.")
+    return next(iter(scenes.values()))
+
+
+def mesh_of(module: ModuleType) -> Mesh | None:
+    """Function of a module that returns a discretisation, if it has one; raises :class:`InputError` for several."""
+    found = _returning(module, "Discretization")
+    if len(found) > 1:
+        raise InputError(f"{module.__file__} has the meshes {', '.join(found)}: keep one function with that result.")
+    return next(iter(found.values()), None)
+
+
+def _returning(module: ModuleType, kind: str) -> dict[str, Callable[..., Any]]:
+    """Functions of a module, by name, that are annotated to return a class of rodfem."""
+    found: dict[str, Callable[..., Any]] = {}
+    for name, x in vars(module).items():
+        if isfunction(x) and x.__module__ == module.__name__ and not name.startswith("_"):
+            returned = signature(x).return_annotation
+            word = returned if isinstance(returned, str) else getattr(returned, "__name__", "")
+            if word.rpartition(".")[2].strip("'\"") == kind:
+                found[name] = x
+    return found
