@@ -49,10 +49,7 @@ NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$|-(inf|nan)$")
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser whose complaints are one sentence, printed once under MPI.
-
-    The destination of an option is the name of the argument that it is for.
-    """
+    """Argument parser whose complaints are one sentence; the destination of an option is the argument that it sets."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         """As for any parser, with numbers like -1e6 as values."""

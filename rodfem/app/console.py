@@ -126,7 +126,10 @@ def info(words: Sequence[str]) -> None:
 
 
 def list_diagrams(words: Sequence[str]) -> None:
-    """Saved diagrams below a folder: scene, date, size, first loss of stability."""
+    """Saved diagrams below a folder: scene, date, size, first loss of stability.
+
+    Raises :class:`~rodfem.errors.InputError` where there is none.
+    """
     parser = Parser(prog="rodfem list", description=_summary(list_diagrams))
     parser.add_argument("folder", type=Path, nargs="?", default=Path("results"), help="default: results")
     place = parser.parse_args(words).folder

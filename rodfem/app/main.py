@@ -36,10 +36,7 @@ rodfem run FILE.py --help lists all options of the rod.
 
 
 def main(words: Sequence[str]) -> None:
-    """State the rod of a file and run it; bad input ends with one sentence and status 2.
-
-    An interrupt is raised as KeyboardInterrupt, with the sentence that the program ends with.
-    """
+    """State the rod of a file and run it; raises KeyboardInterrupt with the sentence that the program ends with."""
     if not words or words[0] in ("-h", "--help"):
         print(HELP, end="")
         sys.exit(0)
@@ -67,10 +64,7 @@ def main(words: Sequence[str]) -> None:
 
 
 def unread(words: Sequence[str]) -> list[str]:
-    """Options of solvers, matrices and vectors among ``words``, of those after a lone ``--``, that nothing has read.
-
-    PETSc ignores what it does not know.
-    """
+    """Options among ``words`` that belong to solvers, matrices and vectors, and that PETSc has not read."""
     from cffi import FFI
     from petsc4py import PETSc
 
@@ -86,10 +80,7 @@ def unread(words: Sequence[str]) -> list[str]:
 
 
 def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
-    """Parser of all options of a rod; raises :class:`InputError` where a constant has the name of another option.
-
-    ``usual`` is the scene with the usual constants, ``program`` the name for the help.
-    """
+    """Parser of all options of a rod; raises :class:`InputError` for a constant with the name of another option."""
     parser = Parser(
         prog=program,
         description=statement.words,
@@ -113,10 +104,7 @@ def _run(
     petsc: Sequence[str],
     words: Callable[[str], str],
 ) -> None:
-    """State the rod and run it.
-
-    ``statement``, ``mesh`` and ``petsc`` are those of :func:`main`, ``words`` rewords what is said.
-    """
+    """State the rod and run it; ``words`` rewords what is said."""
     from petsc4py import PETSc
 
     from rodfem.app.run import run

@@ -82,10 +82,7 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
 
 
 def discretization_of(options: argparse.Namespace, own: Discretization | None) -> Discretization:
-    """Discretisation that the options ask for, where they do not that of the scene's ``own``, if it has one.
-
-    Raises :class:`InputError` for elements or a degree beside an accuracy, and for what is no discretisation.
-    """
+    """Discretisation that the options ask for, or the scene's ``own``; raises :class:`InputError` for what is none."""
     from rodfem.fem.fields import Discretization
 
     chosen = {name: getattr(options, name) for name in ("formulation", "elements", "degree")}

@@ -10,9 +10,9 @@ import shlex
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
@@ -113,7 +113,10 @@ class Terminal(Report):
     def __init__(
         self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool, words: Callable[[str], str] = str
     ) -> None:
-        """Write into the folder ``output``, which there is; with ``quiet`` print nothing, else what ``words`` makes."""
+        """Write what the ``plan`` asks for into the folder ``output``, which there is, on the first rank of ``comm``.
+
+        With ``quiet`` nothing is printed, else what ``words`` makes of each line.
+        """
         super().__init__(comm, words=words)
         if quiet:
             self.on = self.live = False
@@ -181,19 +184,15 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
 
 def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""
-    scene, plan, output = diagram.scene, terminal.plan, terminal.output
-    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
-    mesh = asdict(diagram.solvers[0].system.fields.discretization)
-    about |= {name: value for name, value in mesh.items() if name != "vertices"}
-    which = "left-most eigenvalues mu = omega^2" if scene.conservative else "eigenvalues mu = omega^2 nearest zero"
+    plan, output = terminal.plan, terminal.output
+    which = (
+        "left-most eigenvalues mu = omega^2" if diagram.scene.conservative else "eigenvalues mu = omega^2 nearest zero"
+    )
     terminal.say(f"\nIs it stable? ({which})")
-    finders: dict[int, ModeFinder] = {}
+    finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
     saved: list[tuple[str, int]] = []
     for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
-        where, number = f"{scene.load} = {special.point.load:.10g}", special.point.mesh
-        if number not in finders:
-            finders[number] = ModeFinder(diagram.solvers[number], plan.error_bars)
-        finder = finders[number]
+        where, finder = f"{diagram.scene.load} = {special.point.load:.10g}", finder_on(special.point.mesh)
         terminal.working(f"{branch.name} at {where}: stability{' and modes' if plan.modes else ''}")
         try:
             if not plan.modes:
@@ -204,13 +203,20 @@ def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
             terminal.warn(str(trouble))
             continue
         terminal.verdict(branch.name, where, verdict.at(special.point), modes)
-        keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, about)
-        on_first(terminal.comm, partial(keep, first=not saved, scene=scene))
+        keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
+        on_first(terminal.comm, partial(keep, first=not saved, scene=diagram.scene))
         saved.append((branch.name, special.row))
     if saved:
         pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
         _draw_modes(saved, pictures, terminal)
         terminal.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
+
+
+def _about(diagram: Diagram) -> dict[str, Any]:
+    """What a file of modes says of its scene and its mesh."""
+    scene, mesh = diagram.scene, asdict(diagram.solvers[0].system.fields.discretization)
+    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
+    return about | {name: value for name, value in mesh.items() if name != "vertices"}
 
 
 def _draw_modes(saved: list[tuple[str, int]], pictures: list[str], terminal: Terminal) -> None:

@@ -1,9 +1,8 @@
-"""Steps of a sweep from load to load along one path of equilibria, halved where it is not clear that they stay on it.
+"""Equilibria of a sweep: at a load, and from load to load along one path.
 
 At a given load Newton's method finds an equilibrium, and beyond a fold, or where the path bends sharply, that of
-another path.  A state is on the path if it is where the last ones lead: as far from there as a part of the step, or
-less.  Steps that are halved get there on a smooth path, and before a fold never; across a kink of the loads the least
-step does, whose change is that of the directions before and after it.  Positions, rotations and strains are looked at
+another path.  A state is on the path if it is as near to where the last ones lead as a part of the step.  Steps are
+halved until it is: on a smooth path that ends, before a fold never.  Positions, rotations and strains are looked at
 each by itself, since a rod that is pressed together much may turn by little.
 """
 
@@ -19,19 +18,46 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import ROWS, across_orbit, predict_at_load
-from rodfem.diagram.held import require_held
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
 
+PARTS = (1, 2, 4, 8)
+"""Numbers of steps to a load that are tried, one after the other."""
+DRIVEN = 1e-7
+"""Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 ASTRAY = 0.05
-"""Distance from a prediction, relative to the step that it predicts, beyond which a state may be of another path."""
-STILL = 1e-8
+"""Distance from a prediction, over the step that it predicts, beyond which a state may be of another path."""
+FLOOR = 1e-8
 """The same in natural sizes, within which it is on the path whatever the step."""
 LEAST = 1e-6
-"""Least step, relative to the range of loads."""
-STEEPEST = 2.0
-"""Change of a state over the least step, relative to that of the steeper one of the directions at its ends."""
-BESIDE = 1e-2
+"""Least step, over the range of loads."""
+PART = 1e-2
 """Part of a step at whose end a state tells in which direction the path goes on."""
+
+
+def at_load(solver: BranchSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+    """Equilibrium at a load from a ``guess`` nearby, in more and more steps; raises :class:`ConvergenceError`."""
+    begin = solver.system.scalar(guess)
+    for parts in PARTS:
+        x = guess
+        for part in range(1, parts + 1):
+            x, outcome = solver.at_load(x, load if part == parts else begin + (load - begin) * part / parts)
+            if not outcome.converged:
+                break
+        else:
+            require_balance(solver, x)
+            return x
+    raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+
+
+def require_balance(solver: BranchSolver, x: PETSc.Vec) -> None:
+    """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
+    system = solver.system
+    if system.drift(x) > DRIVEN * system.stiffness_scale:
+        raise SceneError(
+            f"There is no equilibrium at {system.scene.load} = {system.scalar(x):g}: nothing holds the rod against the "
+            f"{' or the '.join(system.free_motions(x))}, and the loads drive it; hold that motion at one end, or "
+            "balance the loads."
+        )
 
 
 class LoadSteps:
@@ -48,51 +74,25 @@ class LoadSteps:
         self.blocks = [of[(begin <= of) & (of < end)] - begin for of in numbers]
 
     def to(self, load: float) -> PETSc.Vec:
-        """Equilibrium on the path at a ``load`` further on.
-
-        Raises :class:`ConvergenceError` where the path cannot be followed to there, and :class:`SceneError` where a
-        load drives a motion that nothing holds.  Collective.
-        """
+        """Equilibrium on the path at a ``load`` further on; raises :class:`ConvergenceError`.  Collective."""
         last = self.known[-1]
         while last.load != load:
-            following = self._next(last, load)
-            if following is None:
-                following, self.known = self._across_a_kink(last, load), []
-            self.known, last = [*self.known[1 - ROWS :], following], following
+            last = self._next(last, load)
+            self.known = [*self.known[1 - ROWS :], last]
         return last.x
 
-    def _next(self, last: Point, load: float) -> Point | None:
-        """Next state of the path, at the ``load`` or on the way to it; None where no step is short enough."""
-        size = min(abs(load - last.load), self.step)
+    def _next(self, last: Point, load: float) -> Point:
+        """Next state of the path, at the ``load`` or on the way to it."""
+        ahead = load - last.load
+        size = min(abs(ahead), self.step)
         while size > 0.0:
-            there = self._beyond(last, size, load)
+            there = load if size >= abs(ahead) else last.load + copysign(size, ahead)
             x = self._found(there)
             if x is not None:
                 self.step = max(2.0 * size, self.step)
                 return replace(last, x=x, load=there)
             self.step = max(size / 2, self.least)
             size = size / 2 if size > self.least else 0.0
-        return None
-
-    def _beyond(self, last: Point, size: float, load: float) -> float:
-        """Load one step of some ``size`` further on, at most ``load``."""
-        ahead = load - last.load
-        return load if size >= abs(ahead) else last.load + copysign(size, ahead)
-
-    def _across_a_kink(self, last: Point, load: float) -> Point:
-        """State one least step further on, from which the path has another direction.
-
-        Raises :class:`ConvergenceError` where the directions before and after the step do not explain the change.
-        """
-        there = self._beyond(last, self.least, load)
-        by = BESIDE * (there - last.load)
-        x, outcome = self.solver.at_load(last.x, there)
-        ends = [self.solver.at_load(state, at) for state, at in ((last.x, last.load - by), (x, there + by))]
-        if outcome.converged and all(end.converged for _, end in ends):
-            slopes = [self._sizes(y - state) / BESIDE for (y, _), state in zip(ends, (last.x, x), strict=True)]
-            if (self._sizes(x - last.x) <= np.maximum(STEEPEST * np.max(slopes, axis=0), STILL)).all():
-                require_held(self.solver, x)
-                return replace(last, x=x, load=there)
         name, at = self.solver.system.scene.load, f"{last.load:.8g}"
         raise ConvergenceError(
             f"The equilibrium at {name} = {at} could not be followed to {load:.6g}: near {at} its path turns back, at "
@@ -109,9 +109,9 @@ class LoadSteps:
         solver, last = self.solver, self.known[-1]
         if len(self.known) > 1 and (x := self._predicted(self.known, load)) is not None:
             return x
-        beside = last.load + BESIDE * (load - last.load)
-        y, outcome = solver.at_load(last.x, beside)
-        return self._predicted([replace(last, x=y, load=beside), last], load) if outcome.converged else None
+        near = last.load + PART * (load - last.load)
+        y, outcome = solver.at_load(last.x, near)
+        return self._predicted([replace(last, x=y, load=near), last], load) if outcome.converged else None
 
     def _predicted(self, known: Sequence[Point], load: float) -> PETSc.Vec | None:
         """Equilibrium at a ``load`` to which the ``known`` ones lead; None where none is found, or another one."""
@@ -123,9 +123,9 @@ class LoadSteps:
         if not outcome.converged:
             return None
         off, step = (self._sizes(x - other) for other in (predicted, last))
-        if (off > np.maximum(ASTRAY * step, STILL)).any():
+        if (off > np.maximum(ASTRAY * step, FLOOR)).any():
             return None
-        require_held(self.solver, x)
+        require_balance(self.solver, x)
         return x
 
     def _sizes(self, change: PETSc.Vec) -> np.ndarray:
