@@ -22,7 +22,6 @@ import rodfem
 from rodfem import Discretization, Plan, libraries
 from rodfem.app.console import main
 from rodfem.errors import SetupError
-from rodfem.linalg import compiler
 
 COMM = MPI.COMM_WORLD
 HOME = Path(__file__).parents[2]
@@ -121,18 +120,3 @@ def test_without_a_compiler(given: str, folder: Path) -> None:
         assert "no C compiler 'no-such-compiler'" in done.stderr
     else:
         assert "apt install gcc" in done.stderr and 'pip install "rodfem[cc]"' in done.stderr
-
-
-@pytest.mark.alone
-def test_another_compiler_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = compiler.missing.__wrapped__
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setattr(os, "environ", dict(os.environ))
-    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
-    monkeypatch.setattr(compiler, "find_spec", lambda name: name == "ziglang")
-    assert found() == ""
-    assert os.environ["CC"] == f"{sys.executable} -m ziglang cc" and os.environ["LDSHARED"].endswith(" cc -shared")
-    monkeypatch.setattr(os, "environ", {"CC": sys.executable})
-    monkeypatch.setattr(compiler.shutil, "which", lambda name: name)
-    monkeypatch.setattr(compiler.sysconfig, "get_path", lambda name: "/nowhere")
-    assert re.search(r"no header files .*'apt install python3-dev'", found())
