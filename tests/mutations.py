@@ -50,7 +50,6 @@ DIAGRAM = "tests/diagram/test_diagram.py"
 WORK = "tests/continuation/test_work.py"
 RECORDED = "tests/modes/test_recorded.py"
 CLOSE = "tests/diagram/test_close_critical_loads.py"
-MISSED = "tests/diagram/test_missed_loads.py"
 AT_SPECIAL = "tests/diagram/test_at_special_points.py"
 OTHER_CONSTANTS = "tests/diagram/test_other_constants.py"
 
@@ -94,7 +93,7 @@ FAULTS = {
         "rodfem/continuation/singular.py",
         "least[m if self.fold else m - k : m] /= units[0]",
         "least[m if self.fold else m - k :] /= units[0]",
-        "tests/hard/test_hard_cases.py",
+        HARD,
     ),
     "what-turns-back-near-zero-is-passed": Fault(
         "rodfem/diagram/special_search.py",
@@ -218,7 +217,7 @@ FAULTS = {
         "tests/diagram/test_first_name.py",
     ),
     "ranges-are-left-and-entered-again": Fault(
-        "rodfem/diagram/tracer.py", "        if out is None:", "        if True:", "tests/hard/test_hard_cases.py"
+        "rodfem/diagram/tracer.py", "        if out is None:", "        if True:", HARD
     ),
     "bars-of-modes-by-the-nearest": Fault(
         "rodfem/modes/finder.py",
@@ -284,7 +283,7 @@ FAULTS = {
         "rodfem/diagram/collisions.py",
         "if other.discriminant < 0 and not just_met:",
         "if other.discriminant < 0:",
-        "tests/diagram/test_flutter_at_a_row.py",
+        HARD,
     ),
     "steps-of-round-off-in-a-sweep": Fault(
         "rodfem/diagram/sweep.py",
@@ -296,7 +295,7 @@ FAULTS = {
         "rodfem/stability/nonsymmetric.py",
         "slow = np.flatnonzero(abs(values) < SLOW * one)",
         "slow = np.flatnonzero(abs(values) < 0.0)",
-        "tests/diagram/test_slow_and_far_frequencies.py",
+        HARD,
     ),
     "rods-that-soften-are-not-slow": Fault(
         "rodfem/stability/nonsymmetric.py",
@@ -404,7 +403,7 @@ FAULTS = {
         "tests/diagram/test_functions_between_rows.py",
     ),
     "branches-follow-polynomials-beyond-bends": Fault(
-        f"{CONTINUATION}follow.py", "FAILURES = 2", "FAILURES = 200", "tests/hard/test_hard_cases.py"
+        f"{CONTINUATION}follow.py", "FAILURES = 2", "FAILURES = 200", HARD
     ),
     "loci-follow-polynomials-beyond-bends": Fault(
         "rodfem/codim2/curve.py", "FAILURES = 2", "FAILURES = 200", "tests/codim2/test_locus.py"
@@ -596,13 +595,13 @@ FAULTS = {
         "rodfem/fem/invariance.py",
         "    table -= across @ (across.T @ table)\n",
         "",
-        "tests/diagram/test_load_steps.py",
+        HARD,
     ),
     "sweeps-leave-their-path": Fault(
         "rodfem/diagram/load_steps.py",
         "(off > np.maximum(ASTRAY * step, FLOOR)).any()",
         "False",
-        "tests/diagram/test_load_steps.py",
+        HARD,
     ),
     "secants-that-find-nothing-are-believed": Fault(
         "rodfem/diagram/collisions.py",
@@ -888,7 +887,10 @@ FAULTS = {
         "tests/problem/test_units.py",
     ),
     "frequencies-that-meet-and-part-in-a-step": Fault(
-        "rodfem/diagram/critical_loads.py", "for m in sorted(ahead):", "for m in sorted(ahead)[:0]:", MISSED
+        "rodfem/diagram/critical_loads.py",
+        "for m in sorted(ahead):",
+        "for m in sorted(ahead)[:0]:",
+        HARD,
     ),
     "two-that-cross-may-meet": Fault(
         "rodfem/diagram/meetings.py",
@@ -978,7 +980,7 @@ FAULTS = {
         "rodfem/diagram/collisions.py",
         "noise.of_discriminant + clear.split) /",
         "noise.of_discriminant) /",
-        CLOSE,
+        HARD,
     ),
     "the-cubic-is-the-branch": Fault(
         "rodfem/continuation/crossings.py",

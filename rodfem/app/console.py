@@ -46,10 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         lines = (f"  {each:<10}{_summary(command)}" for each, command in COMMANDS.items())
         print(HELP.format(commands="\n".join(lines)), end="")
     elif name == "--version":
-        from rodfem.output.origin import versions
-
-        for library, version in {"rodfem": rodfem.__version__, **versions()}.items():
-            print(f"{library:<8}{version}")
+        print(_versions())
     elif name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
@@ -60,6 +57,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             COMMANDS[name](words)
         except InputError as trouble:
             complain(str(trouble))
+
+
+def _versions() -> str:
+    """A line for the program, and one for each library that computes."""
+    from rodfem.output.origin import versions  # imports dolfinx, which takes a second
+
+    return "\n".join(f"{name:<8}{version}" for name, version in {"rodfem": rodfem.__version__, **versions()}.items())
 
 
 def _summary(command: Callable[..., None]) -> str:
@@ -175,10 +179,10 @@ def first_loss(data: Mapping[str, Any]) -> str:
         return "the first state is singular"
     if columns["negative"][0]:
         return f"unstable{plane} from the first state on"
-    lost = next(_losses(branch), None)
-    for row in sorted([x["row"] for x in branch.get("unexplained") or ()])[:1]:
-        if lost is None or lost["row"] > row:
-            return f"unknown: the index changes near {data['parameter']} = {columns['load'][row]:.6g} unexplained"
+    lost, unexplained = next(_losses(branch), None), [x["row"] for x in branch.get("unexplained") or ()]
+    if unexplained and (lost is None or lost["row"] > min(unexplained)):
+        load = columns["load"][min(unexplained)]
+        return f"unknown: the index changes near {data['parameter']} = {load:.6g} unexplained"
     if lost is not None:
         return f"{lost['kind']}{plane} at {data['parameter']} = {_load_of(lost)}"
     if any(columns["negative"]):

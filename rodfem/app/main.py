@@ -47,11 +47,8 @@ def main(words: Sequence[str]) -> None:
     module = load(Path(file))
     statement, mesh = Statement(rod_of(module, name)), mesh_of(module)
     ours, petsc = (rest[: rest.index("--")], rest[rest.index("--") + 1 :]) if "--" in rest else (rest, [])
-    usual = statement.scene()
-    parser = parser_of(statement, usual, f"rodfem run {file}")
-    varied = f"--{usual.load}"
-    if varied in [word.split("=")[0] for word in ours] and varied not in parser._option_string_actions:
-        complain(f"{usual.load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
+    parser = parser_of(statement, statement.scene(), f"rodfem run {file}")
+    _refuse_the_load(statement.scene().load, ours, parser)
     options = parser.parse_args(ours)
     start_petsc(petsc)
     try:
@@ -61,6 +58,13 @@ def main(words: Sequence[str]) -> None:
         raise KeyboardInterrupt(f"interrupted; {KEPT} {options.output}: rodfem.load reads them") from None
     except MemoryError:
         complain(f"Memory is exhausted: use fewer elements or a lower degree; {KEPT} {options.output}.")
+
+
+def _refuse_the_load(load: str, words: Sequence[str], parser: Parser) -> None:
+    """Complain of the load among the options, unless a constant has its name: a run varies it."""
+    option = f"--{load}"
+    if option in [word.split("=")[0] for word in words] and option not in parser._option_string_actions:
+        complain(f"{load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
 
 
 def unread(words: Sequence[str]) -> list[str]:

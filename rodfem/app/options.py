@@ -194,9 +194,10 @@ def _constant(owner: str, argument: Parameter, described: Mapping[str, str]) -> 
     if default is Parameter.empty:
         raise InputError(f"The argument {name} of {owner} has no default: give it one, which an option can replace.")
     size = len(default) if isinstance(default, tuple) else None
-    kinds = {type(x) for x in (default if size else (default,))}
-    kind = float if kinds == {int, float} or (kinds == {int} and "float" in str(argument.annotation)) else kinds.pop()
-    if kind not in KINDS or (size is not None and kind not in (int, float)):
+    kinds = set(map(type, default)) if size else {type(default)}
+    number = kinds == {int} and "float" in str(argument.annotation)
+    kind = float if number or kinds == {int, float} else kinds.pop()
+    if kind not in (KINDS if size is None else (int, float)):
         raise InputError(
             f"The argument {name} of {owner} has the default {default!r}: give a number, a word, or a tuple of numbers."
         )

@@ -65,9 +65,7 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     except InputError:
         raise
     except (Exception, SystemExit) as trouble:  # whatever the file does
-        line = getattr(trouble, "lineno", None) if isinstance(trouble, SyntaxError) else _last_line(path, trouble)
-        where = f"{file}, line {line}" if line else f"{file}"
-        words = f"{where}: {type(trouble).__name__}: {trouble}{_there_are(trouble)}"
+        words = f"{file}{_line(path, trouble)}: {type(trouble).__name__}: {trouble}{_there_are(trouble)}"
         raise InputError(f"{words}; run {_python()} {file} to see more.") from trouble
     finally:
         if before is not None:
@@ -75,9 +73,11 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     return module
 
 
-def _last_line(path: Path, trouble: BaseException) -> int | None:
-    """Last line of a file that ran before it failed."""
-    return next((f.lineno for f in reversed(extract_tb(trouble.__traceback__)) if f.filename == str(path)), None)
+def _line(path: Path, trouble: BaseException) -> str:
+    """Last line of a file that ran before it failed, or that is no Python, in words."""
+    lines = [frame.lineno for frame in extract_tb(trouble.__traceback__) if frame.filename == str(path)]
+    line = trouble.lineno if isinstance(trouble, SyntaxError) else lines[-1] if lines else None
+    return f", line {line}" if line else ""
 
 
 def _there_are(trouble: BaseException) -> str:

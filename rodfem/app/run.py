@@ -19,6 +19,7 @@ from mpi4py import MPI
 from rodfem.app.interrupts import held
 from rodfem.app.persons_file import leave_the_run
 from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import USER
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
@@ -28,7 +29,7 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder
-from rodfem.modes.modes import save_modes
+from rodfem.modes.modes import Modes, save_modes
 from rodfem.modes.typical import typical_modes
 from rodfem.output.files import save_json, save_run
 from rodfem.output.folder import locked, remove_earlier
@@ -36,7 +37,7 @@ from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
-from rodfem.stability.assessment import Assessor
+from rodfem.stability.assessment import Assessor, Verdict
 
 if TYPE_CHECKING:
     from rodfem.codim2.locus import Locus
@@ -192,24 +193,29 @@ def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
     saved: list[tuple[str, int]] = []
     for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
-        where, finder = f"{diagram.scene.load} = {special.point.load:.10g}", finder_on(special.point.mesh)
+        where = f"{diagram.scene.load} = {special.point.load:.10g}"
         terminal.working(f"{branch.name} at {where}: stability{' and modes' if plan.modes else ''}")
         try:
-            if not plan.modes:
-                terminal.verdict(branch.name, where, finder.assessor(special.point.x, plan.method).at(special.point))
-                continue
-            verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
+            verdict, modes = _verdict(finder_on(special.point.mesh), special, plan)
         except (InputError, ConvergenceError) as trouble:
             terminal.warn(str(trouble))
             continue
         terminal.verdict(branch.name, where, verdict.at(special.point), modes)
-        keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
-        on_first(terminal.comm, partial(keep, first=not saved, scene=diagram.scene))
-        saved.append((branch.name, special.row))
+        if modes is not None:
+            keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
+            on_first(terminal.comm, partial(keep, first=not saved, scene=diagram.scene))
+            saved.append((branch.name, special.row))
     if saved:
         pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
         _draw_modes(saved, pictures, terminal)
         terminal.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
+
+
+def _verdict(finder: ModeFinder, special: SpecialPoint, plan: Plan) -> tuple[Verdict, Modes | None]:
+    """Verdict on a state, and its modes if the plan asks for them."""
+    if plan.modes:
+        return finder(special.point.x, plan.modes, plan.method or "auto")
+    return finder.assessor(special.point.x, plan.method), None
 
 
 def _about(diagram: Diagram) -> dict[str, Any]:
@@ -232,13 +238,10 @@ def _draw_modes(saved: list[tuple[str, int]], pictures: list[str], terminal: Ter
 
 def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[str, float, float]) -> None:
     """Follow each special point that no locus passes in the plane of the load and the parameter that is asked for."""
-    parameter, low, high = asked
     saved: list[dict] = []
     for branch in diagram:
         near: list[Locus] = []
-        for special in branch.special:
-            if not (special.kind.counted or special.kind.line) or special.connects_to is not None:
-                continue
+        for special in _to_follow(branch):
             which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
             if any(found.passes(special, diagram.solvers[0].units) for found in near):
                 terminal.say(f"\nThe {which} is on a locus above")
@@ -250,19 +253,24 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
             terminal.say(f"\nLocus of the {which}")
             terminal.working(f"locus {len(saved) + 1}, of the {which}")
             try:
-                found = diagram.locus(special, parameter, (low, high))
+                near.append(diagram.locus(special, asked[0], asked[1:]))
             except (InputError, ConvergenceError) as trouble:
                 terminal.warn(str(trouble))
                 continue
-            near.append(found)
-            terminal.say(found.text())
-            saved.append(found.data())
-            on_first(terminal.comm, partial(found.save, terminal.output / f"locus-{len(saved)}.json"))
+            terminal.say(near[-1].text())
+            saved.append(near[-1].data())
+            on_first(terminal.comm, partial(near[-1].save, terminal.output / f"locus-{len(saved)}.json"))
     if saved and figures:
         from rodfem.output.plot_locus import draw_locus
 
         on_first(terminal.comm, lambda: draw_locus(saved, terminal.output / "locus.png"))
         terminal.say(f"Loci in {terminal.output}{os.sep}: locus-1.json ..., locus.png")
+
+
+def _to_follow(branch: Branch) -> list[SpecialPoint]:
+    """Special points of a branch that have a locus, but for those at which it meets another branch."""
+    found = (s for s in branch.special if s.connects_to is None)
+    return [s for s in found if s.kind.counted or s.kind.line]
 
 
 def draw(output: Path, report: Report) -> None:

@@ -267,7 +267,7 @@ class Report(Observer):
         ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
         """
         load, ordinate = (with_unit(data[x], data.get(f"{x}_unit") or "") for x in ("parameter", "ordinate"))
-        special, rows = [s for branch in branches for s in branch.special], list(table_of(data))
+        rows = list(table_of(data))
         bars = "in parentheses a bound of the error" if is_estimated(data) else "no estimate of the errors"
         self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
         wide = max([len("branch point"), *(len(row[1]) for row in rows)])
@@ -275,15 +275,19 @@ class Report(Observer):
         for name, kind, *numbers, index, remarks in rows:
             self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
             self._indented(remarks)
+        self._doubts(branches)
+        self._not_followed(branches, most)
+
+    def _doubts(self, branches: Sequence[Branch]) -> None:
+        """Say where indices are not explained, first states are singular, and special points are not resolved."""
         for branch in branches:
             for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
                 self.warn(f"{branch.name}: {sentence}")
-        if coarse := sum(s.resolved is False for s in special):
+        if coarse := sum(s.resolved is False for branch in branches for s in branch.special):
             self.warn(
                 f"The mesh does not resolve {many(coarse, 'special point')}: the value in parentheses is no bound "
                 "there, and whether the rod has such a point is open; use more elements or a higher degree."
             )
-        self._not_followed(branches, most)
 
     def _not_followed(self, branches: Sequence[Branch], most: int) -> None:
         """Say how many branch points were not followed, why, and what would follow them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from html import escape
+from itertools import chain
 from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -116,8 +117,7 @@ class Diagram:
         Without a kind those at which something happens: loads asked for and ends are left out.  Events are found by
         their names, too.  Raises :class:`~rodfem.errors.InputError` for a kind that does not exist.
         """
-        chosen = self.branches if branch is None else [self[branch]]
-        every = [s for b in chosen for s in b.special]
+        every = list(chain.from_iterable(b.special for b in (self if branch is None else [self[branch]])))
         if kind is None:
             return [s for s in every if not s.kind.given]
         events = {*(event.name for event in self.plan.events), *map(_name_of_event, every)} - {""}
@@ -227,23 +227,27 @@ class Diagram:
         """
         from rodfem.diagram.trace import trace
 
-        scene, system = self.scene, self.solvers[0].system
-        in_plan = {name: changes.pop(name) for name in [f.name for f in fields(Plan)] if name in changes}
-        constants = [name for name in scene.parameters if name != scene.load]
-        if unknown := [name for name in changes if name not in constants]:
+        system, plans = self.solvers[0].system, [f.name for f in fields(Plan)]
+        in_plan = {name: changes.pop(name) for name in plans if name in changes}
+        self._check_changes(in_plan, changes)
+        plan, mesh = replace(self.plan, **in_plan), discretization or system.fields.asked
+        if discretization is None and plan.accuracy is not None and mesh.vertices is None:
+            mesh = Discretization(mesh.formulation, factors=mesh.factors)
+        return trace(self.scene.varying(**changes) if changes else self.scene, mesh, plan, comm=system.comm)
+
+    def _check_changes(self, in_plan: dict[str, Any], constants: dict[str, Any]) -> None:
+        """Raise :class:`InputError` for a constant that there is not, and without what no file holds of a plan."""
+        known = [name for name in self.scene.parameters if name != self.scene.load]
+        if unknown := [name for name in constants if name not in known]:
             raise InputError(
                 f"A plan has no {unknown[0]!r}, nor has the scene beside its load: choose one of "
-                f"{', '.join([*(f.name for f in fields(Plan)), *constants])}, or give a Discretization first."
+                f"{', '.join([*(f.name for f in fields(Plan)), *known])}, or give a Discretization first."
             )
         if self.lacks and self.lacks not in in_plan:
             raise InputError(
                 f"The plan of this diagram had {self.lacks} of its own, which no file holds: give them, as in "
                 f"again({self.lacks}=...)."
             )
-        plan, mesh = replace(self.plan, **in_plan), discretization or system.fields.asked
-        if discretization is None and plan.accuracy is not None and mesh.vertices is None:
-            mesh = Discretization(mesh.formulation, factors=mesh.factors)
-        return trace(scene.varying(**changes) if changes else scene, mesh, plan, comm=system.comm)
 
     def _special_at(self, point: Point | SpecialPoint) -> SpecialPoint | None:
         """The fold or branch point whose state that of a point is, where there is one."""

@@ -99,8 +99,7 @@ class Quadrature:
         asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
         found = [(point, self._check(point)(point.x)) for point in first]
         found += [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
-        if any(self._check(point).kink(point.x) for point in [*first, *(special.point for special in asked)]):
-            self._kinks(branch)
+        self._kinks(branch, [*first, *(special.point for special in asked)])
         for point, words in [each for each in found if each[1] and not each[0].kink][:1]:
             self.observer.warn(f"{branch.name}: at {self.load} = {point.load:.6g} {words}")
 
@@ -113,8 +112,10 @@ class Quadrature:
             special.note = "; ".join(filter(None, (special.note, "not estimated: see the warnings")))
         return words
 
-    def _kinks(self, branch: Branch) -> None:
-        """Leave the stability of rows on a kink undecided, and say so."""
+    def _kinks(self, branch: Branch, asked: Sequence[Point]) -> None:
+        """Leave the stability of rows on a kink undecided, and say so, where one of some points is on a kink."""
+        if not any(self._check(point).kink(point.x) for point in asked):
+            return
         for point in branch.points:
             point.kink = self._check(point).kink(point.x)
         loads = [f"{point.load:.6g}" for point in branch.points if point.kink]

@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.gaps import Gap, arms
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.reduced import lines
@@ -259,14 +259,19 @@ class Explorer(Tracer):
                     "branches leave are sought at random there, and some may be missing."
                 )
             forms = [normal_form_of(self.solver, origin_of(self.solver, special), way) for way in found]
-        for form in filter(None, forms):
-            form.classify(*self._indices(special))
-        kinds = ["" if form is None else form.kind for form in forms]
+        kinds = [self._kind(form, special) for form in forms]
         order = sorted(range(len(found)), key=lambda i: not kinds[i].startswith("subcritical"))
         several = dict.fromkeys(kinds[i] for i in order if kinds[i])
         if len(several) > 1:
             special.note = f"branches of several forms leave here: {', '.join(several)}"
         return [found[i] for i in order]
+
+    def _kind(self, form: NormalForm | None, special: SpecialPoint) -> str:
+        """Kind of the form of a branch that leaves a special point; empty where it is not known."""
+        if form is None:
+            return ""
+        form.classify(*self._indices(special))
+        return form.kind
 
     @staticmethod
     def _indices(special: SpecialPoint) -> tuple[int, int]:

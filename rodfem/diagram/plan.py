@@ -142,7 +142,7 @@ class Plan:
     @staticmethod
     def _check_locus(scene: Scene, name: str, low: float, high: float) -> None:
         if name == scene.load or name not in scene.parameters:
-            others = ", ".join(n for n in scene.parameters if n != scene.load)
+            others = ", ".join(sorted(scene.parameters.keys() - {scene.load}))
             choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
             raise InputError(f"{name!r} is no second parameter: {choose}.")
         if name not in asked_for(scene):

@@ -287,10 +287,9 @@ class Sweep:
             findings = self.critical.between(first.side, second.side, behind, exact)
         events, negative = findings.events, a.negative
         explained = negative + sum(e.change for e in events) + findings.entered == b.negative
+        in_all = explained and {e.kind for e in events} == {FLUTTER}  # of all eigenvalues that are recorded
         for event in events:
-            after = negative + event.change
-            if explained and event is events[-1] and all(e.kind == FLUTTER for e in events):
-                after = b.negative  # of all eigenvalues that are recorded
+            after = b.negative if in_all and event is events[-1] else negative + event.change
             self._critical(branch, event, (a, b), (negative, after))
             negative = after
         if not explained:

@@ -12,7 +12,6 @@ from math import ceil
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
@@ -153,10 +152,8 @@ def _mesh(
         return replace(
             start_mesh(scene, discretization.formulation, plan.accuracy, comm), factors=discretization.factors
         )
-    number = plan.spectrum or FREQUENCIES
-    loads = np.linspace(*plan.over(scene), 3)
-    mesh, change = frequency_mesh(scene, discretization.formulation, plan.accuracy, loads, number, comm=comm)
-    observer.frequency_mesh(mesh, number, change, plan.accuracy)
+    mesh, change = _frequency_mesh(scene, discretization.formulation, plan, plan.accuracy, comm)
+    observer.frequency_mesh(mesh, plan.spectrum or FREQUENCIES, change, plan.accuracy)
     return replace(mesh, factors=discretization.factors)
 
 
@@ -170,15 +167,15 @@ def _note_unused(given: Discretization, plan: Plan, observer: Observer) -> None:
         )
 
 
-def frequency_mesh(
-    scene: Scene, formulation: str, accuracy: float, loads: NDArray[np.float64], number: int, *, comm: MPI.Comm
+def _frequency_mesh(
+    scene: Scene, formulation: str, plan: Plan, accuracy: float, comm: MPI.Comm
 ) -> tuple[Discretization, float]:
-    """Discretisation for ``number`` frequencies at some ``loads``, and by how much they change on the next one.
+    """Discretisation for the frequencies of a sweep, and by how much they change on the next one.
 
-    The change is relative (to one, for values mu = omega^2 smaller than that); ``accuracy`` is the one asked for.
-    Where refinement ceases to help, at round-off, the best mesh is returned.  ``scene`` and ``formulation`` are those
-    of the mesh, the ranks of ``comm`` share it.
+    The change is relative (to one, for values mu = omega^2 smaller than that).  Where refinement ceases to help, at
+    round-off, the best mesh is returned.
     """
+    loads, number = np.linspace(*plan.over(scene), 3), plan.spectrum or FREQUENCIES
     mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
     system = System(scene, mesh, comm)
     values, symmetries = _frequencies(system, loads, number), system.symmetries

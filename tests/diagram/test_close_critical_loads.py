@@ -86,33 +86,6 @@ columns = cache(swept)
 """The same, once for each set of arguments."""
 
 
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0), (19.0, 21.0)])
-@pytest.mark.parametrize(
-    "strong", [1 + 1e-6, 1.005, 1.01, *(pytest.param(x, marks=pytest.mark.long) for x in (1.001, 1.012, 1.02))]
-)
-def test_two_flutters(strong: float, span: tuple[float, float]) -> None:
-    """In one step, or in two that follow one another: what is born lies where the other one was before."""
-    diagram = columns(strong, span)
-    found = critical(diagram[0])
-    agree(found, [BECK, BECK * strong])
-    order = found if span[0] < span[1] else found[::-1]
-    assert [numbers for _, _, *numbers in order] == ([[0, 2], [2, 4]] if span[0] < span[1] else [[4, 2], [2, 0]])
-    adds_up(diagram)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("strong", [1 + 1e-9, pytest.param(1 + 1e-10, marks=pytest.mark.long)])
-def test_flutters_that_are_one_to_round_off(strong: float) -> None:
-    """Four eigenvalues that are taken for two equal pairs: the bar of their load has those of both."""
-    for span in ((19.0, 21.0), (10.0, 30.0)):
-        found = critical(columns(strong, span)[0])
-        for exact in (BECK, BECK * strong):
-            assert any(abs(load - exact) <= bar < 1e-6 for load, bar, *_ in found)
-
-
 def humped(strong: float, top: float, curvature: float, span: tuple[float, float]) -> Scene:
     """Beck's column whose thrust is ``BECK + top - curvature (p - 5.0371)^2``."""
 
