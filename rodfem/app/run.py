@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import atexit
 import gc
-import json
 import os
 import shlex
-import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import cache, partial
@@ -126,8 +124,6 @@ class Terminal(Report):
     def system(self, system: System, accuracy: float | None = None) -> None:
         """Say what is solved, and refuse a method that does not apply before anything is computed."""
         super().system(system, accuracy)
-        if other := self.comm.bcast(_other_run(self.output) if self.comm.rank == 0 else ""):
-            self.say(f"  replaces in {self.output}{os.sep} the {other} (run(output=...) keeps both)")
         if self.plan.method or self.plan.modes:
             Assessor(system).choose(self.plan.method or "auto", self.plan.modes)
 
@@ -142,20 +138,6 @@ class Terminal(Report):
                 on_first(self.comm, lambda: remove_earlier(self.output))
             save_run(diagram.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
             self._saved = len(diagram)
-
-
-def _other_run(folder: Path) -> str:
-    """Date and command of the run that a folder holds; empty if it holds none, or one of the same command."""
-    try:
-        origin = json.loads((folder / "diagram.json").read_text())["origin"]
-        command, date = shlex.split(origin["command"]), str(origin["date"])[:10]
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
-        return ""
-    if command == sys.orig_argv:
-        return ""
-    at = next((i for i, word in enumerate(command) if Path(word).name == "rodfem"), 0)
-    said = shlex.join(["rodfem", *command[at + 1 :]] if at else command)
-    return f"run of {date}, {''.join(c for c in said if c.isprintable())}"
 
 
 def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:

@@ -23,7 +23,7 @@ APART = 0.5
 """Arclength beyond which two special points of one branch may be one."""
 
 
-def beyond(solver: BranchSolver, last: Point, span: tuple[float, float]) -> Point | None:
+def point_past_end(solver: BranchSolver, last: Point, span: tuple[float, float]) -> Point | None:
     """Equilibrium of a branch past its ``last`` point, on the end of a range; None where the load does not go there.
 
     Raises :class:`ConvergenceError` where there is none.
@@ -40,7 +40,7 @@ def beyond(solver: BranchSolver, last: Point, span: tuple[float, float]) -> Poin
     return solver.point(x, s, solver.load_tangent(x, further > load), outcome)
 
 
-def closing(branch: Branch, step: Step, width: float, here: Callable[[Point], Point], alike: Alike) -> Point | None:
+def loop_end(branch: Branch, step: Step, width: float, here: Callable[[Point], Point], alike: Alike) -> Point | None:
     """Last point of a ``branch`` that is back at its beginning in a ``step``; None if it is not.
 
     It is the very state that the branch begins with.  One that leaves a branch point, a singular state, comes back to
@@ -68,7 +68,7 @@ def _passes(a: Point, b: Point, first: Point) -> bool:
     return min(a.load, b.load) <= first.load <= max(a.load, b.load) and a.load != b.load and a.slope * first.slope > 0
 
 
-def meeting(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:
+def connection(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:
     """Recognise a ``special`` point that one of the ``branches`` has; a reason if the ``branch`` ends there.
 
     ``alike`` compares states; ``load`` is the name of the load.

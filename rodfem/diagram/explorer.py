@@ -45,10 +45,6 @@ class Explorer(Tracer):
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
-        if self.meshes.accuracy != self.plan.accuracy:
-            self.observer.note(
-                f"  computed to {self.meshes.accuracy:g}: a coarser mesh would break the ring's symmetry along itself"
-            )
         self.trace(self._primary())
         self._branch_off(0)
         for load in self.plan.at if self.plan.tries else ():
@@ -152,12 +148,6 @@ class Explorer(Tracer):
             )
         solver.require_convexity(x)
         point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
-        inertia = solver.inertia
-        if inertia.resolution > inertia.scale:
-            self.observer.warn(
-                f"The arithmetic of this mesh leaves the sign of eigenvalues up to {inertia.resolution:.2g} open, and "
-                f"the lowest bending one is {inertia.scale:.2g}: take larger elements, or a lower degree."
-            )
         family = point.zero - solver.system.active_drifts(x)
         if family > 0:
             self._leave_family(point, family, stop > start)

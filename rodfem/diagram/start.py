@@ -1,12 +1,8 @@
-"""Where a computation begins: its first state, the name of its branch, the index that a mesh can hold.
-
-Each unstable mode has half-waves.  Where a mesh has few nodes for each of them, the index of the start is counted on
-twice as many elements as well: another one is that of the mesh, not of the rod.
-"""
+"""Where a computation begins: its first state, the name of its branch, the index that a mesh can hold."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +14,6 @@ from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
-from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 
@@ -26,8 +21,6 @@ BENT = 1e-6
 """Distance from the chord, over the rod's length, and rotation from the scene's start, in radian, that are none."""
 AHEAD = 0.1
 """Distance along the first tangent, in the metric, at which the centreline is looked at as well."""
-NODES = 8
-"""Nodes for each unstable mode below which the index is compared."""
 HOPELESS, A_FEW = 0.9, 4
 """Index over the number of nodes above which it is that of the mesh; half-waves that a mesh of any size is allowed."""
 
@@ -88,31 +81,18 @@ def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
         )
 
 
-def check_start(solver: BranchSolver, span: tuple[float, float], warn: Callable[[str], None]) -> None:
-    """Compare the index at the ends of a range of loads with that on twice as many elements, where a mesh has few.
+def check_start(solver: BranchSolver, span: tuple[float, float]) -> None:
+    """Raise :class:`InputError` where the mesh of a ``solver`` cannot hold the half-waves at the ends of a ``span``.
 
-    ``warn`` gets a sentence on an index that is the mesh's.  Of a rod that bends from the start on, only the first load
-    is looked at.  Raises :class:`InputError` where the mesh cannot hold the half-waves at all, :class:`SceneError`
-    where constraints depend on one another.  Collective.
+    Of a rod that bends from the start on, only the first load is looked at.  Raises :class:`SceneError` where
+    constraints depend on one another.  Collective.
     """
-    if not solver.conservative:
-        return
-    scene, mesh = solver.system.scene, solver.system.fields.discretization
-    nodes = mesh.elements * mesh.degree
-    for load in span:
+    mesh = solver.system.fields.discretization
+    for load in span if solver.conservative else ():
         index = _index(solver, load)
         if index is None:
             return
-        if NODES * index > nodes:
-            check_index(scene, load, index, nodes)
-            finer = BranchSolver(System(scene, mesh.finer(2), solver.system.comm))
-            there = _index(finer, load)
-            if there not in (None, index):
-                warn(
-                    f"At {scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} elements "
-                    f"and {there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a higher "
-                    "degree."
-                )
+        check_index(solver.system.scene, load, index, mesh.elements * mesh.degree)
 
 
 def _index(solver: BranchSolver, load: float) -> int | None:

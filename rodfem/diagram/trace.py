@@ -112,10 +112,9 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
             mesh = _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None:
-                check_start(found, plan.over(scene), recorder.warn)
+                check_start(found, plan.over(scene))
         asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
         recorder.system(found.system, plan.accuracy)
-        _note_unused(discretization, plan, recorder)
         if doubt := round_off_of_strains(scene):
             recorder.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
             plan = replace(plan, error_bars=False)  # two meshes have that round-off alike: no bar would hold it
@@ -155,16 +154,6 @@ def _mesh(
     mesh, change = _frequency_mesh(scene, discretization.formulation, plan, plan.accuracy, comm)
     observer.frequency_mesh(mesh, plan.spectrum or FREQUENCIES, change, plan.accuracy)
     return replace(mesh, factors=discretization.factors)
-
-
-def _note_unused(given: Discretization, plan: Plan, observer: Observer) -> None:
-    """Say that the accuracy of a plan chooses in the place of elements and a degree."""
-    own, asked = (Discretization.elements, Discretization.degree), (given.elements, given.degree)
-    if plan.accuracy is not None and given.vertices is None and asked != own:
-        observer.note(
-            f"  The accuracy chooses the meshes, not elements={given.elements} and degree={given.degree}: "
-            "give vertices, too, for a mesh to begin with."
-        )
 
 
 def _frequency_mesh(

@@ -20,7 +20,7 @@ from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.switching import FIRST
-from rodfem.diagram.branch_ends import beyond, closing, meeting
+from rodfem.diagram.branch_ends import connection, loop_end, point_past_end
 from rodfem.diagram.doubts import PersistentZeros, Quadrature
 from rodfem.diagram.equivalence import equivalent, image_of
 from rodfem.diagram.events import Events
@@ -186,7 +186,7 @@ class Tracer:
     def _take(self, branch: Branch, history: list[Point], row: Point) -> str:
         """Append a row to a branch, with the special points before it; why the branch ends there, or before."""
         previous = history[-1]
-        last = closing(branch, Step(self.solver, previous, row), self.high - self.low, self.here, self.alike)
+        last = loop_end(branch, Step(self.solver, previous, row), self.high - self.low, self.here, self.alike)
         row = last or row
         self._check_symmetry(row)
         self._check(row)
@@ -264,7 +264,7 @@ class Tracer:
             if any(s.kind == special.kind and s.point is special.point for s in branch.special):
                 continue  # at a row that the branch has gone back to
             if special.kind.branches:
-                reason = meeting(branch, special, self.branches, self.alike, self.scene.load)
+                reason = connection(branch, special, self.branches, self.alike, self.scene.load)
             branch.insert(special)
             self.observer.special(branch, special)
             if reason:  # it ends before rows, and loads asked for, that were taken for some of it
@@ -313,7 +313,7 @@ class Tracer:
         previous = self.here(branch.points[-2])
         try:
             with self.solver.system.clock.scope("location"):
-                further = None if previous.x is last.x else beyond(self.solver, last, self.span)
+                further = None if previous.x is last.x else point_past_end(self.solver, last, self.span)
                 found = [] if further is None else self.specials.beyond(previous, further)
         except ConvergenceError as trouble:
             where = f"{self.scene.load} = {last.load:g}"

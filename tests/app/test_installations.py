@@ -11,15 +11,13 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from golden_cases import numbers
-from hemitropic_cases import scene
 from mpi4py import MPI
 
 import rodfem
-from rodfem import Discretization, Plan, libraries
+from rodfem import libraries
 from rodfem.app.console import main
 from rodfem.errors import SetupError
 
@@ -28,13 +26,6 @@ HOME = Path(__file__).parents[2]
 RECORDED = {b["name"]: b["special"] for b in numbers()["demo hemitropic"]}
 
 pytestmark = pytest.mark.versions
-
-
-def loads_of(scene: rodfem.Scene) -> dict[str, Any]:
-    """Loads of the special points of the first branch, on this rank alone."""
-    mesh = Discretization("reduced", elements=8, degree=6)
-    diagram = rodfem.trace(scene, mesh, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
-    return {"loads": [s.point.load for s in diagram.branches[0].special]}
 
 
 def test_a_run_with_all_that_it_can_do(folder: Path) -> None:
@@ -59,13 +50,6 @@ def test_a_run_with_all_that_it_can_do(folder: Path) -> None:
     if COMM.rank == 0:
         main(["view", str(folder / "run"), "--no-open"])
         assert str(first["load"])[:11] in (folder / "run" / "report.html").read_text()
-
-
-def test_many_rods(folder: Path) -> None:
-    found = rodfem.many([scene(), scene()], loads_of, folder / "map")
-    expected = [s["load"] for s in RECORDED["straight"]]
-    for rod in found:
-        assert rod["loads"] == pytest.approx(expected, abs=1e-10)
 
 
 # --- what must not be installed, what must be there -----------------------------------------------------------------
