@@ -598,7 +598,7 @@ FAULTS = {
         HARD,
     ),
     "sweeps-leave-their-path": Fault(
-        "rodfem/diagram/load_steps.py",
+        "rodfem/diagram/equilibria.py",
         "(off > np.maximum(ASTRAY * step, FLOOR)).any()",
         "False",
         HARD,
@@ -1102,7 +1102,7 @@ FAULTS = {
         "tests/literature/test_free_rods.py",
     ),
     "sweeps-go-in-one-step": Fault(
-        "rodfem/diagram/load_steps.py", "PARTS = (1, 2, 4, 8)", "PARTS = (1,)", "tests/diagram/test_held.py"
+        "rodfem/diagram/equilibria.py", "PARTS = (1, 2, 4, 8)", "PARTS = (1,)", "tests/diagram/test_held.py"
     ),
     "flutter-within-its-bars-is-known": Fault(
         "rodfem/diagram/sweep.py",

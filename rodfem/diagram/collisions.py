@@ -26,7 +26,7 @@ from rodfem.continuation.flutter import (
     zero_uncertainty,
 )
 from rodfem.continuation.kinds import FLUTTER, Kind
-from rodfem.diagram.load_steps import at_load
+from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
 from rodfem.stability.frequencies import ALIKE, MULTIPLE, groups
@@ -137,24 +137,21 @@ class Collisions:
         gone = [i for i in a.spectrum.upper.tolist() if i not in common.values()]
         for sign, here, there, chosen in ((1, b, a, born), (-1, a, b, gone)):
             for group in groups(here.spectrum.values[chosen], np.inf, MULTIPLE):
-                self._follow(findings, sign, here, there, [chosen[i] for i in group])
+                upper = [chosen[i] for i in group]
+                try:
+                    event = self._end(here, there, upper)
+                except ConvergenceError as trouble:
+                    findings.doubts.append(
+                        f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was "
+                        f"not followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
+                    )
+                    continue
+                if event is None:
+                    findings.entered += 2 * sign * len(upper)
+                else:
+                    event.change *= sign
+                    self._add(findings, event, here)
         return findings
-
-    def _follow(self, findings: Findings, sign: int, here: Side, there: Side, upper: list[int]) -> None:
-        """Follow equal complex pairs at one load, which have no counterpart at the other one, to where they collide."""
-        try:
-            event = self._end(here, there, upper)
-        except ConvergenceError as trouble:
-            findings.doubts.append(
-                f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was not "
-                f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
-            )
-            return
-        if event is None:
-            findings.entered += 2 * sign * len(upper)
-        else:
-            event.change *= sign
-            self._add(findings, event, here)
 
     def _add(self, findings: Findings, event: Critical, here: Side) -> None:
         """Take a collision, followed from ``here``, together with others at its load; none is to be found twice."""

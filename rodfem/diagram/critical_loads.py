@@ -30,7 +30,7 @@ from rodfem.diagram.collisions import (
     interpolated_zero,
     others_negative,
 )
-from rodfem.diagram.load_steps import at_load
+from rodfem.diagram.equilibria import at_load
 from rodfem.diagram.meetings import Meeting, meetings
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between

@@ -20,8 +20,8 @@ from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.known import equilibria_at
 from rodfem.deflation.search import find_equilibria
+from rodfem.diagram.equilibria import ahead, first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
-from rodfem.diagram.start import ahead, first_state, name_of_first
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link

@@ -17,8 +17,8 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.deflation.search import find_equilibria
+from rodfem.diagram.equilibria import check_index, first_state
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.start import check_index, first_state
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem import form_compiler

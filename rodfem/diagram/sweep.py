@@ -25,9 +25,8 @@ from rodfem.continuation.row_checks import RowCheck
 from rodfem.diagram.collisions import Critical, Side
 from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.doubts import Quadrature
-from rodfem.diagram.load_steps import LoadSteps, at_load
+from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_first
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.start import first_state, name_of_first
 from rodfem.diagram.sweep_errors import SweepErrors
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without

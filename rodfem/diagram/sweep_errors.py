@@ -10,7 +10,7 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.diagram.collisions import Mean, Measuring, located_flutter, zero_near
-from rodfem.diagram.load_steps import at_load
+from rodfem.diagram.equilibria import at_load
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver

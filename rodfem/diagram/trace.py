@@ -18,11 +18,10 @@ from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
 from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.equilibria import at_load, check_start, first_state
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.load_steps import at_load
 from rodfem.diagram.plan import EQUATIONS, Plan, entries
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
-from rodfem.diagram.start import check_start, first_state
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem import form_compiler

@@ -13,8 +13,7 @@ import pytest
 
 import rodfem
 from rodfem.app import console
-from rodfem.app.main import mesh_of, rod_of
-from rodfem.app.options import Statement
+from rodfem.app.main import Statement, mesh_of, rod_of
 from rodfem.app.persons_file import load
 from rodfem.errors import InputError
 
