@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import sys
 from collections.abc import Iterator
 from functools import partial
@@ -23,7 +22,6 @@ from benchmarks.store import Store
 
 sys.path.append(str(ROOT / "tests"))
 
-from hard import kills
 from hard.accuracy import PROBLEMS, at
 from hard.case import Case, Measured
 from hard.cases import CASES
@@ -35,7 +33,7 @@ LIMIT = 900.0
 """Seconds after which a process that measures a case is stopped."""
 ACCURACIES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-11)
 SEED = 1
-"""Of the random scenes, and of the moments of kills."""
+"""Of the random scenes."""
 TITLES = {
     "stiffness": "Stiffness, meshes, rotations",
     "bifurcations": "Bifurcations",
@@ -150,13 +148,8 @@ Measured on {strftime("%Y-%m-%d")}.
 {accuracies_of(store)}"""
 
 
-def kills_of(store: Store) -> str:
-    """What runs left that were killed, in a table."""
-    return table(kills.HEAD, list(kills.in_rows(store.rows("kills"))))
-
-
-def page(store: Store, tries: int, scenes: int) -> str:
-    """The page, with everything measured; so many runs are killed, and so many random scenes traced twice."""
+def page(store: Store, scenes: int) -> str:
+    """The page, with everything measured; so many random scenes are traced twice."""
     head = ["case", "row of the contract", "what makes it hard", "promised", "parameter", "measured", "error over bar"]
     parts = []
     for group, cases in CASES.items():
@@ -164,7 +157,6 @@ def page(store: Store, tries: int, scenes: int) -> str:
         parts.append(f"## {TITLES[group]}\n\n{table(head, rows)}")
     folder = store.path.parent
     store.measure("fuzz", lambda: worker.run(folder / "fuzz.jsonl", SEED, scenes, depth=1, limit=LIMIT))
-    store.measure("kills", lambda: kills.run(folder / "kills.jsonl", tries, SEED))
     counts: dict[str, int] = {}
     for group in CASES:
         for _, data in store.under(group):
@@ -190,14 +182,7 @@ load of a special point that has a reference is counted. Of random scenes (`pyth
 seed {SEED}) special points on two meshes are compared with each other: their difference over the sum of their bars.
 
 {bars_of(store)}
-{accuracy_section(store)}
-## Runs that are killed
-
-A run of the compressed hemitropic rod is killed by SIGKILL (`python -m tests.hard.kills`): at a random time, or before
-a random one of its events of files. Then no process may run on, and the folder has no file yet or whole files of one
-run. **wrong**: anything else.
-
-{kills_of(store)}"""
+{accuracy_section(store)}"""
 
 
 def main() -> None:
@@ -208,7 +193,6 @@ def main() -> None:
     parser.add_argument("--accuracies", action="store_true", help="bring the page's section on these up to date")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "robustness.md")
     parser.add_argument("--resume", action="store_true", help="keep what an interrupted run has measured")
-    parser.add_argument("--tries", type=int, default=200, help="runs that are killed")
     parser.add_argument("--scenes", type=int, default=40, help="random scenes that are traced twice")
     given = parser.parse_args()
     if given.measure:
@@ -219,14 +203,14 @@ def main() -> None:
             print(json.dumps(row), flush=True)
     elif given.accuracies:
         store = Store(ROOT / "results" / "robustness" / "accuracies.json", given.resume)
-        before, rest = re.split(r"(?m)^## (?:Accuracies asked for[\s\S]*?^## )?(?=Runs that)", given.output.read_text())
-        given.output.write_text(f"{before}{accuracy_section(store)}\n## {rest}")
+        before = given.output.read_text().partition("## Accuracies asked for")[0]
+        given.output.write_text(f"{before}{accuracy_section(store)}")
     else:
         store = Store(ROOT / "results" / "robustness" / "measured.json", given.resume)
         if not given.resume:
             for kept in store.path.parent.glob("*.jsonl"):
                 kept.unlink()
-        given.output.write_text(page(store, given.tries, given.scenes))
+        given.output.write_text(page(store, given.scenes))
 
 
 if __name__ == "__main__":

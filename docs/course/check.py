@@ -9,8 +9,8 @@ from typing import Any
 
 from lesson.answers import answer_to, answers
 from rodfem.app.cli import Parser, complain
+from rodfem.app.interrupts import end_quietly
 from rodfem.app.persons_file import load
-from rodfem.app.pipes import end_quietly
 from rodfem.errors import InputError
 
 WRONG = 1

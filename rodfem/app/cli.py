@@ -17,8 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rodfem.app.interrupts import listen
-from rodfem.app.pipes import end_quietly
+from rodfem.app.interrupts import end_quietly, listen
 from rodfem.errors import ConvergenceError, InputError, SetupError
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib", "rich")
@@ -50,10 +49,7 @@ NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$|-(inf|nan)$")
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser whose complaints are one sentence, printed once under MPI.
-
-    The destination of an option is the name of the argument that it is for.
-    """
+    """Argument parser whose complaints are one sentence; the destination of an option is the argument that it sets."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         """As for any parser, with numbers like -1e6 as values."""
@@ -74,11 +70,6 @@ class Parser(argparse.ArgumentParser):
             return self.option(found[1]) + ("" if found[2] == "..." else " " + found[2].strip("'"))
 
         return ARGUMENT.sub(option, text)
-
-    def gives(self, name: str, words: Sequence[str]) -> bool:
-        """Whether the command line sets an option, by an abbreviation maybe."""
-        full = self.option(name)
-        return any(word.split("=")[0] in [full[:end] for end in range(3, len(full) + 1)] for word in words)
 
     def error(self, message: str) -> NoReturn:
         """Print ``message`` and leave with status 2."""

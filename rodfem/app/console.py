@@ -1,21 +1,26 @@
-"""The program ``rodfem``, also ``python -m rodfem``: one of its commands, with the words after it."""
+"""The program ``rodfem``, also ``python -m rodfem``: one of its commands, with the words after it.
+
+A command is a function: its docstring's first line is its line in the list of commands.  What it needs is imported when
+it runs.
+"""
 
 from __future__ import annotations
 
-import ast
+import os
 import signal
 import sys
-from collections.abc import Sequence
+import webbrowser
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from difflib import get_close_matches
-from importlib import import_module
-from importlib.util import find_spec
+from math import inf
 from pathlib import Path
-from types import ModuleType
+from shutil import get_terminal_size
+from textwrap import fill
+from typing import Any
 
 import rodfem
-from rodfem.app.cli import Parser, complain
-from rodfem.app.commands import COMMANDS
-from rodfem.app.commands import __name__ as HOME
+from rodfem.app.cli import Parser, complain, folder, run_folder
 from rodfem.errors import InputError
 
 HELP = """usage: rodfem COMMAND [ARGUMENTS]
@@ -26,24 +31,30 @@ Equilibria of nonlinearly elastic rods: which are stable, and at which load stab
 
 rodfem COMMAND --help lists the arguments of a command.
 """
+OF_INFO = ("parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
+"""Entries of a diagram that ``rodfem info`` prints."""
+HEADS = {"folder": 28, "scene": 16, "date": 10, "branches": 8, "special": 7}
+"""Columns of ``rodfem list``, and their widths."""
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+"""Variables of the environment, one of which is set where there is a display."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that ``arguments``, by default those of the shell, name; bad input ends with one sentence."""
     name, *words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if name in ("-h", "--help", "help"):
-        print(HELP.format(commands="\n".join(f"  {each:<10}{_words(each)}" for each in COMMANDS)), end="")
+        lines = (f"  {each:<10}{_summary(command)}" for each, command in COMMANDS.items())
+        print(HELP.format(commands="\n".join(lines)), end="")
     elif name == "--version":
         print(_versions())
     elif name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
     else:
-        command = _module(name)
         if arguments is None:  # a reader, as head, may leave; PETSc, which a command may load, would complain
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         try:
-            command.main(words)
+            COMMANDS[name](words)
         except InputError as trouble:
             complain(str(trouble))
 
@@ -52,17 +63,171 @@ def _versions() -> str:
     """A line for the program, and one for each library that computes."""
     from rodfem.output.origin import versions  # imports dolfinx, which takes a second
 
-    found = {"rodfem": rodfem.__version__, **versions()}
-    return "\n".join(f"{name:<8}{version}" for name, version in found.items())
+    return "\n".join(f"{name:<8}{version}" for name, version in {"rodfem": rodfem.__version__, **versions()}.items())
 
 
-def _module(name: str) -> ModuleType:
-    return import_module(f"{HOME}.{name}")
+def _summary(command: Callable[..., None]) -> str:
+    """First line of the docstring of a command."""
+    return (command.__doc__ or "").partition("\n")[0]
 
 
-def _words(name: str) -> str:
-    """First line of the docstring of a command's module, which is not imported: that takes long."""
-    spec = find_spec(f"{HOME}.{name}")
-    assert spec is not None
-    assert spec.origin is not None
-    return (ast.get_docstring(ast.parse(Path(spec.origin).read_text())) or "").partition("\n")[0]
+def convert(words: Sequence[str]) -> None:
+    """Write a saved diagram for other programs: VTKHDF (ParaView), CSV."""
+    from rodfem.output.convert import FORMATS
+    from rodfem.output.files import load_json
+    from rodfem.whole_files import writing
+
+    parser = Parser(prog="rodfem convert", description=_summary(convert))
+    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
+    parser.add_argument("--to", dest="format", choices=FORMATS, default="vtkhdf", help="format (default vtkhdf)")
+    parser.add_argument("--output", type=folder, metavar="DIR", help="folder for the files (default FOLDER/FORMAT)")
+    options = parser.parse_args(words)
+    target: Path = options.output or options.folder / options.format
+    load_json(options.folder / "diagram.json")  # no folder is made for a run that there is not
+    with writing(target):
+        target.mkdir(parents=True, exist_ok=True)
+    for path in FORMATS[options.format](options.folder, target):
+        print(path)
+
+
+def explain(words: Sequence[str]) -> None:
+    """A word of the tables, files and pictures, in a sentence or two."""
+    from rodfem.app.terminal import WIDTH
+    from rodfem.output.glossary import ENTRIES, explanation, is_entry, title
+
+    parser = Parser(prog="rodfem explain", description=_summary(explain))
+    parser.add_argument("word", nargs="*", help="as index, BP LP, branch point; none lists all")
+    given = parser.parse_args(words).word
+    if not given:
+        print("\n".join(sorted(map(title, ENTRIES), key=str.lower)))
+    together = [" ".join(given)] if given else []
+    each = together if any(map(is_entry, together)) or not all(map(is_entry, given)) else given
+    for name, text in (entry for word in each for entry in explanation(word)):
+        width = min(WIDTH, get_terminal_size().columns) if sys.stdout.isatty() else WIDTH
+        print(fill(f"{name}: {text}", width, subsequent_indent="  "))
+
+
+def info(words: Sequence[str]) -> None:
+    """Special points, meshes and accuracy of a saved diagram."""
+    from rodfem.output.contents import read_diagram
+    from rodfem.output.summary import in_sentences
+    from rodfem.output.words import table_of
+
+    parser = Parser(prog="rodfem info", description=_summary(info))
+    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
+    data = read_diagram(parser.parse_args(words).folder / "diagram.json", OF_INFO)
+    constants = ", ".join(f"{name} = {value:.6g}" for name, value in data["constants"].items())
+    lines = [f"{data.get('title', data['scene'])}: {constants or 'no constants'}"]
+    for mesh in data["meshes"]:
+        lines.append(f"  {mesh['elements']} elements of degree {mesh['degree']}, {mesh['unknowns']} unknowns")
+    lines.append(f"  {'branch':<12} {'kind':<13} {data['parameter']:<24} {data['ordinate'][:24]:<24} index")
+    rows = list(table_of(data))
+    for branch in data["branches"]:
+        for name, kind, load, ordinate, index, _ in (row for row in rows if row[0] == branch["name"]):
+            lines.append(f"  {name:<12} {kind:<13} {load:<24} {ordinate:<24} {index}")
+        lines.append(f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}")
+    print("\n".join([*lines, *(f"  {sentence}" for sentence in in_sentences(data))]))
+
+
+def list_diagrams(words: Sequence[str]) -> None:
+    """Saved diagrams below a folder: scene, date, size, first loss of stability.
+
+    Raises :class:`~rodfem.errors.InputError` where there is none.
+    """
+    parser = Parser(prog="rodfem list", description=_summary(list_diagrams))
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("results"), help="default: results")
+    place = parser.parse_args(words).folder
+    files = sorted(place.rglob("diagram.json"))
+    if not files:
+        raise InputError(f"No folder in {place} has a diagram.json: run a scene, or name a folder with results.")
+    print("\n".join([_row(*HEADS, "first loss of stability"), *map(_diagram, files)]))
+
+
+def _diagram(file: Path) -> str:
+    """Line of a diagram; a file that is none has its reason in place of numbers."""
+    from rodfem.output.contents import read_diagram
+
+    name = str(file.parent)
+    try:
+        data = read_diagram(file, ("scene", "parameter", "branches"))
+        written = datetime.fromtimestamp(file.stat().st_mtime, UTC).isoformat()
+        date = str((data.get("origin") or {}).get("date") or written)[: HEADS["date"]]
+        branches = data["branches"]
+        special = sum(len(branch["special"]) for branch in branches)
+        return _row(name, data["scene"], date, str(len(branches)), str(special), first_loss(data))
+    except InputError as trouble:
+        return f"{name:<{HEADS['folder']}} {trouble}"
+
+
+def _row(*cells: str) -> str:
+    *others, last = cells
+    return " ".join([*(f"{cell:<{width}}" for cell, width in zip(others, HEADS.values(), strict=True)), last])
+
+
+def first_loss(data: Mapping[str, Any]) -> str:
+    """Kind and load of the first special point on the first branch from which on it is unstable, with its accuracy.
+
+    Of a planar rod it is the loss of stability in the plane, and the words say so.
+    """
+    from rodfem.output.summary import called
+
+    if not data["branches"]:
+        return "no branches"
+    branch = data["branches"][0]
+    columns, plane = branch["columns"], " in the plane" if data.get("planar") else ""
+    if branch.get("singular_start"):
+        return "the first state is singular"
+    if columns["negative"][0]:
+        return f"unstable{plane} from the first state on"
+    lost, unexplained = next(_losses(branch), None), [x["row"] for x in branch.get("unexplained") or ()]
+    if unexplained and (lost is None or lost["row"] > min(unexplained)):
+        load = columns["load"][min(unexplained)]
+        return f"unknown: the index changes near {data['parameter']} = {load:.6g} unexplained"
+    if lost is not None:
+        return f"{lost['kind']}{plane} at {data['parameter']} = {_load_of(lost)}"
+    if any(columns["negative"]):
+        return f"unstable{plane} somewhere, without a special point"
+    ends = f"from {columns['load'][0]:.6g} to {columns['load'][-1]:.6g}"
+    return f"none{plane}: {called(branch['name'])} is stable {ends}"
+
+
+def _losses(branch: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """Yield the special points of a branch at which stability is lost."""
+    from rodfem.continuation.kinds import KINDS
+
+    for special in branch["special"]:
+        if not KINDS[special["kind"]].given and not special["negative_before"] and special["negative_after"]:
+            yield special
+
+
+def _load_of(special: Mapping[str, Any]) -> str:
+    """Load of a special point, with its accuracy."""
+    from rodfem.output.digits import number
+
+    bar = special.get("error_estimate")
+    return number(special["load"], inf if bar is None else bar, special.get("resolved"))
+
+
+def run(words: Sequence[str]) -> None:
+    """Trace the rod of a file, with its constants as options."""
+    from rodfem.app.main import main as run_file
+
+    run_file(words)
+
+
+def view(words: Sequence[str]) -> None:
+    """A report on a saved diagram, in the browser: the diagram, the rod in space, its stability."""
+    from rodfem.report.page import write_report
+
+    parser = Parser(prog="rodfem view", description=_summary(view))
+    parser.add_argument("folder", type=Path, help="that of a run, as results/cord")
+    parser.add_argument("--output", type=Path, help="page to write (default: report.html in the folder)")
+    parser.add_argument("--no-open", action="store_true", help="write the page, and open no browser")
+    given = parser.parse_args(words)
+    path = write_report(given.folder, given.output)
+    print(path)
+    if not given.no_open and (sys.platform in ("darwin", "win32") or any(map(os.environ.get, DISPLAYS))):
+        webbrowser.open(path.resolve().as_uri())
+
+
+COMMANDS = {"convert": convert, "explain": explain, "info": info, "list": list_diagrams, "run": run, "view": view}

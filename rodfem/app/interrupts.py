@@ -1,4 +1,4 @@
-"""Interrupts of programs: one sentence and status 130, on any number of ranks, whichever of them is told.
+"""Signals to programs: an interrupt is one sentence and status 130, whichever rank gets it; a closed pipe is no word.
 
 A rank that is interrupted ends the others, too: they wait for it in a message, where Python hears no signal.
 """
@@ -70,3 +70,10 @@ def held() -> Iterator[None]:
             signal.signal(each, signal.SIG_DFL if handler is None else handler)
         if late:
             signal.raise_signal(late[0])
+
+
+def end_quietly() -> None:
+    """Have the system end this process when nobody reads what it prints, as ``head``, and not PETSc, which it loads."""
+    from petsc4py import PETSc  # noqa: F401
+
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)

@@ -1,64 +1,59 @@
-"""The command line of a rod: options of its constants, and those that all rods have."""
+"""The command ``rodfem run``: the rod of a file, with options of its constants and those that all rods have."""
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
+from inspect import Parameter, cleandoc, getdoc, isfunction, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rodfem.app.cli import Parser, complain, sentences, start_petsc
-from rodfem.app.constants import Statement
-from rodfem.app.options import add_options, mesh_of, plan_of
+from rodfem.app.cli import Parser, complain, folder, sentences, start_petsc
+from rodfem.app.persons_file import load
 from rodfem.errors import InputError
+from rodfem.problem.scene import Scene
+from rodfem.stability.registry import AUTO, METHODS
 
 if TYPE_CHECKING:
+    from rodfem.diagram.plan import Plan
     from rodfem.fem.fields import Discretization
-    from rodfem.problem.scene import Scene
 
 Mesh = Callable[..., "Discretization"]
 KEPT = "the branches that were finished are in"
 """What there is in the folder of a run that was interrupted."""
 NOTED = ("-rodfem_", "-mat_", "-vec_", "-eps_", "-st_", "-ksp_", "-pc_")
 """Beginnings of options of solvers, all of which have the prefix ``rodfem_`` here, of matrices and of vectors."""
+STEP = 0.1
+"""Largest step along a branch, in radian, by default."""
+HELP = """usage: rodfem run FILE.py [--scene NAME] [OPTIONS]
+
+Trace the rod of a file: a Scene, or a function with '-> Scene' whose arguments have defaults and are the rod's
+constants. Where the file has several, --scene names one. A function with '-> Discretization' of the same constants is
+its mesh, where no option asks for another.
+
+rodfem run FILE.py --help lists all options of the rod.
+"""
 
 
-def main(
-    rod: Callable[..., Scene] | Scene,
-    mesh: Mesh | None = None,
-    arguments: Sequence[str] | None = None,
-    program: str | None = None,
-) -> None:
-    """Parse the command line, state the rod, run it; bad input ends with one sentence and status 2.
-
-    An interrupt is raised as KeyboardInterrupt, with the sentence that the program ends with.
-
-    Parameters
-    ----------
-    rod
-        A scene, or a function of constants that returns one.  Each argument of the function has a default and is an
-        option; its words are those of the section Parameters of the docstring.  Of a scene the parameters beside the
-        load are options.
-    mesh
-        Function of the same constants that returns the discretisation where no option asks for another.
-    arguments
-        Replace those of the command line.
-    program
-        Name for the help, by default that of the script.
-    """
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
-    try:
-        statement = Statement(rod)
-        usual = statement.scene()
-        parser = parser_of(statement, usual, program or Path(sys.argv[0]).name)
-    except InputError as trouble:
-        complain(str(trouble))
-    varied = f"--{usual.load}"
-    if varied in [word.split("=")[0] for word in ours] and varied not in parser._option_string_actions:
-        complain(f"{usual.load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
+def main(words: Sequence[str]) -> None:
+    """State the rod of a file and run it; raises KeyboardInterrupt with the sentence that the program ends with."""
+    if not words or words[0] in ("-h", "--help"):
+        print(HELP, end="")
+        sys.exit(0)
+    file, *rest = words
+    name = None
+    if rest[:1] == ["--scene"]:
+        name, rest = (rest[1] if len(rest) > 1 else ""), rest[2:]
+    module = load(Path(file))
+    statement, mesh = Statement(rod_of(module, name)), mesh_of(module)
+    ours, petsc = (rest[: rest.index("--")], rest[rest.index("--") + 1 :]) if "--" in rest else (rest, [])
+    parser = parser_of(statement, statement.scene(), f"rodfem run {file}")
+    _refuse_the_load(statement.scene().load, ours, parser)
     options = parser.parse_args(ours)
     start_petsc(petsc)
     try:
@@ -70,11 +65,15 @@ def main(
         complain(f"Memory is exhausted: use fewer elements or a lower degree; {KEPT} {options.output}.")
 
 
-def unread(words: Sequence[str]) -> list[str]:
-    """Options of solvers, matrices and vectors among ``words``, of those after a lone ``--``, that nothing has read.
+def _refuse_the_load(load: str, words: Sequence[str], parser: Parser) -> None:
+    """Complain of the load among the options, unless a constant has its name: a run varies it."""
+    option = f"--{load}"
+    if option in [word.split("=")[0] for word in words] and option not in parser._option_string_actions:
+        complain(f"{load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
 
-    PETSc ignores what it does not know.
-    """
+
+def unread(words: Sequence[str]) -> list[str]:
+    """Options among ``words`` that belong to solvers, matrices and vectors, and that PETSc has not read."""
     from cffi import FFI
     from petsc4py import PETSc
 
@@ -90,10 +89,7 @@ def unread(words: Sequence[str]) -> list[str]:
 
 
 def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
-    """Parser of all options of a rod; raises :class:`InputError` where a constant has the name of another option.
-
-    ``usual`` is the scene with the usual constants, ``program`` the name for the help.
-    """
+    """Parser of all options of a rod; raises :class:`InputError` for a constant with the name of another option."""
     parser = Parser(
         prog=program,
         description=statement.words,
@@ -117,10 +113,7 @@ def _run(
     petsc: Sequence[str],
     words: Callable[[str], str],
 ) -> None:
-    """State the rod and run it.
-
-    ``statement``, ``mesh`` and ``petsc`` are those of :func:`main`, ``words`` rewords what is said.
-    """
+    """State the rod and run it; ``words`` rewords what is said."""
     from petsc4py import PETSc
 
     from rodfem.app.run import run
@@ -129,7 +122,8 @@ def _run(
     if petsc:  # once more, for a PETSc that was running already
         PETSc.Options().insertString(" ".join(petsc))
     constants = statement.values(options)
-    scene, discretization, plan = statement.scene(**constants), _mesh(mesh, options, constants), plan_of(options)
+    own = None if mesh is None else mesh(**constants)
+    scene, discretization, plan = statement.scene(**constants), discretization_of(options, own), plan_of(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
     run(scene, discretization, plan, options.output, figures=options.figures, words=words)
@@ -137,5 +131,225 @@ def _run(
         Report().warn(f"PETSc did not read the option {', '.join(ignored)}: see whether it is spelled right.")
 
 
-def _mesh(mesh: Mesh | None, options: argparse.Namespace, constants: Mapping[str, Any]) -> Discretization:
-    return mesh_of(options, None if mesh is None else mesh(**constants))
+def rod_of(module: ModuleType, name: str | None) -> Callable[..., Scene] | Scene:
+    """Scene of a module, or the function that states it; raises :class:`InputError` unless there is one to choose."""
+    scenes = {n: x for n, x in vars(module).items() if isinstance(x, Scene)} | _returning(module, "Scene")
+    choice = ", ".join(scenes)
+    if name is not None:
+        if name not in scenes:
+            raise InputError(f"{module.__file__} has no scene {name!r}: choose one of {choice or 'those you add'}.")
+        return scenes[name]
+    if not scenes:
+        raise InputError(f"{module.__file__} states no rod: give it a Scene, or a function with '-> Scene'.")
+    if len(scenes) > 1:
+        raise InputError(f"{module.__file__} has the scenes {choice}: choose one by --scene NAME.")
+    return next(iter(scenes.values()))
+
+
+def mesh_of(module: ModuleType) -> Mesh | None:
+    """Function of a module that returns a discretisation, if it has one; raises :class:`InputError` for several."""
+    found = _returning(module, "Discretization")
+    if len(found) > 1:
+        raise InputError(f"{module.__file__} has the meshes {', '.join(found)}: keep one function with that result.")
+    return next(iter(found.values()), None)
+
+
+def _returning(module: ModuleType, kind: str) -> dict[str, Callable[..., Any]]:
+    """Functions of a module, by name, that are annotated to return a class of rodfem."""
+    found: dict[str, Callable[..., Any]] = {}
+    for name, x in vars(module).items():
+        if isfunction(x) and x.__module__ == module.__name__ and not name.startswith("_"):
+            returned = signature(x).return_annotation
+            word = returned if isinstance(returned, str) else getattr(returned, "__name__", "")
+            if word.rpartition(".")[2].strip("'\"") == kind:
+                found[name] = x
+    return found
+
+
+def add_options(parser: Parser, load: str, output: Path) -> None:
+    """Declare them; ``load`` is the name of the load, ``output`` the default folder."""
+    from rodfem.fem import formulations
+
+    words = {
+        "--elements": "number of finite elements along the rod (default: the scene's own, or 8)",
+        "--degree": "polynomial degree; the error falls as h^(2K) (default: the scene's own, or 6)",
+        "--formulation": "; ".join(f"{made.name}: {made.words}" for made in formulations.FORMULATIONS.values())
+        + f"; {formulations.AUTO}: the first that the scene allows (default {formulations.AUTO})",
+        "--factors": "chain: compiled assembly and elimination along the rod, on one rank; petsc: the same numbers, "
+        "slower, by dolfinx, PETSc and MUMPS, as always on several ranks (default chain)",
+        "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
+        "error by less than EPS (relative to values greater than one)",
+        "--range": f"start at {load} = A, stay between A and B (default: the scene's)",
+        "--at": f"compute every branch also at exactly these values of {load}",
+        "--step": f"largest step along a branch, in radian of rotation (root mean square; default {STEP})",
+        "--depth": "follow what leaves from branch points of branches of a depth less than D; the first branch has "
+        "depth 0, what leaves from it 1, and so on (default 2)",
+        "--spectrum": "also compute the K left-most eigenvalues of every state with SLEPc",
+        "--method": "judge the states at the loads of --at, and print all that is said, by "
+        f"{', '.join((AUTO, *METHODS))}",
+        "--modes": "find and draw the K left-most modes of the states at the loads of --at",
+        "--search": "at each load of --at also look for equilibria that no branch has reached, with that many tries",
+        "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
+        "--output": f"folder for files and pictures (default {output})",
+        "--no-figures": "draw nothing",
+    }
+    groups: dict[str, dict[str, dict[str, Any]]] = {
+        "discretisation": {
+            "--elements": {"type": int, "metavar": "N"},
+            "--degree": {"type": int, "metavar": "K"},
+            "--formulation": {"metavar": f"{{{','.join(formulations.names())}}}"},
+            "--factors": {"default": "chain", "metavar": "{chain,petsc}"},
+            "--accuracy": {"type": float, "metavar": "EPS"},
+        },
+        "what to compute": {
+            "--range": {"dest": "span", "type": float, "nargs": 2, "metavar": ("A", "B")},
+            "--at": {"type": float, "nargs": "+", "default": [], "metavar": "LOAD"},
+            "--step": {"dest": "largest", "type": float, "metavar": "S"},
+            "--depth": {"type": int, "default": 2, "metavar": "D"},
+            "--spectrum": {"type": int, "default": 0, "metavar": "K"},
+            "--method": {"default": "", "metavar": "NAME"},
+            "--modes": {"type": int, "default": 0, "metavar": "K"},
+            "--search": {"dest": "tries", "type": int, "default": 0, "metavar": "TRIES"},
+            "--locus": {"nargs": 3, "metavar": ("NAME", "LOW", "HIGH")},
+        },
+        "output": {
+            "--output": {"type": folder, "default": output, "metavar": "DIR"},
+            "--no-figures": {"dest": "figures", "action": "store_false"},
+        },
+    }
+    for title, options in groups.items():
+        group = parser.add_argument_group(title)
+        for option, how in options.items():
+            group.add_argument(option, help=words[option], **how)
+
+
+def discretization_of(options: argparse.Namespace, own: Discretization | None) -> Discretization:
+    """Discretisation that the options ask for, or the scene's ``own``; raises :class:`InputError` for what is none."""
+    from rodfem.fem.fields import Discretization
+
+    chosen = {name: getattr(options, name) for name in ("formulation", "elements", "degree")}
+    given = {name: value for name, value in chosen.items() if value is not None}
+    for name in ("elements", "degree"):
+        if options.accuracy is not None and name in given:
+            raise InputError(f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy.")
+    own = own or Discretization()
+    if options.accuracy is not None and own.vertices is None:
+        own = replace(own, elements=Discretization.elements, degree=Discretization.degree)
+    return replace(own, factors=options.factors, **given)
+
+
+def plan_of(options: argparse.Namespace) -> Plan:
+    """Plan that the options ask for; raises :class:`InputError` for what is none."""
+    from rodfem.continuation.step_control import StepControl
+    from rodfem.diagram.plan import Plan
+
+    return Plan(
+        None if options.span is None else tuple(options.span),
+        tuple(options.at),
+        depth=options.depth,
+        spectrum=options.spectrum,
+        steps=StepControl(largest=STEP if options.largest is None else options.largest),
+        tries=options.tries,
+        locus=_pair(options.locus),
+        method=options.method,
+        modes=options.modes,
+        accuracy=options.accuracy,
+    )
+
+
+def _pair(words: Sequence[str] | None) -> tuple[str, float, float] | None:
+    """Name and interval of a second parameter; raises :class:`InputError` for what are no numbers."""
+    if words is None:
+        return None
+    try:
+        return words[0], float(words[1]), float(words[2])
+    except ValueError:
+        raise InputError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None
+
+
+KINDS = (bool, int, float, str)
+"""Types of a constant; a tuple has numbers."""
+
+
+class Constant(NamedTuple):
+    """An argument with its ``name``, ``default``, type ``kind`` and ``words``; ``size`` of a tuple, None of others."""
+
+    name: str
+    default: Any
+    kind: type
+    size: int | None
+    words: str
+
+    @property
+    def option(self) -> str:
+        """As on the command line."""
+        return f"--{self.name.replace('_', '-')}"
+
+    def declare(self, group: Any) -> None:
+        """Declare the option in a group of options of :mod:`argparse`."""
+        how: dict[str, Any] = {"dest": self.name, "default": self.default, "help": self._help()}
+        if self.kind is bool:
+            group.add_argument(self.option, action=argparse.BooleanOptionalAction, **how)
+        else:
+            how |= {} if self.size is None else {"nargs": self.size}
+            group.add_argument(self.option, type=self.kind, metavar="X" if self.kind is float else "N", **how)
+
+    def _help(self) -> str:
+        shown = " ".join(f"{x:g}" for x in self.default) if self.size else self.default
+        default = f"{shown:g}" if self.kind is float and not self.size else shown
+        return f"{self.words} (default {default})".replace("%", "%%").strip()
+
+
+class Statement:
+    """A rod as a function of its constants, of a scene alone the parameters beside its load."""
+
+    def __init__(self, of: Callable[..., Scene] | Scene) -> None:
+        """Read the constants; raises :class:`InputError` for one without a default, or of no type that has options."""
+        if isinstance(of, Scene):
+            scene, self.words = of, of.title
+            others = [(name, p.value) for name, p in scene.parameters.items() if name != scene.load]
+            self.constants = [Constant(name, value, float, None, "") for name, value in others]
+            self._of: Callable[..., Scene] = scene.varying
+        else:
+            self.words = cleandoc(of.__doc__ or "")
+            described = descriptions(getdoc(of) or "")
+            self.constants = [_constant(of.__name__, p, described) for p in signature(of).parameters.values()]
+            self._of = of
+        self.scene = cache(self._made)
+
+    def _made(self, **values: Any) -> Scene:
+        """The scene with these constants; raises :class:`InputError` where the function returns none."""
+        scene = self._of(**values)
+        if not isinstance(scene, Scene):
+            raise InputError(f"{getattr(self._of, '__name__', 'it')} returns {scene!r}: let it return a Scene.")
+        return scene
+
+    def values(self, options: argparse.Namespace) -> dict[str, Any]:
+        """Values of the constants among parsed options."""
+        given = {c.name: getattr(options, c.name) for c in self.constants}
+        return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+
+
+def _constant(owner: str, argument: Parameter, described: Mapping[str, str]) -> Constant:
+    """Constant of an argument of the function ``owner``."""
+    name, default = argument.name, argument.default
+    if default is Parameter.empty:
+        raise InputError(f"The argument {name} of {owner} has no default: give it one, which an option can replace.")
+    size = len(default) if isinstance(default, tuple) else None
+    kinds = set(map(type, default)) if size else {type(default)}
+    number = kinds == {int} and "float" in str(argument.annotation)
+    kind = float if number or kinds == {int, float} else kinds.pop()
+    if kind not in (KINDS if size is None else (int, float)):
+        raise InputError(
+            f"The argument {name} of {owner} has the default {default!r}: give a number, a word, or a tuple of numbers."
+        )
+    return Constant(name, default, kind, size, described.get(name, ""))
+
+
+def descriptions(text: str) -> dict[str, str]:
+    """Words on each argument, from the section Parameters of a docstring in the style of numpy."""
+    _, _, section = text.partition("Parameters\n----------\n")
+    found: dict[str, str] = {}
+    for name, words in re.findall(r"^(\w+)[^\n]*\n((?:[ \t]+[^\n]+\n?)+)", section, re.MULTILINE):
+        found[name] = " ".join(words.split()).removesuffix(".")
+    return found

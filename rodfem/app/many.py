@@ -65,10 +65,7 @@ def many(
 def _shared(
     scenes: Sequence[Scene], work: Work, files: Sequence[Path], comm: MPI.Comm, progress: Callable[[int, int], None]
 ) -> list[dict[str, Any]]:
-    """Do the ``work`` on all ``scenes``, each with a file of its own, as :func:`many` does.
-
-    ``comm`` has the ranks, ``progress`` is called after each scene of the first one.
-    """
+    """Do the ``work`` on all ``scenes``, each with a file of its own, as :func:`many` does."""
     on_first(comm, lambda: _check(files))
     trouble: InputError | None = None
     try:

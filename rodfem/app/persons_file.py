@@ -65,34 +65,16 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     except InputError:
         raise
     except (Exception, SystemExit) as trouble:  # whatever the file does
-        line = getattr(trouble, "lineno", None) if isinstance(trouble, SyntaxError) else _last_line(path, trouble)
-        where = f"{file}, line {line}" if line else f"{file}"
-        words = f"{where}: {type(trouble).__name__}: {trouble}{_there_are(trouble)}"
-        raise InputError(f"{words}; run {_python()} {file} to see more.") from trouble
+        words = f"{file}{_line(path, trouble)}: {type(trouble).__name__}: {trouble}"
+        raise InputError(f"{words}; run {sys.executable} {file} to see more.") from trouble
     finally:
         if before is not None:
             sys.modules[spec.name] = before
     return module
 
 
-def _last_line(path: Path, trouble: BaseException) -> int | None:
-    """Last line of a file that ran before it failed."""
-    return next((f.lineno for f in reversed(extract_tb(trouble.__traceback__)) if f.filename == str(path)), None)
-
-
-def _there_are(trouble: BaseException) -> str:
-    """Public functions and classes of a module of rodfem in which a name was looked for in vain."""
-    module = getattr(trouble, "obj", None)
-    if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):
-        return ""
-    here = module.__name__
-    if not here.startswith("rodfem"):
-        return ""
-    names = [n for n, x in vars(module).items() if not n.startswith("_") and getattr(x, "__module__", "") == here]
-    return f": there are {', '.join(sorted(names))}" if names else ""
-
-
-def _python() -> str:
-    """Path of the interpreter, relative to the folder in which it is typed if it is below that."""
-    path = Path(sys.executable)
-    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+def _line(path: Path, trouble: BaseException) -> str:
+    """Last line of a file that ran before it failed, or that is no Python, in words."""
+    lines = [frame.lineno for frame in extract_tb(trouble.__traceback__) if frame.filename == str(path)]
+    line = trouble.lineno if isinstance(trouble, SyntaxError) else lines[-1] if lines else None
+    return f", line {line}" if line else ""

@@ -1,32 +1,44 @@
-"""One run of a scene from beginning to end: solve, save as it goes, draw."""
+"""One run of a scene from beginning to end: trace, save as it goes, then judge, follow and draw."""
 
 from __future__ import annotations
 
 import atexit
 import gc
 import os
+import shlex
 from collections.abc import Callable
+from dataclasses import asdict
+from functools import cache, partial
 from pathlib import Path
-from shlex import quote
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
 from rodfem.app.interrupts import held
-from rodfem.app.loci import follow_all
 from rodfem.app.persons_file import leave_the_run
-from rodfem.app.run_terminal import Terminal
 from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem.continuation.kinds import USER
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN, traced
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
-from rodfem.output.files import save_json
-from rodfem.output.folder import locked
+from rodfem.fem.system import System
+from rodfem.modes.finder import ModeFinder
+from rodfem.modes.modes import Modes, save_modes
+from rodfem.modes.typical import typical_modes
+from rodfem.output.files import save_json, save_run
+from rodfem.output.folder import locked, remove_earlier
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
+from rodfem.stability.assessment import Assessor, Verdict
+
+if TYPE_CHECKING:
+    from rodfem.codim2.locus import Locus
 
 atexit.register(gc.freeze)  # what there is at the end goes with the process: a search for garbage in it takes 0.15 s
 
@@ -94,31 +106,153 @@ def run(
     return diagram
 
 
+class Terminal(Report):
+    """Shows a run on the terminal, and keeps its files up to date."""
+
+    def __init__(
+        self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool, words: Callable[[str], str] = str
+    ) -> None:
+        """Write what the ``plan`` asks for into the folder ``output``, which there is, on the first rank of ``comm``.
+
+        With ``quiet`` nothing is printed, else what ``words`` makes of each line.
+        """
+        super().__init__(comm, words=words)
+        if quiet:
+            self.on = self.live = False
+        self.plan, self.output, self.comm, self._saved = plan, output, comm, 0
+
+    def system(self, system: System, accuracy: float | None = None) -> None:
+        """Say what is solved, and refuse a method that does not apply before anything is computed."""
+        super().system(system, accuracy)
+        if self.plan.method or self.plan.modes:
+            Assessor(system).choose(self.plan.method or "auto", self.plan.modes)
+
+    def complete(self, diagram: Diagram) -> None:
+        """Save the branches that have not been saved: an interrupted run keeps those that are complete."""
+        if self._saved == len(diagram):
+            return
+        new = diagram.branches[self._saved :]
+        modes = typical_modes(new, diagram.solvers)
+        with diagram.clock("files"), held():
+            if not self._saved:
+                on_first(self.comm, lambda: remove_earlier(self.output))
+            save_run(diagram.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
+            self._saved = len(diagram)
+
+
 def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     """Print tables, do what the plan asks for beyond branches, and draw the pictures if ``figures``."""
-    scene, plan, output, comm = diagram.scene, terminal.plan, terminal.output, diagram.solvers[0].system.comm
-    branches, clock = diagram.branches, diagram.clock
-    terminal.save(diagram)
+    scene, plan, output, branches = diagram.scene, terminal.plan, terminal.output, diagram.branches
+    terminal.complete(diagram)
     data = diagram.data
-    on_first(comm, lambda: save_json(data, output / "diagram.json"))
+    on_first(terminal.comm, lambda: save_json(data, output / "diagram.json"))
     terminal.table(data, branches, plan.most_branches)
     terminal.summary(data)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
-    terminal.timing(clock, sum(len(b.points) for b in branches))
-    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {quote(str(output))} shows them)")
+    terminal.timing(diagram.clock, sum(len(b.points) for b in branches))
+    named = shlex.quote(str(output))
+    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {named} shows them)")
     if plan.method or plan.modes:
-        from rodfem.app.assess_all import assess_all
-
-        assess_all(branches, diagram.solvers, plan, output, terminal, figures)
+        _assess(diagram, terminal, figures)
     if plan.locus is not None:
-        follow_all(branches, diagram.solvers, plan, output, terminal, figures)
+        _follow(diagram, terminal, figures, plan.locus)
     if figures:
         terminal.working("pictures")
-        on_first(comm, lambda: draw(output, terminal))
+        on_first(terminal.comm, lambda: draw(output, terminal))
     diagram.complete = True
     with held():
-        on_first(comm, lambda: save_json(data | {"complete": True}, output / "diagram.json"))
+        on_first(terminal.comm, lambda: save_json(data | {"complete": True}, output / "diagram.json"))
+
+
+def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
+    """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""
+    plan, output = terminal.plan, terminal.output
+    which = (
+        "left-most eigenvalues mu = omega^2" if diagram.scene.conservative else "eigenvalues mu = omega^2 nearest zero"
+    )
+    terminal.say(f"\nIs it stable? ({which})")
+    finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
+    saved: list[tuple[str, int]] = []
+    for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
+        where = f"{diagram.scene.load} = {special.point.load:.10g}"
+        terminal.working(f"{branch.name} at {where}: stability{' and modes' if plan.modes else ''}")
+        try:
+            verdict, modes = _verdict(finder_on(special.point.mesh), special, plan)
+        except (InputError, ConvergenceError) as trouble:
+            terminal.warn(str(trouble))
+            continue
+        terminal.verdict(branch.name, where, verdict.at(special.point), modes)
+        if modes is not None:
+            keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
+            on_first(terminal.comm, partial(keep, first=not saved, scene=diagram.scene))
+            saved.append((branch.name, special.row))
+    if saved:
+        pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
+        _draw_modes(saved, pictures, terminal)
+        terminal.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
+
+
+def _verdict(finder: ModeFinder, special: SpecialPoint, plan: Plan) -> tuple[Verdict, Modes | None]:
+    """Verdict on a state, and its modes if the plan asks for them."""
+    if plan.modes:
+        return finder(special.point.x, plan.modes, plan.method or "auto")
+    return finder.assessor(special.point.x, plan.method), None
+
+
+def _about(diagram: Diagram) -> dict[str, Any]:
+    """What a file of modes says of its scene and its mesh."""
+    scene, mesh = diagram.scene, asdict(diagram.solvers[0].system.fields.discretization)
+    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
+    return about | {name: value for name, value in mesh.items() if name != "vertices"}
+
+
+def _draw_modes(saved: list[tuple[str, int]], pictures: list[str], terminal: Terminal) -> None:
+    """Draw the modes that were saved of rows of branches: a picture and an animation of each row."""
+    from rodfem.output.plot_modes import draw_modes
+
+    for (name, row), picture in zip(saved, pictures, strict=False):
+        terminal.working(f"{name}, row {row}: pictures and animations of its modes")
+        for suffix in (".png", ".gif"):
+            target = terminal.output / f"{picture}{suffix}"
+            on_first(terminal.comm, partial(draw_modes, terminal.output / "modes.h5", name, row, target))
+
+
+def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[str, float, float]) -> None:
+    """Follow each special point that no locus passes in the plane of the load and the parameter that is asked for."""
+    saved: list[dict] = []
+    for branch in diagram:
+        near: list[Locus] = []
+        for special in _to_follow(branch):
+            which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
+            if any(found.passes(special, diagram.solvers[0].units) for found in near):
+                terminal.say(f"\nThe {which} is on a locus above")
+                continue
+            if terminal.plan.accuracy is not None:
+                terminal.say(
+                    "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
+                )
+            terminal.say(f"\nLocus of the {which}")
+            terminal.working(f"locus {len(saved) + 1}, of the {which}")
+            try:
+                near.append(diagram.locus(special, asked[0], asked[1:]))
+            except (InputError, ConvergenceError) as trouble:
+                terminal.warn(str(trouble))
+                continue
+            terminal.say(near[-1].text())
+            saved.append(near[-1].data())
+            on_first(terminal.comm, partial(near[-1].save, terminal.output / f"locus-{len(saved)}.json"))
+    if saved and figures:
+        from rodfem.output.plot_locus import draw_locus
+
+        on_first(terminal.comm, lambda: draw_locus(saved, terminal.output / "locus.png"))
+        terminal.say(f"Loci in {terminal.output}{os.sep}: locus-1.json ..., locus.png")
+
+
+def _to_follow(branch: Branch) -> list[SpecialPoint]:
+    """Special points of a branch that have a locus, but for those at which it meets another branch."""
+    found = (s for s in branch.special if s.connects_to is None)
+    return [s for s in found if s.kind.counted or s.kind.line]
 
 
 def draw(output: Path, report: Report) -> None:

@@ -14,7 +14,7 @@ import os
 import sys
 
 from rodfem.app import console
-from rodfem.app.pipes import end_quietly
+from rodfem.app.interrupts import end_quietly
 
 
 def lesson(name: str) -> bool:

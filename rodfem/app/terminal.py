@@ -124,11 +124,7 @@ class Report(Observer):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Leave the terminal as it was, also after an error or an interrupt."""
-        self.close()
-
-    def close(self) -> None:
-        """Remove the line of what is done now."""
+        """Remove the line of what is done now, also after an error or an interrupt."""
         if self.live:
             self.screen.close()
 
@@ -197,11 +193,7 @@ class Report(Observer):
         )
 
     def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
-        """Say which mesh was chosen for frequencies, and by how much they still change.
-
-        ``number`` frequencies change by ``change`` from ``mesh`` to the next one; ``asked`` is the accuracy asked for.
-        Both are relative.
-        """
+        """Say which mesh was chosen, and by how much ``number`` frequencies change on the next one, relative."""
         word = "" if change <= asked else f", above the {asked:g} asked for: round-off"
         self.say(
             f"{mesh.elements} elements of degree {mesh.degree} for an accuracy of {asked:g}: with half as many more "
@@ -270,32 +262,32 @@ class Report(Observer):
         self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
 
     def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
-        """Print the final table: every special point of a diagram, with its error bar, and what is left open.
+        """Print every special point of a diagram, with its error bar, and what is left open.
 
         ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
         """
         load, ordinate = (with_unit(data[x], data.get(f"{x}_unit") or "") for x in ("parameter", "ordinate"))
-        special, rows = [s for branch in branches for s in branch.special], list(table_of(data))
+        rows = list(table_of(data))
         bars = "in parentheses a bound of the error" if is_estimated(data) else "no estimate of the errors"
         self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
         wide = max([len("branch point"), *(len(row[1]) for row in rows)])
         self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
         for name, kind, *numbers, index, remarks in rows:
             self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
-            self.lines(remarks)
+            self._indented(remarks)
+        self._doubts(branches)
+        self._not_followed(branches, most)
+
+    def _doubts(self, branches: Sequence[Branch]) -> None:
+        """Say where indices are not explained, first states are singular, and special points are not resolved."""
         for branch in branches:
-            self._doubts(branch)
-        if coarse := sum(s.resolved is False for s in special):
+            for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
+                self.warn(f"{branch.name}: {sentence}")
+        if coarse := sum(s.resolved is False for branch in branches for s in branch.special):
             self.warn(
                 f"The mesh does not resolve {many(coarse, 'special point')}: the value in parentheses is no bound "
                 "there, and whether the rod has such a point is open; use more elements or a higher degree."
             )
-        self._not_followed(branches, most)
-
-    def _doubts(self, branch: Branch) -> None:
-        """Say where the index of a branch is not explained, and whether its first state is singular."""
-        for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
-            self.warn(f"{branch.name}: {sentence}")
 
     def _not_followed(self, branches: Sequence[Branch], most: int) -> None:
         """Say how many branch points were not followed, why, and what would follow them."""
@@ -308,7 +300,7 @@ class Report(Observer):
             points = many(missed, "branch point was", "branch points were")
             self.say(f"  {points} not followed, {limit}: {more} follows what leaves there")
 
-    def lines(self, remarks: Iterable[str]) -> None:
+    def _indented(self, remarks: Iterable[str]) -> None:
         """Print lines that belong to the one before."""
         for remark in remarks:
             self.say(f"    {remark}")
@@ -333,13 +325,10 @@ class Report(Observer):
     def frequencies(self, branches: Sequence[Branch], load: str, rows: int = 11) -> None:
         """Print the square roots of the left-most eigenvalues against the load, if the scene has them."""
         points = [p for b in branches for p in b.points if p.omega2]
-        shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
         if points:
-            self.say(
-                f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load} "
-                "(errors not estimated)"
-            )
-            self._frequencies(shown, load)
+            head = "Frequencies omega, the square roots of the left-most eigenvalues, against"
+            self.say(f"\n{head} {load} (errors not estimated)")
+            self._frequencies(points[:: max(1, (len(points) - 1) // (rows - 1))], load)
 
     def _frequencies(self, shown: Sequence[Point], load: str) -> None:
         table = [_roots(p, self.units.omega2**0.5) for p in shown]
@@ -354,14 +343,11 @@ class Report(Observer):
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
-        """Print the verdict on one state, with its modes if they were computed.
-
-        ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` its modes.
-        """
+        """Print what was ``found`` of the branch ``name`` at a ``load``, with its ``modes`` if there are some."""
         zero = f", {found.zero} zero" if found.zero else ""
         self.say(f"  {name}, {load}: {self._stability(found)}{zero}")
-        self.lines(map(str, found.soft))
-        self.lines(_eigenvalues(found, modes))
+        self._indented(map(str, found.soft))
+        self._indented(_eigenvalues(found, modes))
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
         took = f"{many(found.factorisations, 'factorisation')}, {1e3 * found.seconds:.1f} ms"
         self.say(f"    {found.method} ({found.reason}){proof}; {took}")

@@ -1,4 +1,4 @@
-"""Where a branch ends: at a branch point on the end of the range, where it closes or meets another one."""
+"""Where a branch ends: at a branch point on the end of the range, where it closes, or meets another one."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.diagram.equivalence import Alike, near
+from rodfem.diagram.finders import Step
 from rodfem.errors import ConvergenceError
 from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
-SAME_END = 1e-6
-"""A special point nearer to the end of the range than this, in spans, is the last state."""
 LEAST = 12
 """Points of the shortest closed loop."""
 NEIGHBOUR = 4
@@ -24,44 +23,33 @@ APART = 0.5
 """Arclength beyond which two special points of one branch may be one."""
 
 
-def singular_end(
-    solver: BranchSolver,
-    span: tuple[float, float],
-    previous: Point,
-    last: Point,
-    search: Callable[[Point, Point], list[SpecialPoint]],
-) -> SpecialPoint | None:
-    """Branch point on the very end of the range, located on a piece of the branch that goes past it; None for none.
+def point_past_end(solver: BranchSolver, last: Point, span: tuple[float, float]) -> Point | None:
+    """Equilibrium of a branch past its ``last`` point, on the end of a range; None where the load does not go there.
 
-    ``search`` finds the special points between the ``previous`` row and one beyond the ``last``, for which the
-    ``solver`` solves; ``span`` is the range.  Raises :class:`ConvergenceError` where there is no equilibrium beyond.
+    Raises :class:`ConvergenceError` where there is none.
     """
     system, load = solver.system, last.load
-    scene = system.scene
-    beyond = load + BEYOND * (load - sum(span) / 2)
-    low, high = scene.parameters[scene.load].admissible
-    if not low < beyond < high or previous.x is last.x:
+    further = load + BEYOND * (load - sum(span) / 2)
+    low, high = system.scene.parameters[system.scene.load].admissible
+    if not low < further < high:
         return None
-    x, outcome = solver.at_load(last.x, beyond, reach=1.0)
+    x, outcome = solver.at_load(last.x, further, reach=1.0)
     if not outcome.converged:
-        raise ConvergenceError(f"there is no equilibrium at {scene.load} = {beyond:g}")
+        raise ConvergenceError(f"there is no equilibrium at {system.scene.load} = {further:g}")
     s = last.arclength + system.distance(last.x, x)
-    point = solver.point(x, s, solver.load_tangent(x, beyond > load), outcome)
-    found = [s for s in search(previous, point) if s.kind.branches]
-    return next((s for s in found if abs(s.point.load - load) < SAME_END * abs(span[1] - span[0])), None)
+    return solver.point(x, s, solver.load_tangent(x, further > load), outcome)
 
 
-def closing(
-    solver: BranchSolver, branch: Branch, a: Point, b: Point, width: float, here: Callable[[Point], Point], alike: Alike
-) -> Point | None:
-    """Last point of a ``branch`` that is back at its beginning between two points ``a``, ``b``; None if it is not.
+def loop_end(branch: Branch, step: Step, width: float, here: Callable[[Point], Point], alike: Alike) -> Point | None:
+    """Last point of a ``branch`` that is back at its beginning in a ``step``; None if it is not.
 
     It is the very state that the branch begins with.  One that leaves a branch point, a singular state, comes back to
-    its first row; where loads are equal it ends at ``b``.  Points are on the mesh of the ``solver``, ``here`` carries
-    one there; ``width`` is that of the range of loads, and ``alike`` compares states.
+    its first row; where loads are equal it ends with the step.  ``here`` carries points to the mesh of the step,
+    ``width`` is that of the range of loads, and ``alike`` compares states.
     """
     if len(branch.points) < LEAST:
         return None
+    solver, a, b = step.solver, step.a, step.b
     if max(abs(a.slope), abs(b.slope)) < VERTICAL * width:  # equal loads: compare the states
         passed = solver.system.distance(b.x, here(branch.points[0]).x) < b.arclength - a.arclength
         return b if passed else None
@@ -70,7 +58,7 @@ def closing(
         return None
     try:
         point = Arc(solver, a, b).at_load(first.load)
-    except ConvergenceError:  # beside a fold, say: not there
+    except ConvergenceError:  # near a fold, say: not there
         return None
     return point if alike(point, first, SAME_STATE) else None
 
@@ -80,8 +68,8 @@ def _passes(a: Point, b: Point, first: Point) -> bool:
     return min(a.load, b.load) <= first.load <= max(a.load, b.load) and a.load != b.load and a.slope * first.slope > 0
 
 
-def meeting(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:
-    """Recognise a ``special`` point that one of the ``branches`` has already; a reason if the ``branch`` ends there.
+def connection(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:
+    """Recognise a ``special`` point that one of the ``branches`` has; a reason if the ``branch`` ends there.
 
     ``alike`` compares states; ``load`` is the name of the load.
     """

@@ -1,27 +1,37 @@
-"""Collisions of eigenvalues between two loads of a sweep: complex pairs that are at one of them and not at the other.
+"""Collisions of eigenvalues between two loads of a sweep, and zeros of the mean of a cluster of them.
 
-A pair at one load goes on from that at the other one whose plane has its vectors, and whose value is near.  Another one
-comes from two real eigenvalues that meet on the way.  They are followed by their invariant subspace.
+A complex pair at one load goes on from that at the other one whose plane has its vectors, and whose value is near.
+Another one comes from two real eigenvalues that meet on the way.  They are followed by their invariant subspace.  The
+mean of eigenvalues that pass through zero together is smooth in the load.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import assignment
-from rodfem.continuation.flutter import Located, locate_flutter
+from rodfem.continuation.flutter import (
+    ENOUGH,
+    NODES,
+    Located,
+    in_doubt,
+    interpolant,
+    locate_flutter,
+    real_root,
+    zero_uncertainty,
+)
 from rodfem.continuation.kinds import FLUTTER, Kind
-from rodfem.diagram.held import at_load
+from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
 from rodfem.stability.frequencies import ALIKE, MULTIPLE, groups
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
-from rodfem.stability.spectrum import Spectrum, inside
+from rodfem.stability.spectrum import SHIFT, Spectrum, inside
 from rodfem.tolerances import TINY, round_off, unit
 
 SAME = 1e-9
@@ -29,8 +39,11 @@ SAME = 1e-9
 JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
 MOVED, OUTSIDE = 0.3, 0.2
-"""Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, above which it is another.
-"""
+"""Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, of another one."""
+SECANT = 1e-6
+"""Relative distance of the first two loads of a secant method."""
+AROUND = (1e-4, 1e-5, 1e-6)
+"""Half widths, relative to a divergence load, over which its eigenvalues are sampled."""
 
 
 @dataclass(frozen=True)
@@ -42,30 +55,13 @@ class Side:
     spectrum: Spectrum
 
 
-class Near(NamedTuple):
-    """A ``side`` at which a ``cluster`` comes near a collision, or zero: the ``value`` is its discriminant, or mean."""
-
-    side: Side
-    cluster: Cluster
-    value: float
-
-
 @dataclass
 class Critical:
-    """A critical load, before its state is evaluated.
+    """A critical ``load`` of some ``kind``, before its state is evaluated, with a ``note``.
 
-    Attributes
-    ----------
-    kind, load, uncertainty
-        Flutter or divergence, the load, and what its location leaves open.
-    change
-        Change of the number of unstable eigenvalues.
-    omega2, cluster
-        The eigenvalue there, and the cluster of those that collide or pass through zero.
-    note
-        Remark in words.
-    still
-        Number of eigenvalues of the cluster that are zero at all loads: those of rigid motions.
+    Its ``cluster`` of eigenvalues collides or passes through zero at ``omega2``; ``still`` of them, those of rigid
+    motions, are zero at all loads.  ``uncertainty`` is what the location leaves open of the load, ``change`` is that of
+    the number of unstable eigenvalues.
     """
 
     kind: Kind
@@ -79,7 +75,7 @@ class Critical:
 
 
 @dataclass
-class Told:
+class Findings:
     """What happens in a step: ``events``, what ``entered`` (less what left), and ``doubts``, in words, where not all.
 
     Complex eigenvalues that ``entered`` are complex at both loads, but by no more than round-off at the first one.
@@ -89,9 +85,9 @@ class Told:
     entered: int = 0
     doubts: list[str] = field(default_factory=list)
 
-    def and_then(self, other: Told) -> Told:
+    def __add__(self, other: Findings) -> Findings:
         """What happens in two steps, one after the ``other``."""
-        return Told(self.events + other.events, self.entered + other.entered, self.doubts + other.doubts)
+        return Findings(self.events + other.events, self.entered + other.entered, self.doubts + other.doubts)
 
 
 def pairs_in_common(mine: Spectrum, others: Spectrum) -> dict[int, int]:
@@ -127,48 +123,45 @@ def others_negative(mine: Spectrum, others: Spectrum) -> bool:
 
 
 class Collisions:
-    """Tells which eigenvalues of a sweep collide in a step."""
+    """Finds the eigenvalues of a sweep that collide in a step."""
 
     def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver) -> None:
-        """Know what computes equilibria (``solver``); the ``eigensolver`` is that of the pencils."""
+        """Take equilibria from the ``solver``, pencils from the ``eigensolver``."""
         self.solver, self.eigensolver = solver, eigensolver
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
 
-    def between(self, a: Side, b: Side) -> Told:
+    def between(self, a: Side, b: Side) -> Findings:
         """Collisions between two loads, those at one and the same load together."""
-        told, common = Told(), pairs_in_common(b.spectrum, a.spectrum)
+        findings, common = Findings(), pairs_in_common(b.spectrum, a.spectrum)
         born = [i for i in b.spectrum.upper.tolist() if i not in common]
         gone = [i for i in a.spectrum.upper.tolist() if i not in common.values()]
         for sign, here, there, chosen in ((1, b, a, born), (-1, a, b, gone)):
             for group in groups(here.spectrum.values[chosen], np.inf, MULTIPLE):
-                self._follow(told, here, there, [chosen[i] for i in group], sign)
-        return told
+                upper = [chosen[i] for i in group]
+                try:
+                    event = self._end(here, there, upper)
+                except ConvergenceError as trouble:
+                    findings.doubts.append(
+                        f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was "
+                        f"not followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
+                    )
+                    continue
+                if event is None:
+                    findings.entered += 2 * sign * len(upper)
+                else:
+                    event.change *= sign
+                    self._add(findings, event, here)
+        return findings
 
-    def _follow(self, told: Told, here: Side, there: Side, upper: list[int], sign: int) -> None:
-        """Follow equal complex pairs at one load, which have no counterpart at the other one, to where they collide."""
-        try:
-            event = self._end(here, there, upper)
-        except ConvergenceError as trouble:
-            told.doubts.append(
-                f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was not "
-                f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
-            )
-            return
-        if event is None:
-            told.entered += 2 * sign * len(upper)
-        else:
-            event.change *= sign
-            self._add(told, event, here)
-
-    def _add(self, told: Told, event: Critical, here: Side) -> None:
+    def _add(self, findings: Findings, event: Critical, here: Side) -> None:
         """Take a collision, followed from ``here``, together with others at its load; none is to be found twice."""
-        same = [e for e in told.events if abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
+        same = [e for e in findings.events if abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
         if not same:
-            told.events.append(event)
+            findings.events.append(event)
             return
         known = same[0]
         if known.change * event.change > 0 and self._common(known, event, here) > 0.5:
-            told.doubts.append(
+            findings.doubts.append(
                 f"Two pairs at {self._load} = {here.load:.6g} end in one collision at {event.load:.8g}: use a smaller "
                 "range."
             )
@@ -186,10 +179,7 @@ class Collisions:
         return float((abs(parts) ** 2).sum() / min(parts.shape))
 
     def _end(self, here: Side, there: Side, upper: list[int]) -> Critical | None:
-        """Collision, on the way ``there``, of pairs complex ``here``; None for some that are, by round-off, there too.
-
-        Raises :class:`ConvergenceError` where it is none of both.
-        """
+        """Collision, on the way ``there``, of pairs complex ``here``; None if, by round-off, they are so there, too."""
         cluster = cluster_at(self.eigensolver.at(here.x), here.spectrum, upper)
         other = measure(self.eigensolver.at(there.x), cluster)
         scale = abs(other.values).max()
@@ -221,10 +211,7 @@ class Collisions:
         return Critical(FLUTTER, there.load, cluster.size, floor, cluster.mean, cluster, note)
 
     def _located(self, here: Side, there: Side, cluster: Cluster, *, just_met: bool) -> Critical:
-        """Collision of a cluster on the way from one load to another, where it may have ``just_met``.
-
-        Raises :class:`ConvergenceError` where there is none.
-        """
+        """Collision of a cluster between two loads, which may have ``just_met``; raises :class:`ConvergenceError`."""
         measured, width = Measuring(self.solver, self.eigensolver, here.x), abs(here.load - there.load)
         located = located_flutter(measured, cluster, (there.load + here.load) / 2, width)
         load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
@@ -250,14 +237,14 @@ def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]
 
 
 class Measuring:
-    """How a ``solver`` and its ``eigensolver`` measure a cluster at a load: at the equilibrium near ``guess``."""
+    """A cluster of eigenvalues against the load: at the equilibrium near a ``guess``."""
 
     def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> None:
         """Compute nothing yet."""
         self.solver, self.eigensolver, self.guess = solver, eigensolver, guess
 
     def __call__(self, load: float, cluster: Cluster) -> Measured:
-        """Measure the cluster; raises :class:`ConvergenceError` where it is not found."""
+        """Measure a cluster; raises :class:`ConvergenceError` where it is not found."""
         return measure(self.pencil(load), cluster)
 
     def noise(self, load: float, cluster: Cluster) -> ClusterNoise:
@@ -271,14 +258,83 @@ class Measuring:
 
 
 def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:
-    """Collision as :func:`~rodfem.continuation.flutter.locate_flutter` finds it; round-off of the matrix counts, too.
+    """Collision of a ``measured`` ``cluster``, from about a ``load`` on, in pieces of the half ``width`` at first.
 
-    Of a ``measured`` ``cluster``, from about the ``load`` on, in pieces of the half ``width`` at first.  Pairs that are
-    taken for one may meet at loads, and at eigenvalues, of their own: that counts, too.  Raises
-    :class:`ConvergenceError` where that does.
+    Round-off of the matrix counts (see :func:`~rodfem.continuation.flutter.locate_flutter`).  So does that pairs that
+    are taken for one may meet at loads, and at eigenvalues, of their own.  Raises :class:`ConvergenceError`.
     """
     found = locate_flutter(measured, cluster, load, width)
     noise, clear = measured.noise(found.clear, found.cluster), measured(found.clear, found.cluster)
     moved = (noise.of_discriminant + clear.split) / abs(found.slope)
     left = noise.of_mean + clear.split / max(2 * float(np.sqrt(abs(clear.discriminant))), TINY)
     return replace(found, uncertainty=found.uncertainty + moved, left=found.left + left)
+
+
+@dataclass(frozen=True)
+class Mean:
+    """Mean of the eigenvalues of a ``measured`` ``cluster`` against the load, ``still`` of which are zero at all loads.
+
+    Vectors of those are no better than round-off: where there are any, the eigenvalues nearest zero are taken.
+    """
+
+    measured: Measuring
+    cluster: Cluster
+    still: int
+
+    def __call__(self, load: float) -> float:
+        """Mean at a load; raises :class:`ConvergenceError` where the cluster is not found."""
+        if not self.still:
+            return self.measured(load, self.cluster).cluster.mean
+        pencil, size = self.measured.pencil(load), self.cluster.size
+        values = pencil.near(size + 2, SHIFT * pencil.system.scene.units.omega2).values
+        return float(values[np.argsort(abs(values), kind="stable")[:size]].real.mean())
+
+    def noise(self, load: float) -> float:
+        """Round-off of the matrix in the mean, which does not scatter; unknown, and zero, where some are zero."""
+        return 0.0 if self.still else self.measured.noise(load, self.cluster).mean
+
+
+def interpolated_zero(mean: Mean, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load`` at which a ``mean`` of eigenvalues vanishes, and what its round-off leaves open.
+
+    At loads of natural size ``one`` it is sampled over the widest of :data:`AROUND`, and interpolated: its scatter
+    shows in the last coefficients.  Where a collision is as near, the mean is not smooth, or there is none: then over
+    a narrower one.  Raises :class:`ConvergenceError` where it does not vanish near by.
+    """
+    found = list[tuple[float, float]]()
+    for half in (width * unit(load, one=one) for width in AROUND):
+        try:
+            series = interpolant([mean(load + half * t) for t in NODES.tolist()])
+            root = real_root(series)
+            if root is None:
+                continue
+            doubt = in_doubt(series) + mean.noise(load + half * root)
+        except ConvergenceError:
+            continue
+        found.append((half * zero_uncertainty(series, root, doubt), load + half * root))
+        if found[-1][0] < ENOUGH * unit(load, one=one):
+            break
+    if not found:
+        raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
+    uncertainty, at = min(found)
+    return at, uncertainty
+
+
+def zero_near(mean: Mean, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load``, of natural size ``one``, at which a ``mean`` vanishes, and what its round-off leaves open.
+
+    By secants; raises :class:`ConvergenceError` where it does not vanish near.
+    """
+    from scipy.optimize import newton  # slow to load
+
+    step = SECANT * unit(load, one=one)
+    with catch_warnings():  # two equal values end the secants
+        simplefilter("ignore", RuntimeWarning)
+        found, result = newton(mean, load, x1=load + step, tol=round_off(load, one), full_output=True, disp=False)
+    slope = (mean(found + step) - mean(found - step)) / (2 * step)
+    left = mean.noise(found)
+    if not result.converged:  # round-off of the mean may be more than the tolerance
+        left = max(left, abs(mean(found)))
+        if left > step * abs(slope):
+            raise ConvergenceError(f"No divergence load was found near {load:.6g}: use a smaller range.")
+    return float(found), abs(left / slope)

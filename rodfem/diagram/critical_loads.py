@@ -19,9 +19,18 @@ import numpy as np
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.flutter import SHARP
 from rodfem.continuation.kinds import DIVERGENCE
-from rodfem.diagram.collisions import Collisions, Critical, Measuring, Near, Side, Told, cluster_at, others_negative
-from rodfem.diagram.divergence_loads import Mean, interpolated_zero
-from rodfem.diagram.held import at_load
+from rodfem.diagram.collisions import (
+    Collisions,
+    Critical,
+    Findings,
+    Mean,
+    Measuring,
+    Side,
+    cluster_at,
+    interpolated_zero,
+    others_negative,
+)
+from rodfem.diagram.equilibria import at_load
 from rodfem.diagram.meetings import Meeting, meetings
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
@@ -30,7 +39,7 @@ from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, unit
 
 PARTS, PART = 16, 0.47
-"""Times that a step is parted, at most, and where: not in its middle, at which a step is likely to be special."""
+"""Times that a step is parted, at most, and where: not in its middle, which is likely to be special."""
 PATIENCE = 3
 """Steps of a sweep that are not clear, whatever is tried, after which no other one is parted."""
 SMALL = 1e-3
@@ -39,9 +48,8 @@ CLEAR = 1e-4
 """Distance from a collision, relative to a step of the sweep, at which its eigenvalues are counted: they are apart."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
-NEARER, CLOSEST, BESIDE = 10, 1e-6, 1e-2
+NEARER, CLOSEST, NEAR = 10, 1e-6, 1e-2
 """Loads at which a meeting is looked for, at most, their least distance, over a step, and that of the meeting found."""
-
 SAME = 1e-2
 """Change of the mean of eigenvalues, relative, within which they are the same ones at a load nearby."""
 
@@ -50,40 +58,36 @@ class CriticalLoads:
     """Locates the critical loads between two loads of a sweep."""
 
     def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver, warn: Callable[[str], None]) -> None:
-        """Know what computes equilibria (``solver``) and their eigenvalues (``eigensolver``), and whom to ``warn``."""
+        """Take equilibria and their eigenvalues from the solvers; ``warn`` gets sentences on what is not clear."""
         self.solver, self.eigensolver, self.warn = solver, eigensolver, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
         self.collisions, self._still, self._parted, self._unclear = Collisions(solver, eigensolver), 0, 0, 0
-        self.near: list[Near] = []
         self._ahead = list[Meeting]()  # parts of the next step at which eigenvalues may meet
 
-    def between(self, a: Side, b: Side, behind: Side | None, still: int) -> Told:
+    def between(self, a: Side, b: Side, behind: Side | None, still: int) -> Findings:
         """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish.
 
         Steps are given one after the other, each with the row ``behind`` it; ``still`` eigenvalues are zero at all
-        loads.  What is not clear is said.
+        loads.
         """
         self._still, self._parted = still, 0
-        told, sides = Told(), [a]
-        for side in [*self._met(told, a, b, behind), b]:
-            told = told.and_then(self._told(sides[-1], side))
+        findings, sides = Findings(), [a]
+        for side in [*self._met(findings, a, b, behind), b]:
+            findings += self._parted_step(sides[-1], side)
             sides.append(side)
-        self._unclear += bool(told.doubts)
-        for words in dict.fromkeys(told.doubts):
+        self._unclear += bool(findings.doubts)
+        for words in dict.fromkeys(findings.doubts):
             self.warn(words)
-        told.events.sort(key=lambda e: abs(e.load - a.load))
-        return told
+        findings.events.sort(key=lambda e: abs(e.load - a.load))
+        return findings
 
-    def _met(self, told: Told, a: Side, b: Side, behind: Side | None) -> list[Side]:
+    def _met(self, findings: Findings, a: Side, b: Side, behind: Side | None) -> list[Side]:
         """Loads of a step at which eigenvalues come nearest to one another, or to zero, and may meet; in its order."""
         ahead, self._ahead, width = self._ahead, [], b.load - a.load
         found, reach = (_meetings(a, b, behind), behind.load - b.load) if behind else ([], 0.0)
         for m in found:
-            if m.flat:
-                if abs(m.t) <= 0.5:  # at the nearest row
-                    self._keep(b, m.places)
-            elif abs(m.t) < CLOSEST:
-                self._examine(told, b, m.places)
+            if abs(m.t) < CLOSEST:
+                self._examine(findings, b, m.places)
             elif m.t < 0.0:
                 ahead.append(m._replace(t=1.0 + m.t * reach / width))
             else:
@@ -93,38 +97,32 @@ class CriticalLoads:
             load = a.load + m.t * width
             if min(abs(load - side.load) for side in (*out, b)) > CLOSEST * abs(width):
                 try:
-                    out.append(self._nearest(told, out[-1], b, load, m.mean))
+                    out.append(self._nearest(findings, out[-1], b, m._replace(t=load)))
                 except ConvergenceError as trouble:
-                    told.doubts.append(self._unknown(a.load, b.load, trouble))
+                    findings.doubts.append(
+                        f"Whether frequencies meet, and part again, between {self._load} = {a.load:.6g} and "
+                        f"{b.load:.6g} is not known ({str(trouble).rstrip('.')})."
+                    )
         return out[1:]
 
-    def _nearest(self, told: Told, a: Side, b: Side, load: float, mean: float) -> Side:
-        """Where eigenvalues about a ``mean`` come nearest in a step, or a load at which they have met.
-
-        That is about a ``load``.
-        """
-        low, high, mine = a, b, self._side(a, load)
+    def _nearest(self, findings: Findings, a: Side, b: Side, meeting: Meeting) -> Side:
+        """Where the eigenvalues of a ``meeting``, about its load ``t``, are nearest, or a load where they met."""
+        low, high, mine = a, b, self._side(a, meeting.t)
         for _ in range(NEARER):
             if mine.spectrum.numbers != a.spectrum.numbers:
                 return mine
-            move = _move(low, mine, high, mean)
+            move = _move(low, mine, high, meeting.mean)
             if abs(move) < CLOSEST * abs(b.load - a.load):
                 break
             low, high = (mine, high) if move * (b.load - a.load) > 0.0 else (low, mine)
             mine = self._side(mine, mine.load + move)
         for m in _meetings(a, mine, b):
-            if abs(m.t) < BESIDE and not m.flat:
-                self._examine(told, mine, m.places)
+            if abs(m.t) < NEAR:
+                self._examine(findings, mine, m.places)
         return mine
 
-    def _keep(self, side: Side, places: list[int]) -> None:
-        """Keep eigenvalues that come near one another about a side, to be compared with another mesh."""
-        cluster = cluster_at(self.eigensolver.at(side.x), side.spectrum, places)
-        if (value := float(side.spectrum.values[places].var().real)) != 0.0:
-            self.near.append(Near(side, cluster, value))
-
-    def _examine(self, told: Told, side: Side, places: list[int]) -> None:
-        """Say that eigenvalues may meet at a side, for round-off; else keep them, to be compared with another mesh."""
+    def _examine(self, findings: Findings, side: Side, places: list[int]) -> None:
+        """Say that eigenvalues may meet at a side where round-off leaves that open."""
         pencil = self.eigensolver.at(side.x)
         cluster = cluster_at(pencil, side.spectrum, places)
         if len(places) == 1:
@@ -133,72 +131,61 @@ class CriticalLoads:
             here = measure(pencil, cluster)
             value, noise = here.discriminant, noise_of(pencil, here).of_discriminant
         if abs(value) <= noise:
-            told.doubts.append(self._near_at(side.load))
-        else:
-            self.near.append(Near(side, cluster, value))
+            findings.doubts.append(
+                f"Two frequencies come so near one another at {self._load} = {side.load:.8g}, or one so near zero, "
+                "that whether they meet there, and part again, is not known."
+            )
 
-    def _unknown(self, low: float, high: float, trouble: ConvergenceError) -> str:
-        """Words for two loads between which something may come and go, for a reason."""
-        return (
-            f"Whether frequencies meet, and part again, between {self._load} = {low:.6g} and {high:.6g} is not known "
-            f"({str(trouble).rstrip('.')})."
-        )
-
-    def _near_at(self, load: float) -> str:
-        """Words for a load at which something may come and go at once."""
-        return (
-            f"Two frequencies come so near one another at {self._load} = {load:.8g}, or one so near zero, that "
-            "whether they meet there, and part again, is not known."
-        )
-
-    def _told(self, a: Side, b: Side) -> Told:
+    def _parted_step(self, a: Side, b: Side) -> Findings:
         """What happens in a step, which is parted where not all of it is clear."""
-        told = self._whole(a, b)
-        if not told.doubts or self._parted >= (PARTS if self._unclear < PATIENCE else 0):
-            return told
+        findings = self._whole(a, b)
+        if not findings.doubts or self._parted >= (PARTS if self._unclear < PATIENCE else 0):
+            return findings
         self._parted += 1
         try:
             middle = self._side(a, a.load + PART * (b.load - a.load))
         except ConvergenceError:
-            return told
-        return self._told(a, middle).and_then(self._told(middle, b))
+            return findings
+        return self._parted_step(a, middle) + self._parted_step(middle, b)
 
     def _side(self, a: Side, load: float) -> Side:
         """A load of a step that begins at a side: the equilibrium, and its eigenvalues."""
         x = at_load(self.solver, a.x, load)
         return Side(load, x, self.eigensolver.at(x).spectrum)
 
-    def _whole(self, a: Side, b: Side) -> Told:
+    def _whole(self, a: Side, b: Side) -> Findings:
         """What happens in a step that is not parted."""
-        told = self.collisions.between(a, b)
-        negative = [event for event in told.events if event.omega2 < 0]
+        findings = self.collisions.between(a, b)
+        negative = [event for event in findings.events if event.omega2 < 0]
         left = sum(event.change for event in negative)
         for event in negative:  # both are unstable before and after
             event.change = 0
-        known, passed = {a.load: a, b.load: b}, 0
+        sides, passed = {a.load: a, b.load: b}, 0
         for piece in self._pieces(a, b, [event.load for event in negative]):
-            first, last = (len((known.get(x) or self._side(a, x)).spectrum.negative) for x in piece)
-            told = told.and_then(self._diverging(a, piece, first, last))
+            first, last = (len((sides.get(x) or self._side(a, x)).spectrum.negative) for x in piece)
+            findings += self._diverging(a, piece, first, last)
             passed += last - first
+        if not findings.doubts:
+            findings.doubts += self._unexplained(a, b, passed - left, collided=bool(negative))
+        return findings
+
+    def _unexplained(self, a: Side, b: Side, change: int, *, collided: bool) -> list[str]:
+        """Sentence on negative eigenvalues of which a ``change`` in a step does not tell all; none if it does."""
         numbers = [len(side.spectrum.negative) for side in (a, b)]
-        if numbers[0] + passed - left != numbers[1] and not told.doubts:
-            told.doubts.append(
+        if numbers[0] + change != numbers[1]:
+            return [
                 f"Between {self._load} = {a.load:.6g} and {b.load:.6g} the number of negative eigenvalues changes from "
                 f"{numbers[0]} to {numbers[1]}, which what was found does not explain: use a smaller range."
-            )
-        if not negative and not told.doubts and self._exchanged(a, b):
-            told.doubts.append(
+            ]
+        if not collided and self._exchanged(a, b):
+            return [
                 f"Whether eigenvalues that are negative at {self._load} = {a.load:.6g} and at {b.load:.6g} are the "
                 "same ones, or some pass through zero between them, others back, is not known: use a smaller range."
-            )
-        return told
+            ]
+        return []
 
     def _exchanged(self, a: Side, b: Side) -> bool:
-        """Whether other eigenvalues may be negative after a step than before, by vectors.
-
-        Near rigid motions vectors are round-off.  What passes through zero in a small part of a step changes all the
-        same by as much as it is.
-        """
+        """Whether other eigenvalues may be negative after a step, by vectors: near rigid motions they are round-off."""
         if not others_negative(a.spectrum, b.spectrum):
             return False
         before, after = (np.sort(s.spectrum.values[s.spectrum.negative].real) for s in (a, b))
@@ -219,7 +206,7 @@ class CriticalLoads:
         edges.append(b.load)
         return [(x, y) for x, y in zip(edges[::2], edges[1::2], strict=True) if (y - x) * width > 0]
 
-    def _diverging(self, a: Side, span: tuple[float, float], first: int, last: int) -> Told:
+    def _diverging(self, a: Side, span: tuple[float, float], first: int, last: int) -> Findings:
         """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``.
 
         At the loads of the ``span``, in the order of the sweep, so many are negative.
@@ -237,20 +224,20 @@ class CriticalLoads:
                 beyond = abs(mu(found[-1])) > max(ends, self.units.omega2)
             except (ConvergenceError, IndexError, ValueError):
                 words = f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
-                return Told(doubts=[words])
+                return Findings(doubts=[words])
             if beyond:  # a pole: of a rod whose mass is all at a few points, where these do not move
                 words = (
                     f"At {self._load} = {found[-1]:.8g} an eigenvalue changes its sign through infinity, not zero: the "
                     "motion there has no inertia; give the rod a mass along it."
                 )
-                return Told(doubts=[words])
+                return Findings(doubts=[words])
         together: list[list[float]] = []
         for load in sorted(found):
             if together and abs(load - together[-1][0]) < TOGETHER * unit(load, one=self.units.load):
                 together[-1].append(load)
             else:
                 together.append([load])
-        out = Told()
+        out = Findings()
         for group in together:
             try:
                 out.events.append(self._divergence(a, group, loads, 1 if last > first else -1))
@@ -296,5 +283,5 @@ def _meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
 
 def _move(low: Side, row: Side, high: Side, mean: float) -> float:
     """Change of the load from a row to where eigenvalues about a ``mean`` meet within its neighbours; zero for none."""
-    found = [m for m in _meetings(low, row, high) if not m.flat and abs(m.mean - mean) < SAME * abs(mean)]
+    found = [m for m in _meetings(low, row, high) if abs(m.mean - mean) < SAME * abs(mean)]
     return min((m.t * (high.load - row.load) for m in found), key=abs, default=0.0)

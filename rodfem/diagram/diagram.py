@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from html import escape
+from itertools import chain
 from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,7 +20,7 @@ from rodfem.deflation.known import Coexisting, equilibria_at, with_copies
 from rodfem.diagram import tables
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.modes.typical import typical_modes
@@ -119,15 +120,13 @@ class Diagram:
         Without a kind those at which something happens: loads asked for and ends are left out.  Events are found by
         their names, too.  Raises :class:`~rodfem.errors.InputError` for a kind that does not exist.
         """
-        chosen = self.branches if branch is None else [self[branch]]
-        every = [s for b in chosen for s in b.special]
+        every = list(chain.from_iterable(b.special for b in (self if branch is None else [self[branch]])))
         if kind is None:
             return [s for s in every if not s.kind.given]
-        events = {*(e.name for e in self.plan.events), *(s.note for s in every if s.kind == EVENT)}
+        events = {*(event.name for event in self.plan.events), *map(_name_of_event, every)} - {""}
         if kind not in KINDS and kind not in events:
             raise InputError(f"There is no kind {kind!r}: choose one of {', '.join([*KINDS, *sorted(events)])}.")
-        named = [(s, s.event.name if s.event is not None else s.note) for s in every]  # notes may say more
-        return [s for s, name in named if kind == s.kind or (s.kind == EVENT and kind == name)]
+        return [s for s in every if kind in (s.kind, _name_of_event(s))]
 
     @checked(load=number(1.0))
     def at(self, load: float) -> list[Point]:
@@ -135,8 +134,7 @@ class Diagram:
 
         In the order of their branches; at the load of a fold or branch point also the state there.  Raises
         :class:`~rodfem.errors.InputError` for a load outside the range, and
-        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found between two rows on either side of it, or
-        at a fold of a mesh that is not the finest, whose own folds are at other loads.
+        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found between two rows on either side of it.
         """
         low, high = sorted(self.span)
         if not low <= load <= high:
@@ -144,21 +142,11 @@ class Diagram:
                 f"The load {load:g} is outside the range {low:g} to {high:g} of this diagram: trace a wider one, as in "
                 "diagram.again(span=...)."
             )
-        finest = self._finest()
-        solver = self.solvers[finest]
+        solver = self.solvers[self._finest()]
         if not solver.conservative:
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
-        try:
-            found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
-        except ConvergenceError as trouble:
-            coarser = [s for s in self.special() if s.kind.singular and s.point.mesh != finest and s.point.load == load]
-            if not coarser:
-                raise
-            raise ConvergenceError(
-                f"The {coarser[0].kind} at {self.scene.load} = {load:.10g} was located on a coarser mesh than the "
-                "finest, which has it at another load: take its own point, or ask for a load beside it."
-            ) from trouble
+        found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, solver.mesh))
         return [self.solver(point).examined(point, special=self._special_at(point)) for point in found]
 
     @checked(load=number(1.0))
@@ -230,16 +218,11 @@ class Diagram:
             )
         low, high = sorted(load or self.span)
         points = found[0].points
-        # beside an index that the mesh leaves open another eigenvalue may vanish with this one
-        beside = [points[max(i - 1, 0) : i + 2] for i, point in enumerate(points) if point is special.point]
-        return locus(
-            self.solvers[special.point.mesh],
-            special,
-            parameter,
-            ((low, high), interval),
-            steps or STEPS,
-            doubtful=any(point.undecided for some in beside for point in some),
-        )
+        row = next(i for i, point in enumerate(points) if point is special.point)
+        # near an index that the mesh leaves open another eigenvalue may vanish with this one
+        doubtful = any(point.undecided for point in points[max(row - 1, 0) : row + 2])
+        solver, bounds = self.solvers[special.point.mesh], ((low, high), interval)
+        return locus(solver, special, parameter, bounds, steps or STEPS, doubtful=doubtful)
 
     @checked(load=number(1.0), tries=count(24), seed=count(0))
     def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:
@@ -255,24 +238,27 @@ class Diagram:
         """
         from rodfem.diagram.trace import trace
 
-        known, constants = [f.name for f in fields(Plan)], [n for n in self.scene.parameters if n != self.scene.load]
-        if unknown := [name for name in changes if name not in [*known, *constants]]:
+        system, plans = self.solvers[0].system, [f.name for f in fields(Plan)]
+        in_plan = {name: changes.pop(name) for name in plans if name in changes}
+        self._check_changes(in_plan, changes)
+        plan, mesh = replace(self.plan, **in_plan), discretization or system.fields.asked
+        if discretization is None and plan.accuracy is not None and mesh.vertices is None:
+            mesh = Discretization(mesh.formulation, factors=mesh.factors)
+        return trace(self.scene.varying(**changes) if changes else self.scene, mesh, plan, comm=system.comm)
+
+    def _check_changes(self, in_plan: dict[str, Any], constants: dict[str, Any]) -> None:
+        """Raise :class:`InputError` for a constant that there is not, and without what no file holds of a plan."""
+        known = [name for name in self.scene.parameters if name != self.scene.load]
+        if unknown := [name for name in constants if name not in known]:
             raise InputError(
                 f"A plan has no {unknown[0]!r}, nor has the scene beside its load: choose one of "
-                f"{', '.join([*known, *constants])}, or give a Discretization first."
+                f"{', '.join([*(f.name for f in fields(Plan)), *known])}, or give a Discretization first."
             )
-        values = {name: changes.pop(name) for name in constants if name not in known and name in changes}
-        system = self.solvers[0].system
-        if self.lacks and self.lacks not in changes:
+        if self.lacks and self.lacks not in in_plan:
             raise InputError(
                 f"The plan of this diagram had {self.lacks} of its own, which no file holds: give them, as in "
                 f"again({self.lacks}=...)."
             )
-        mesh, plan = discretization or system.fields.asked, replace(self.plan, **changes)
-        if discretization is None and plan.accuracy is not None and mesh.vertices is None:
-            mesh = Discretization(mesh.formulation, factors=mesh.factors)
-        scene = self.scene.varying(**values) if values else self.scene
-        return trace(scene, mesh, plan, comm=system.comm)
 
     def _special_at(self, point: Point | SpecialPoint) -> SpecialPoint | None:
         """The fold or branch point whose state that of a point is, where there is one."""
@@ -402,3 +388,10 @@ class Diagram:
         title = "".join(f"<th>{escape(name)}</th>" for name in head)
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         return f"<p>{escape(repr(self)[1:-1])}</p><table><thead><tr>{title}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _name_of_event(special: SpecialPoint) -> str:
+    """Name of the event at a special point, which a file has in its note; empty at other points."""
+    if special.kind != EVENT:
+        return ""
+    return special.note if special.event is None else special.event.name

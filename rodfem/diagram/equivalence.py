@@ -1,7 +1,12 @@
-"""Whether two points of a diagram are one, neighbours, or mirror images: by what no symmetry of the rod changes.
+"""Whether two points of a diagram are one, neighbours, or mirror images; and the image of a whole branch.
 
-Two sides of a pitchfork may be mirror images in their plane, at the same loads, energies and stretches, and differ in
-what they do across it: then no symmetry of the rod carries one into the other.  The eigenvalues nearest zero tell.
+Points are compared by what no symmetry of the rod changes: load, energy and stretch.  Two sides of a pitchfork may be
+mirror images in their plane, and differ in what they do across it: then no symmetry of the rod carries one into the
+other.  The eigenvalues nearest zero tell.
+
+Of the two sides of a symmetric pitchfork only one is traced.  A discrete symmetry of the equations
+(:mod:`rodfem.deflation.discrete_symmetries`) carries it to the other one, of the same energies and indices.  A diagram
+shows that image where its ordinate has the opposite sign.
 """
 
 from __future__ import annotations
@@ -13,29 +18,36 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.arc import Arc
-from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.deflation.discrete_symmetries import candidates, mirrors
 from rodfem.errors import ConvergenceError
 from rodfem.problem.units import Units
 from rodfem.stability.inertia import NULL, Factored
-from rodfem.tolerances import LOCATED, SAME_STATE, unit
+from rodfem.tolerances import LOCATED, NEGLIGIBLE, SAME_STATE, unit
 
 STEP = 0.05
 """Change of load and energy in a step of a branch, relative to values greater than the rod's units."""
 SAME_VALUE = 1e-3
 """Relative difference of eigenvalues of mirror images: of last iterates, and of meshes that are not symmetric."""
-LOOKED_AT = 3
+COMPARED = 3
 """Eigenvalues nearest zero, beyond those that count as zero, that are compared."""
+CARRIED = 1e-3
+"""Distance of a state's image from another state, over the distance of the two, below which the one is the other."""
+OTHER = 1e-6
+"""Difference of two ordinates, relative to the greatest one, above which they are two; one below it has no side."""
+SHARES = (0.5, 1.0)
+"""Places along a branch, as shares of its rows, at whose states an image is asked for."""
 
 Alike = Callable[[Point, Point, float], bool]
 """Whether two points are equivalent within a tolerance, whatever meshes they are on."""
 
 
 def equivalent(a: Point, b: Point, units: Units, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
-    """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch.
+    """Whether two points ``a``, ``b`` agree in load, energy and stretch.
 
-    Loads and energies of ``a`` and ``b`` may differ by ``tolerance``, relative to values greater than the rod's
-    ``units``; so may stretches, or by ``of_strain`` where that is larger.
+    They may differ by ``tolerance``, relative to values greater than the rod's ``units``; stretches by ``of_strain``
+    where that is larger.
     """
     strain = max(tolerance, of_strain)
     pairs = (
@@ -93,7 +105,52 @@ def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
 def _nearest(found: Factored, zero: int) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues that count as ``zero`` and a few more, ascending, and the round-off of those; 0 for others."""
     found.count()
-    values, vectors = found.nearest(zero + LOOKED_AT, NULL)
+    values, vectors = found.nearest(zero + COMPARED, NULL)
     order = np.argsort(values)
     noise = np.array([found.noise(v) for v in vectors]) * (abs(values) <= found.inertia.tolerance)
     return values[order], noise[order]
+
+
+def image_of(branch: Branch, solver: BranchSolver) -> str:
+    """The symmetry, in words, that carries a branch to one with the opposite ordinate; empty where there is none.
+
+    It is one of the equations at the loads of two states, one within the ``branch`` and its last one, and takes the
+    ordinates of both to their opposites, to round-off.  States of other meshes than that of ``solver`` are left out.
+    """
+    chosen, size = _sampled(branch, solver)
+    if not chosen or any(abs(point.ordinate) <= OTHER * size for point in chosen):
+        return ""
+    system, phase = solver.system, solver.system.phase
+    found = candidates(system)
+    for point in chosen:  # the ordinate, which few of them take to its opposite, costs less than the equations
+        there = [solver.shape.ordinate(mirror(system, point.x)) + point.ordinate for mirror in found]
+        opposite = [mirror for mirror, left in zip(found, there, strict=True) if abs(left) <= NEGLIGIBLE * size]
+        found = mirrors(system, point.x, opposite) if opposite else []
+    system.phase = phase
+    found.sort(key=lambda mirror: (mirror.reversal, -sum(mirror.signs), mirror.signs))
+    return found[0].in_words() if found else ""
+
+
+def other_ordinates(branch: Branch, first: Point, image: Point, solver: BranchSolver) -> str:
+    """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty where it keeps them, or signs.
+
+    It carries the ``first`` state after the branch point to the state ``image`` on the other side.  States of other
+    meshes than that of ``solver`` are left out.
+    """
+    system, near = solver.system, CARRIED * solver.system.norm(first.x - image.x)
+    found, phase = [m for m in candidates(system) if system.norm(m(system, first.x) - image.x) <= near], system.phase
+    found = mirrors(system, first.x, found) if found else []  # a small imperfection carries the one near the other, too
+    system.phase = phase
+    chosen, size = _sampled(branch, solver)
+    for mirror in found:
+        changes = [abs(solver.shape.ordinate(mirror(system, p.x))) - abs(p.ordinate) for p in chosen]
+        if all(abs(change) <= OTHER * size for change in changes):
+            return ""
+    return found[0].in_words() if found else ""
+
+
+def _sampled(branch: Branch, solver: BranchSolver) -> tuple[list[Point], float]:
+    """Two points of a branch on the mesh of a solver, and the size of its ordinates there."""
+    points = [point for point in branch.points if point.mesh == solver.mesh]
+    chosen = [points[round(share * (len(points) - 1))] for share in SHARES] if points else []
+    return chosen, max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])

@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.gaps import Gap, arms
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.reduced import lines
@@ -20,9 +20,8 @@ from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.known import equilibria_at
 from rodfem.deflation.search import find_equilibria
-from rodfem.diagram.equivalence import are_images, equivalent, near
-from rodfem.diagram.first_state import ahead, first_state, name_of_first
-from rodfem.diagram.images import other_ordinates
+from rodfem.diagram.equilibria import ahead, first_state, name_of_first
+from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
@@ -46,10 +45,6 @@ class Explorer(Tracer):
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
-        if self.meshes.accuracy != self.plan.accuracy:
-            self.observer.note(
-                f"  computed to {self.meshes.accuracy:g}: a coarser mesh would break the ring's symmetry along itself"
-            )
         self.trace(self._primary())
         self._branch_off(0)
         for load in self.plan.at if self.plan.tries else ():
@@ -95,10 +90,7 @@ class Explorer(Tracer):
         return convex
 
     def _detached(self, gap: Gap, depth: int) -> None:
-        """Trace the branch on the other side of a gap, which no step from this side reaches.
-
-        A state that is squeezed to nothing, or through it, is none of a rod.
-        """
+        """Trace the branch on the other side of a gap, unless it is squeezed to nothing, or through it."""
         self.use(gap.point.mesh)
         for point in self._convex(arms(self.solver, gap)):
             if self.low < point.load < self.high and point.stretch > 0 and not self._on_branch(point):
@@ -156,20 +148,10 @@ class Explorer(Tracer):
             )
         solver.require_convexity(x)
         point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
-        self._check_arithmetic()
         family = point.zero - solver.system.active_drifts(x)
         if family > 0:
             self._leave_family(point, family, stop > start)
         return point
-
-    def _check_arithmetic(self) -> None:
-        """Warn where round-off hides the sign of eigenvalues as large as the lowest bending one."""
-        inertia = self.solver.inertia
-        if inertia.resolution > inertia.scale:
-            self.observer.warn(
-                f"The arithmetic of this mesh leaves the sign of eigenvalues up to {inertia.resolution:.2g} open, and "
-                f"the lowest bending one is {inertia.scale:.2g}: take larger elements, or a lower degree."
-            )
 
     def _leave_family(self, point: Point, freedoms: int, increasing: bool) -> None:
         """Give a first point that may move freely at its load the tangent along which the load changes.
@@ -194,6 +176,7 @@ class Explorer(Tracer):
         point.tangent, point.slope = tangent, system.scalar(tangent)
 
     def _switch(self, parent: Branch, i: int, special: SpecialPoint) -> None:
+        """Trace the branches that leave the special point ``i`` of a parent."""
         special.switched = True
         self.use(special.point.mesh)
         self.solver.damp(special.point.zero - self.solver.system.active_drifts(special.point.x) - special.multiplicity)
@@ -207,13 +190,14 @@ class Explorer(Tracer):
                     break
                 self.use(special.point.mesh)
                 branch = self._leaving_along(parent, i, direction * sign, len(ways))
-                if branch is not None and self._is_new(parent, special, branch, firsts, before):
+                if branch is not None and self._is_new(parent, branch, firsts, before):
                     self.trace(branch)
         self._classify_from_the_side(special, self.branches[before:])
 
     def _leaving_along(self, parent: Branch, i: int, direction: PETSc.Vec, ways: int) -> Branch | None:
         """Branch that leaves the special point ``i`` of a parent along a direction, one of ``ways``, in the range."""
-        special, bounds, depth = parent.special[i], self._bounds(), parent.depth + 1
+        special, margin, depth = parent.special[i], ON_BOUND * (self.high - self.low), parent.depth + 1
+        bounds = self.low - margin, self.high + margin  # room for round-off
         made = start_branch(self.solver, special, direction, ways, bounds, depth)
         if made is None:
             self.observer.warn(f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}.")
@@ -222,32 +206,33 @@ class Explorer(Tracer):
         if not bounds[0] <= points[1].load <= bounds[1]:
             self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
             return None
-        return Branch(self._name(parent), (parent.name, i), depth, points, begins=begins)
+        name = self._unused(f"{parent.name}." if parent.depth else "branch ")
+        return Branch(name, (parent.name, i), depth, points, begins=begins)
 
-    def _is_new(self, parent: Branch, special: SpecialPoint, branch: Branch, firsts: list[Point], before: int) -> bool:
+    def _is_new(self, parent: Branch, branch: Branch, firsts: list[Point], before: int) -> bool:
         """Whether a branch that leaves is none that has been traced, or the mirror image of one.
 
         ``firsts`` gets its first point: those of branches that leave there, traced since there were so many ``before``.
         """
-        first = branch.points[1]
-        images = [p for p in firsts if are_images(self.solver, special, p, first, self.alike)]
-        if images:
-            self._say_other_ordinates(self.branches[before:], special, images[0], first)
+        assert branch.parent is not None
+        special, first = parent.special[branch.parent[1]], branch.points[1]
+        image = next((p for p in firsts if are_images(self.solver, special, p, first, self.alike)), None)
+        if image is not None:
+            if image.mesh == first.mesh == self.solver.mesh:
+                self._other_side(self.branches[before:], special, image, first)
             return False
         firsts.append(replace(first))  # as it is now: once it is traced richer meshes have decided its index
-        if special.connects_to is None and self._traced_already(branch, special):
-            return False
-        return not self._came_from(parent, special, first)
+        known = special.connects_to is None and self._traced_already(branch, special)
+        return not known and not self._came_from(parent, special, first)
 
-    def _say_other_ordinates(self, traced: Sequence[Branch], special: SpecialPoint, first: Point, image: Point) -> None:
-        """Say where a side that is not traced, the ``image`` of one of the branches ``traced``, has other ordinates."""
-        for branch in traced:
-            if branch.points[1].x is first.x and first.mesh == image.mesh == self.solver.mesh:
-                if words := other_ordinates(branch, first, image, self.solver):
-                    self.observer.warn(
-                        f"{branch.name}: What leaves {special.point.load:.8g} on the other side is its mirror image "
-                        f"({words}), at the same loads and as stable, but has other ordinates, and is not traced."
-                    )
+    def _other_side(self, traced: Sequence[Branch], special: SpecialPoint, first: Point, image: Point) -> None:
+        """Say that the mirror ``image`` of a branch, which is not traced, has other ordinates, if it does."""
+        for branch in [branch for branch in traced if branch.points[1].x is first.x]:
+            if words := other_ordinates(branch, first, image, self.solver):
+                self.observer.warn(
+                    f"{branch.name}: What leaves {special.point.load:.8g} on the other side is its mirror image "
+                    f"({words}), at the same loads and as stable, but has other ordinates, and is not traced."
+                )
 
     def _lines(self, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
         """Directions of the branches that leave, given those of the null vectors; what leaves subcritically is first.
@@ -264,27 +249,25 @@ class Explorer(Tracer):
                     "branches leave are sought at random there, and some may be missing."
                 )
             forms = [normal_form_of(self.solver, origin_of(self.solver, special), way) for way in found]
-        kinds = []
-        for form in forms:
-            if form is not None:
-                form.classify(*self._indices(special))
-            kinds.append("" if form is None else form.kind)
+        kinds = [self._kind(form, special) for form in forms]
         order = sorted(range(len(found)), key=lambda i: not kinds[i].startswith("subcritical"))
         several = dict.fromkeys(kinds[i] for i in order if kinds[i])
         if len(several) > 1:
             special.note = f"branches of several forms leave here: {', '.join(several)}"
         return [found[i] for i in order]
 
+    def _kind(self, form: NormalForm | None, special: SpecialPoint) -> str:
+        """Kind of the form of a branch that leaves a special point; empty where it is not known."""
+        if form is None:
+            return ""
+        form.classify(*self._indices(special))
+        return form.kind
+
     @staticmethod
     def _indices(special: SpecialPoint) -> tuple[int, int]:
         """Index of the branch that is left at loads just below, and just above."""
         indices = special.negative_before, special.negative_after
         return indices if special.point.slope > 0 else (indices[1], indices[0])
-
-    def _bounds(self) -> tuple[float, float]:
-        """Least and greatest load, with room for round-off."""
-        margin = ON_BOUND * (self.high - self.low)
-        return self.low - margin, self.high + margin
 
     def _law(self, special: SpecialPoint, direction: PETSc.Vec) -> None:
         """Find the normal form at a branch point: of the branch that leaves, or of this one if it ends on another."""
@@ -308,9 +291,6 @@ class Explorer(Tracer):
             special.law.classify(index[False], index[True])
             self.observer.law(special)
 
-    def _name(self, parent: Branch) -> str:
-        return self._unused(f"{parent.name}." if parent.depth else "branch ")
-
     def _unused(self, before: str, after: str = "", number: int = 1) -> str:
         """Name with the least ``number`` from this one on that no branch has: of a file, a name is one branch's."""
         names = {branch.name for branch in self.branches}
@@ -330,11 +310,10 @@ class Explorer(Tracer):
 
     def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
-        a, b = branch.points[1], special.point
-        for other in self.branches:
-            for end in other.special:
-                if end.connects_to is not None and self.alike(end.point, b, SAME_SPECIAL):
-                    before = other.points[max(end.row - 2, 0) : end.row]
-                    if any(near(a, p, self.solver.units) for p in before):
-                        return True
+        ends = ((other, end) for other in self.branches for end in other.special if end.connects_to is not None)
+        for other, end in ends:
+            if self.alike(end.point, special.point, SAME_SPECIAL):
+                rows = other.points[max(end.row - 2, 0) : end.row]
+                if any(near(branch.points[1], row, self.solver.units) for row in rows):
+                    return True
         return False

@@ -26,8 +26,8 @@ from rodfem.continuation.eigenvalue_curves import assignment
 from rodfem.stability.frequencies import ALIKE, groups
 from rodfem.stability.spectrum import Spectrum, times
 
-LOWER, CLOSE = 0.7, 0.1
-"""Part of the values at both neighbours below which a lowest one is near zero, and relative distance that is close."""
+LOWER = 0.7
+"""Part of the values at both neighbours below which a lowest one is near zero."""
 SMALL = 0.3
 """Relative distance of two eigenvalues from which on they do not meet in a step."""
 CLEAR = 100.0
@@ -39,15 +39,11 @@ SMALLEST = 12
 
 
 class Meeting(NamedTuple):
-    """What may vanish at a part ``t`` of a step: the eigenvalues at these ``places``, and their ``mean``.
-
-    It is ``flat`` where they are hardly nearer to one another than at the neighbours.
-    """
+    """What may vanish at a part ``t`` of a step: the eigenvalues at these ``places``, and their ``mean``."""
 
     t: float
     places: list[int]
     mean: float
-    flat: bool
 
 
 class _Rows(NamedTuple):
@@ -68,12 +64,12 @@ def meetings(row: Spectrum, before: Spectrum, behind: Spectrum, t: float = 1.0) 
     if count > SMALLEST:
         count = max(SMALLEST, count // 2)
         count += int(abs(row.values[:count].imag.sum()) > ALIKE * abs(row.values[count - 1]))
-    (first, back), (last, ahead) = (_beside(row, other, count) for other in (before, behind))
+    (first, back), (last, ahead) = (_neighbour(row, other, count) for other in (before, behind))
     rows = _Rows(np.array([first, row.condensed.pairs.nu[:count], last]), np.array([back * back.T, ahead * ahead.T]))
     return [*_pairs(row, rows, t), *_single(row, rows, t)]
 
 
-def _beside(row: Spectrum, other: Spectrum, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _neighbour(row: Spectrum, other: Spectrum, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (k,) of a neighbour, as the row has them, and its ``T`` in the vectors of the row (k, k)."""
     mine, there = row.condensed, other.condensed
     left = times(mine.lower, mine.pairs.left[:count].T).T
@@ -102,14 +98,13 @@ def _pairs(row: Spectrum, rows: _Rows, t: float) -> list[Meeting]:
     size = np.minimum(abs(mean[1, i]), abs(mean[1, j]))
     conjugate = imaginary[i] & (abs(mean[1, i] - mean[1, j].conj()) < ALIKE * size)
     chosen = (apart < SMALL * size) & (real | conjugate)
-    i, j, sign, size = i[chosen], j[chosen], np.where(real[chosen], 1.0, -1.0), size[chosen]
+    i, j, sign = i[chosen], j[chosen], np.where(real[chosen], 1.0, -1.0)
     D = sign * ((mean[:, i] - mean[:, j]) ** 2).real / 4.0
     rounded = (CLEAR * np.maximum(noise[i], noise[j])) ** 2
     coupled = (products[:, i, j].real < -rounded) | (one[i, j] > ONE) | (sign < 0.0)
     coupled &= (D[[0, 2]] > rounded).all(axis=0)
-    found = _lowest(D, t, coupled, (CLOSE * size) ** 2)
-    at = [alike[i[n]] + alike[j[n]] for n, _, _ in found]
-    return [Meeting(part, p, float(values[p].real.mean()), flat) for p, (_, part, flat) in zip(at, found, strict=True)]
+    found = [(alike[i[n]] + alike[j[n]], part) for n, part in _lowest(D, t, coupled)]
+    return [Meeting(part, places, float(values[places].real.mean())) for places, part in found]
 
 
 def _single(row: Spectrum, rows: _Rows, t: float) -> list[Meeting]:
@@ -117,8 +112,8 @@ def _single(row: Spectrum, rows: _Rows, t: float) -> list[Meeting]:
     real = np.flatnonzero(row.values[: rows.nu.shape[1]].imag == 0.0)
     mu = row.condensed.shift + 1.0 / rows.nu[:, real].real
     ends = (mu[0] * mu[2] > 0.0) & (np.minimum(abs(mu[0]), abs(mu[2])) > row.zero / row.one)
-    found = _lowest(np.sign(mu[0]) * mu, t, np.array([ends, ends]), np.zeros(len(real)))
-    return [Meeting(part, [int(real[n])], float(row.values[real[n]].real), flat) for n, part, flat in found]
+    found = _lowest(np.sign(mu[0]) * mu, t, np.array([ends, ends]))
+    return [Meeting(part, [int(real[n])], float(row.values[real[n]].real)) for n, part in found]
 
 
 def _split(alike: list[list[int]], parallel: np.ndarray) -> list[list[int]]:
@@ -130,12 +125,8 @@ def _split(alike: list[list[int]], parallel: np.ndarray) -> list[list[int]]:
     return out
 
 
-def _lowest(f: np.ndarray, t: float, allowed: np.ndarray, close: np.ndarray) -> list[tuple[int, float, bool]]:
-    """Where parabolas through ``f`` (3, k), at ``-t``, 0 and 1, are lowest, near zero: column, place, whether flat.
-
-    They are ``allowed`` (2, k) to be before or behind the row.  One is flat where it is no lower than a part of both
-    ends, but ``close`` (k,) to zero.
-    """
+def _lowest(f: np.ndarray, t: float, allowed: np.ndarray) -> list[tuple[int, float]]:
+    """Where parabolas through ``f`` (3, k), at ``-t``, 0 and 1, are lowest near zero, as ``allowed``: column, place."""
     back, ahead = (f[1] - f[0]) / t, f[2] - f[1]
     bend = (ahead - back) / (1.0 + t)
     slope = ahead - bend
@@ -145,5 +136,4 @@ def _lowest(f: np.ndarray, t: float, allowed: np.ndarray, close: np.ndarray) -> 
     behind = at >= 0.0
     ends = np.minimum(f[0], f[2])
     inside = (-t < at) & (at < 1.0) & np.where(behind, allowed[1], allowed[0]) & (ends > 0.0)
-    deep = low < LOWER * ends
-    return [(int(n), float(at[n]), not deep[n]) for n in np.flatnonzero(inside & (deep | (low < close)))]
+    return [(int(n), float(at[n])) for n in np.flatnonzero(inside & (low < LOWER * ends))]

@@ -8,6 +8,7 @@ from typing import Any
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
+from rodfem.problem.arguments import a
 from rodfem.problem.events import Event
 from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
@@ -26,10 +27,8 @@ COUNTS = {
 }
 """Arguments that are not negative, in words."""
 GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
-FINEST, COARSEST = 1e-11, 1e-1
-"""Least and greatest accuracy that can be asked for; the former is near round-off."""
-ACCURACY = 1e-8
-"""One that an error suggests."""
+FINEST, ACCURACY, COARSEST = 1e-11, 1e-8, 1e-1
+"""Least accuracy that can be asked for, which is near round-off, one that an error suggests, and the greatest one."""
 
 
 @dataclass(frozen=True)
@@ -90,17 +89,16 @@ class Plan:
         object.__setattr__(self, "at", tuple(dict.fromkeys(reals("at", self.at, (0.5, 1.0)))))
         for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3), ("most_branches", 20)):
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
-        if not isinstance(self.steps, StepControl):
-            raise InputError(f"steps is {self.steps!r}: give StepControl, as in steps=StepControl(largest=0.02).")
-        if not isinstance(self.method, str):
-            raise InputError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
+        a(StepControl, "StepControl, as in steps=StepControl(largest=0.02)")("steps", self.steps)
+        a(str, "the name of one, as in method='auto'")("method", self.method)
         if self.method not in ("", registry.AUTO):
             registry.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, ACCURACY)
         flag("error_bars", self.error_bars)
-        if not isinstance(self.events, (tuple, list)) or not all(isinstance(event, Event) for event in self.events):
-            raise InputError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
+        events = a((tuple, list), "Events, as in events=(Event('ends meet', of=f),)")("events", self.events)
+        for i, event in enumerate(events):
+            a(Event, "Events, as in events=(Event('ends meet', of=f),)")(f"events[{i}]", event)
         if self.locus is not None:
             parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
             if len(parts) != 3 or not isinstance(parts[0], str):
@@ -138,31 +136,37 @@ class Plan:
                     "widen the range or leave it out."
                 )
         if self.locus is not None:
-            name, a, b = self.locus
-            if name == scene.load or name not in scene.parameters:
-                others = ", ".join(n for n in scene.parameters if n != scene.load)
-                choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
-                raise InputError(f"{name!r} is no second parameter: {choose}.")
-            if name not in asked_for(scene):
-                raise InputError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
-            if a > b:
-                raise InputError(f"The interval of {name} is from {a:g} to {b:g}: give the lower one first.")
-            if not a <= scene.parameters[name].value <= b or a == b:
-                raise InputError(
-                    f"The interval of {name} from {a:g} to {b:g} does not hold its value "
-                    f"{scene.parameters[name].value:g}: choose one that does."
-                )
-            for value in (a, b):
-                try:
-                    scene.varying(**{name: value})
-                except InputError as trouble:
-                    raise InputError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
+            self._check_locus(scene, *self.locus)
+        self._check_counts()
+
+    @staticmethod
+    def _check_locus(scene: Scene, name: str, low: float, high: float) -> None:
+        if name == scene.load or name not in scene.parameters:
+            others = ", ".join(sorted(scene.parameters.keys() - {scene.load}))
+            choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
+            raise InputError(f"{name!r} is no second parameter: {choose}.")
+        if name not in asked_for(scene):
+            raise InputError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
+        value = scene.parameters[name].value
+        if not low <= value <= high or low == high:
+            raise InputError(
+                f"The interval of {name} from {low:g} to {high:g} does not hold its value {value:g}: choose one that "
+                "does, the lower end first."
+            )
+        for end in (low, high):
+            try:
+                scene.varying(**{name: end})
+            except InputError as trouble:
+                raise InputError(f"The locus cannot reach {name} = {end:g}. {trouble}") from None
+
+    def _check_counts(self) -> None:
+        """Raise :class:`InputError` for numbers below zero, and for what needs loads where none is asked for."""
         for argument, what in COUNTS.items():
             if (value := getattr(self, argument.name)) < 0:
                 raise InputError(f"{value} is not a {what}", Remedy("give 0 or more in {}", argument))
-        if self.tries and not self.at:
+        if not self.at and self.tries:
             raise InputError("A search needs loads to search at", GIVE_LOADS)
-        if (self.modes or self.method) and not self.at:
+        if not self.at and (self.modes or self.method):
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
         if self.modes and self.method in registry.METHODS and not registry.find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
@@ -209,9 +213,7 @@ def not_held(asked: dict[str, Any]) -> str:
 
 def plan_without(asked: dict[str, Any]) -> Plan:
     """Plan that was ``asked`` for, without what no file holds."""
-    known = {f.name for f in fields(Plan)} - {"steps", "events"}
-    given: dict[str, Any] = {}
-    for n in known & asked["plan"].keys():
-        x = asked["plan"][n]
-        given[n] = tuple(x) if isinstance(x, list) else x
-    return Plan(**given)
+    names = ({f.name for f in fields(Plan)} - {"steps", "events"}) & asked["plan"].keys()
+    given: dict[str, Any] = {name: asked["plan"][name] for name in names}
+    lists = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
+    return Plan(**(given | lists))

@@ -123,8 +123,8 @@ def _branch(entry: dict[str, Any], solvers: Sequence[BranchSolver], states: Path
         if solver.conservative and before.mesh == point.mesh == after.mesh and len(points) > 1:
             chord = after.x - before.x  # the tangent to second order of the step
             point.tangent = chord / solver.system.norm(chord)
-    branch = Branch(entry["name"], (parent[0], parent[1]) if parent else None, 0, points, ended=entry["ended"])
-    branch.depth = len(entry["name"].split(".")) if parent else 0
+    depth = len(entry["name"].split(".")) if parent else 0
+    branch = Branch(entry["name"], (parent[0], parent[1]) if parent else None, depth, points, ended=entry["ended"])
     branch.special = [_special(s, points, solvers) for s in entry["special"]]
     branch.singular_start = entry.get("singular_start", 0)
     branch.image = entry.get("image", "")

@@ -17,10 +17,10 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.deflation.search import find_equilibria
-from rodfem.diagram.first_state import first_state
+from rodfem.diagram.equilibria import check_index, first_state
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
-from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization, check_number
 from rodfem.fem.quadrature_check import QuadratureCheck
@@ -50,25 +50,6 @@ POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['bra
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
 METHOD: Check = text("auto")
 """Checks of arguments that several functions have."""
-
-
-HOPELESS = 0.9
-"""Index over the number of nodes above which it is that of the mesh, not of the rod."""
-A_FEW = 4
-"""Half-waves that a mesh of any size is allowed."""
-
-
-def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
-    """Raise :class:`InputError` for an equilibrium of a ``scene`` at a ``load`` whose ``index`` no mesh can hold.
-
-    The mesh has so many ``nodes``.
-    """
-    if index > max(HOPELESS * nodes, A_FEW):
-        raise InputError(
-            f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index "
-            f"is {index} there)",
-            Remedy("use smaller loads, or more elements ({})", Argument("Discretization", "elements")),
-        )
 
 
 class Solver:

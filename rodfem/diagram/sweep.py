@@ -22,14 +22,11 @@ from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.row_checks import RowCheck
-from rodfem.diagram.collisions import Side
+from rodfem.diagram.collisions import Critical, Side
 from rodfem.diagram.critical_loads import CriticalLoads
-from rodfem.diagram.first_state import first_state, name_of_first
-from rodfem.diagram.held import at_load
-from rodfem.diagram.load_steps import LoadSteps
-from rodfem.diagram.persistent_zeros import family_of
+from rodfem.diagram.doubts import Quadrature
+from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_first
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.quadrature import Quadrature
 from rodfem.diagram.sweep_errors import SweepErrors
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
@@ -37,7 +34,7 @@ from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.frequencies import REAL, Frequencies, named
 from rodfem.stability.nonsymmetric import FREQUENCIES, NonsymmetricPencil, NonsymmetricSolver, begins_slowly
-from rodfem.tolerances import unit
+from rodfem.tolerances import DRIFT, unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
@@ -57,13 +54,13 @@ class Sweep:
     """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
 
     def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
-        """Allocate the pencil; the plan must have passed its check.
+        """Allocate the pencil on the mesh of the ``solver``; the ``plan``, of the loads, must have passed its check.
 
-        ``solver`` has the mesh, the ``observer`` hears of the progress, ``finished()`` is called when the sweep is
-        complete.  The ``plan`` names the loads.
+        The ``observer`` hears of the progress, ``finished()`` is called at the end.
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
-        self.span, self.units = plan.over(solver.system.scene), solver.system.scene.units
+        scene = solver.system.scene
+        self.span, self.units, self._load = plan.over(scene), scene.units, scene.load
         self._least = ONE_LOAD * max(map(abs, self.span))
         self._asked = list[float]()
         for load in plan.at:
@@ -77,7 +74,6 @@ class Sweep:
         self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._still = self.number  # frequencies that are zero at all loads
         self.branches: list[Branch] = []
-        self._load = solver.system.scene.load
 
     @property
     def solvers(self) -> Sequence[BranchSolver]:
@@ -104,8 +100,9 @@ class Sweep:
         Quadrature([self.solver], self.observer, self._load).examine(branch)
         self._within_bars(branch)
         self.observer.finished(branch)
-        with without("Whether frequencies stay zero was not examined", comm, self.observer.warn):
-            self._family(last)
+        if self._still:
+            with without("Whether frequencies stay zero was not examined", comm, self.observer.warn):
+                self._family(last)
         with without("The asymmetry of the tangent matrix was not measured", comm, self.observer.warn):
             self._asymmetry(last)
         self.finished()
@@ -113,16 +110,11 @@ class Sweep:
 
     def _sweep(self, branch: Branch) -> str:
         """Compute the points of a branch, load by load, and the special points between them; why it ends early."""
-        a, b = self.span
-        stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
-        own = np.unique([*np.linspace(a, b, LOADS), *stops])
-        apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
-        loads = np.unique([*apart, *self._asked])
-        loads = loads if a < b else loads[::-1]
-        x, _ = first_state(self.solver, a)
-        branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])
+        stops, loads = self._loads()
+        x, _ = first_state(self.solver, self.span[0])
+        branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, loads[1])[0]])
         self.observer.branch(branch)
-        x = at_load(self.solver, x, float(loads[0]))
+        x = at_load(self.solver, x, loads[0])
         self.solver.require_convexity(x)
         if not (first := self.eigensolver.at(x).spectrum).complete:
             self.observer.note("  the mesh has too many unknowns to find all frequencies: those nearest zero are found")
@@ -130,21 +122,29 @@ class Sweep:
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
-            steps, latest = None, None
-            for load in loads.tolist():
-                state = x if steps is None else steps.to(load)
-                if latest is not None and (why := self._lost_convexity(latest.x, state) or self._dependent(state)):
+            latest = self._point(x)
+            steps = LoadSteps(self.solver, latest, self.span)
+            self._take(branch, latest)
+            for load in loads[1:]:
+                state = steps.to(load)
+                if why := self._lost_convexity(latest.x, state) or self._dependent(state):
                     return why
-                if steps and load in stops:
+                if load in stops:
                     steps.known = steps.known[-1:]
                 latest = self._point(state)
-                steps = steps or LoadSteps(self.solver, latest, self.span)
-                for notice in self.solver.notices():
-                    self.observer.warn(notice)
                 self._take(branch, latest)
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._close(branch, None)
         return ""
+
+    def _loads(self) -> tuple[list[float], list[float]]:
+        """Loads at which tables have corners, and all those of the sweep, in its order."""
+        a, b = self.span
+        stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
+        own = np.unique([*np.linspace(a, b, LOADS), *stops])
+        apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
+        loads = np.unique([*apart, *self._asked]).tolist()
+        return stops, loads if a < b else loads[::-1]
 
     def _lost_convexity(self, a: PETSc.Vec, b: PETSc.Vec) -> str:
         """Why a sweep ends between the equilibria ``a`` and ``b``; empty where the stored energy stays convex."""
@@ -161,10 +161,7 @@ class Sweep:
         return "" if lost is None else solver.not_convex(state(lost))
 
     def _dependent(self, x: PETSc.Vec) -> str:
-        """Why a sweep ends before the equilibrium ``x``; empty where its constraints do not depend on one another.
-
-        Where they do, as those of a rod that is pulled taut, frequencies are not defined.
-        """
+        """Why a sweep ends before ``x``: constraints depend on one another, as of a rod pulled taut; empty if not."""
         if may_depend(self.solver.shape, x):
             try:
                 require_independent_constraints(self.solver.shape, x)
@@ -176,6 +173,8 @@ class Sweep:
 
     def _take(self, branch: Branch, point: Point) -> None:
         """Find the eigenvalues of the next row; the step before the last one can be taken then."""
+        for notice in self.solver.notices():
+            self.observer.warn(notice)
         pencil = self.eigensolver.at(point.x)
         row = Row(point, Side(point.load, point.x, pencil.spectrum), self._named(pencil))
         self._close(branch, row)
@@ -199,11 +198,28 @@ class Sweep:
         return named(pencil.system, pencil.leftmost(self.number), pencil.turned, self.number)
 
     def _family(self, last: Point) -> None:
-        """Say where frequencies are zero at all loads, without a symmetry, to which the ``last`` one belongs, too."""
-        if self._still:
-            pencil = self.eigensolver.at(last.x)
-            if words := family_of(pencil, pencil.leftmost(self.number), self._still):
-                self.observer.warn(words)
+        """Say which frequencies are zero at all loads, to which the ``last`` one belongs, too, without a symmetry.
+
+        Frequencies and critical loads are those of one state of a family then: a rod may turn about its axis, between
+        springs that are not alike all around it.  Zero eigenvalues of a symmetry's Jordan block are none of these: ``S
+        v = -d M g`` with its generator ``g``, and a drift scalar ``d`` that is not zero.  A rod that floats has many of
+        both: nothing is said of it.
+        """
+        pencil, system, moving = self.eigensolver.at(last.x), self.solver.system, list[str]()
+        found = pencil.leftmost(self.number)
+        if found.floating:
+            return
+        for i in np.flatnonzero(abs(found.values) < found.noise).tolist():
+            mode = system.new_vector()
+            mode.array[:] = found.vectors[:, i].real
+            if system.drift(mode) <= DRIFT * system.stiffness_scale * system.norm(mode):
+                moving.append(pencil.motion(found.vectors[:, [i]].real))
+        if number := min(len(moving), self._still):
+            self.observer.warn(
+                f"{number} frequency(ies) stay zero that no symmetry of the scene explains "
+                f"({', '.join(dict.fromkeys(moving))}): the rod may turn or move freely, and frequencies and critical "
+                "loads are those of the state that its start leads to; others differ."
+            )
 
     def _asymmetry(self, last: Point) -> None:
         """Say what the load does to the tangent matrix at the last point."""
@@ -266,46 +282,47 @@ class Sweep:
     def _between(self, branch: Branch, first: Row, second: Row, following: Row | None) -> None:
         """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
         a, b, behind = first.point, second.point, following and following.side
-        still = min(first.found.still(), second.found.still())
+        exact = min(first.found.still(), second.found.still())
         with self.solver.system.clock.scope("location"):
-            told = self.critical.between(first.side, second.side, behind, still)
-        events, negative = told.events, a.negative
-        explained = negative + sum(e.change for e in events) + told.entered == b.negative
-        for i, event in enumerate(events):
-            point = a if event.load == a.load else b if event.load == b.load else None
-            point = point or self.at(at_load(self.solver, a.x, event.load))
-            after_it = negative + event.change
-            if explained and i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
-                after_it = b.negative  # of all eigenvalues that are recorded
-            if event.cluster is not None:
-                self._name(point, event.cluster, event.cluster.size - event.still)
-            if event.kind == DIVERGENCE and (zero := point.negative - min(negative, after_it)) > 0:
-                point.negative, point.zero = point.negative - zero, point.zero + zero
-            special = SpecialPoint(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
-            special.cluster, special.note = event.cluster, event.note
-            if point is not a and point is not b:
-                branch.points.append(point)
-            self._special(branch, special)
-            negative = after_it
+            findings = self.critical.between(first.side, second.side, behind, exact)
+        events, negative = findings.events, a.negative
+        explained = negative + sum(e.change for e in events) + findings.entered == b.negative
+        in_all = explained and {e.kind for e in events} == {FLUTTER}  # of all eigenvalues that are recorded
+        for event in events:
+            after = b.negative if in_all and event is events[-1] else negative + event.change
+            self._critical(branch, event, (a, b), (negative, after))
+            negative = after
         if not explained:
             change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
             branch.unexplained.append(change)
             self.observer.warn(str(change))
-        elif told.entered > 0:
-            say = (
-                self.observer.note if a.negative else self.observer.warn
-            )  # of unstable rows only the number is in doubt
-            say(
-                f"{told.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} by "
-                f"no more than round-off: the rows before, which count {a.negative}, may count too few."
+        elif findings.entered > 0:  # of unstable rows only the number is in doubt
+            report = self.observer.note if a.negative else self.observer.warn
+            report(
+                f"{findings.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at "
+                f"{a.load:.6g} by no more than round-off: the rows before, which count {a.negative}, may count too few."
             )
+
+    def _critical(self, branch: Branch, event: Critical, ends: tuple[Point, Point], negative: tuple[int, int]) -> None:
+        """Take a critical load between two rows into a branch, at which the number of unstable eigenvalues changes."""
+        row = next((end for end in ends if end.load == event.load), None)
+        point = row or self.at(at_load(self.solver, ends[0].x, event.load))
+        if event.cluster is not None:
+            self._name(point, event.cluster, event.cluster.size - event.still)
+        if event.kind == DIVERGENCE and (zero := point.negative - min(negative)) > 0:
+            point.negative, point.zero = point.negative - zero, point.zero + zero
+        special = SpecialPoint(event.kind, point, *negative, event.uncertainty, omega2=event.omega2)
+        special.cluster, special.note = event.cluster, event.note
+        if row is None:
+            branch.points.append(point)
+        self._special(branch, special)
 
     def _within_bars(self, branch: Branch) -> None:
         """Say of which frequencies that meet, and part at the next special point, that is not known.
 
         Where two pass one another, of motions in two planes, round-off makes a complex pair of them for a while: the
-        two loads differ by less than their bars, or than what their location leaves open where there are none.  At one
-        load frequencies are double whatever the mesh.
+        two loads differ by less than their bars, or what their location leaves open.  At one load frequencies are
+        double whatever the mesh.
         """
         for s, t in pairwise(branch.special):
             changes = [x.negative_after - x.negative_before for x in (s, t)]
@@ -339,6 +356,3 @@ class Sweep:
                     errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
-            for near in self.critical.near:
-                if words := errors.missed(near):
-                    warn(words)

@@ -9,10 +9,8 @@ from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
-from rodfem.diagram.collisions import Measuring, Near, located_flutter
-from rodfem.diagram.divergence_loads import Mean, zero_near
-from rodfem.diagram.held import at_load
-from rodfem.errors import ConvergenceError
+from rodfem.diagram.collisions import Mean, Measuring, located_flutter, zero_near
+from rodfem.diagram.equilibria import at_load
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -38,10 +36,7 @@ class SweepErrors:
         self.ordinate = OrdinateBound(solver.shape, self.richer.shape)
 
     def estimate(self, s: SpecialPoint) -> None:
-        """Set the error bars of a special point: of its load, its ordinate, and of the eigenvalues that collide.
-
-        Raises :class:`~rodfem.errors.ConvergenceError` where one is not estimated: then all are left as they are.
-        """
+        """Set all error bars of a special point, or none: then raises :class:`~rodfem.errors.ConvergenceError`."""
         point, richer, rho = s.point, self.richer, self.rho
         guess = self.transfer(point.x, state=True)
         x = at_load(richer, guess, point.load)
@@ -62,44 +57,18 @@ class SweepErrors:
         s.error_estimate, s.ordinate_error = of_load, of_ordinate  # none of them where one is not estimated
 
     def _moved(self, x: PETSc.Vec, s: SpecialPoint, bar: float) -> float:
-        """Change of the ordinate, on the richer mesh, over the error ``bar`` of a special point's load, where ``x`` is.
-
-        Of a bar wider than half of the range no more is asked for.
-        """
+        """Change of the ordinate from ``x`` on over the ``bar`` of a special point's load, up to half of the range."""
         low, high = sorted(self.span)
         step = min(bar, (high - low) / 2) * (1.0 if s.point.load < (low + high) / 2 else -1.0)
-        beside = at_load(self.richer, x, s.point.load + step)
-        return abs(self.richer.shape.ordinate(beside) - self.richer.shape.ordinate(x))
-
-    def missed(self, near: Near) -> str:
-        """Sentence on a load at which critical loads may be missing, as the richer mesh is nearer to them; or none."""
-        side, single = near.side, near.cluster.size == 1
-        try:
-            at = Measuring(self.richer, self.eigensolver, self.transfer(side.x, state=True))
-            here = at(side.load, self._transferred(near.cluster))
-            again = here.cluster.mean if single else here.discriminant
-            found = f"{near.value:.2g} on this mesh, and {again:.2g} on a richer one"
-            if again / near.value > 0.5:  # where less remains its sign is in doubt
-                return ""
-        except ConvergenceError:
-            found = f"{near.value:.2g} on this mesh, and not found on a richer one"
-        what = "an eigenvalue is nearest to zero" if single else "two frequencies are nearest to one another"
-        measure = "its distance" if single else "the square of half the difference of their omega^2"
-        return (
-            f"Near {self.solver.system.scene.load} = {side.load:.8g} {what}: {measure} is {found}. A pair of critical "
-            "loads may be missing there, use more elements."
-        )
+        moved = at_load(self.richer, x, s.point.load + step)
+        return abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))
 
     def _cluster(self, s: SpecialPoint) -> Cluster:
         """The cluster of a special point on the richer discretisation."""
         assert s.cluster is not None
-        return self._transferred(s.cluster)
-
-    def _transferred(self, cluster: Cluster) -> Cluster:
-        """A cluster on the richer discretisation."""
-        vectors = as_vectors(self.solver.system, cluster.basis)
+        vectors = as_vectors(self.solver.system, s.cluster.basis)
         columns = [self.transfer(v, state=False).array_r.real for v in vectors]
-        return Cluster(np.stack(columns, axis=1), cluster.mean)
+        return Cluster(np.stack(columns, axis=1), s.cluster.mean)
 
     def _flutter(self, guess: PETSc.Vec, s: SpecialPoint) -> tuple[float, float, float, float]:
         """Flutter load on the richer discretisation, its uncertainty there, the double eigenvalue and that of it."""

@@ -20,14 +20,12 @@ from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.switching import FIRST
-from rodfem.diagram.branch_ends import closing, meeting, singular_end
-from rodfem.diagram.equivalence import equivalent
+from rodfem.diagram.branch_ends import connection, loop_end, point_past_end
+from rodfem.diagram.doubts import PersistentZeros, Quadrature
+from rodfem.diagram.equivalence import equivalent, image_of
 from rodfem.diagram.events import Events
 from rodfem.diagram.finders import Finder, RequestedLoads, Step
-from rodfem.diagram.images import image_of
-from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.quadrature import Quadrature
 from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
 from rodfem.errors import ConvergenceError
@@ -36,22 +34,19 @@ from rodfem.tolerances import DRIFT, ROUND_OFF
 
 NO_CONVERGENCE = "no convergence"
 """How the reason begins for which a branch ends that no step leads on from."""
+SAME_END = 1e-6
+"""A special point nearer to the end of the range than this, in spans, is the last state."""
 NEAR_START = 8
 """Steps of a branch that begins near another special point are as short as its first for so many times their length."""
 
 
 class Tracer:
-    """Traces branches one by one, each knowing those before it.
-
-    ``branches`` grows as the run goes; ``finished`` is called after each branch that is complete, so that nothing
-    is lost.
-    """
+    """Traces branches one by one, each knowing those before it; ``finished`` is called after each that is complete."""
 
     def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
-        """Start with no branch; the plan must have passed its :meth:`Plan.check`.
+        """Start with no branch, on the mesh of the ``solver``; the ``plan`` must have passed its :meth:`Plan.check`.
 
-        ``solver`` has the first mesh, the ``observer`` hears of the progress, ``finished()`` is called after each
-        branch.  The ``plan`` has range, depth and steps.
+        The ``observer`` hears of the progress.
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.scene = solver.system.scene
@@ -85,13 +80,16 @@ class Tracer:
         self.branches.append(branch)
         if branch.ended == NOT_TRACED:
             self.observer.branch(branch)
-        self.use(branch.points[-1].mesh)
-        self.control = AccuracyControl(self.meshes, (self.low, self.high))
-        self.solver.damp(0)
+        self._prepare(branch.points[-1].mesh)
         if branch.parent:
             self.zeros.damp(self.solver, branch.points[-1])
         self._attempt(branch)
         self._finish(branch)
+
+    def _prepare(self, mesh: int) -> None:
+        self.use(mesh)
+        self.control = AccuracyControl(self.meshes, (self.low, self.high))
+        self.solver.damp(0)
 
     def _attempt(self, branch: Branch) -> None:
         try:
@@ -106,17 +104,10 @@ class Tracer:
         return without(what, self.solver.system.comm, self.observer.warn)
 
     def trace_whole(self, point: Point, name: str, depth: int) -> None:
-        """Follow a branch through a point in both directions, as one.
-
-        Raises :class:`ValueError` for a point without a tangent.
-        """
-        if point.tangent is None:
-            raise ValueError("A point without a tangent is no start of a branch.")
+        """Follow a branch through a point, which has a tangent, in both directions, as one."""
         back = Branch(name, None, depth, [point.backwards(0.0)])
-        self.use(point.mesh)
         self.observer.branch(back)
-        self.control = AccuracyControl(self.meshes, (self.low, self.high))
-        self.solver.damp(0)
+        self._prepare(point.mesh)
         self._attempt(back)
         branch = back.backwards()
         if back.ended == "closed loop":
@@ -158,10 +149,7 @@ class Tracer:
         return history
 
     def _remesh(self, branch: Branch, history: list[Point], trouble: TooCoarse) -> list[Point]:
-        """Points to go on from, carried to a mesh that resolves what was too coarse; what lies beyond is dropped.
-
-        Rows before the trouble stay what they are on the mesh that was made for them.
-        """
+        """Points to go on from, on a mesh that resolves what was too coarse; rows before the trouble stay."""
         solver = self.control.another(trouble, self.observer)
         if solver is not None:
             solver.damp(self.solver.system.damping > 0)
@@ -176,10 +164,7 @@ class Tracer:
         return history
 
     def _advance(self, branch: Branch, history: list[Point]) -> bool:
-        """Append points until the branch ends, which :attr:`Branch.ended` then says; whether it has.
-
-        Otherwise both are as before a step that was too long, and are to be gone on with.
-        """
+        """Append points until the branch ends; False where both are as before a step that was too long."""
         self.specials.resume(history)
         for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
@@ -200,8 +185,8 @@ class Tracer:
 
     def _take(self, branch: Branch, history: list[Point], row: Point) -> str:
         """Append a row to a branch, with the special points before it; why the branch ends there, or before."""
-        previous, width = history[-1], self.high - self.low
-        last = closing(self.solver, branch, previous, row, width, self.here, self.alike)
+        previous = history[-1]
+        last = loop_end(branch, Step(self.solver, previous, row), self.high - self.low, self.here, self.alike)
         row = last or row
         self._check_symmetry(row)
         self._check(row)
@@ -279,7 +264,7 @@ class Tracer:
             if any(s.kind == special.kind and s.point is special.point for s in branch.special):
                 continue  # at a row that the branch has gone back to
             if special.kind.branches:
-                reason = meeting(branch, special, self.branches, self.alike, self.scene.load)
+                reason = connection(branch, special, self.branches, self.alike, self.scene.load)
             branch.insert(special)
             self.observer.special(branch, special)
             if reason:  # it ends before rows, and loads asked for, that were taken for some of it
@@ -295,16 +280,16 @@ class Tracer:
     def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> str:
         """Add the last admissible point, where the smallest stretch vanishes; why the branch ends there, or before."""
         last = last_admissible(self.solver, a, b)
-        beside = before_the_end(self.solver, a, last)
-        if beside is not None:
-            if reason := self._lost_convexity(branch, a, beside):
+        near = before_the_end(self.solver, a, last)
+        if near is not None:
+            if reason := self._lost_convexity(branch, a, near):
                 return reason
-            if beside.negative != a.negative:  # what passes zero before is zero at the end once more
-                self._check(beside)
-                if reason := self._between(branch, a, beside):
+            if near.negative != a.negative:  # what passes zero before is zero at the end once more
+                self._check(near)
+                if reason := self._between(branch, a, near):
                     return reason
-                branch.append(beside)
-                a = beside
+                branch.append(near)
+                a = near
         if reason := self._between(branch, a, last):
             return reason
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
@@ -324,16 +309,18 @@ class Tracer:
             self.observer.warn(branch.start_in_words(self.scene.load))
 
     def _singular_end(self, branch: Branch, last: Point) -> None:
-        """Report a branch point on the very end of the range."""
+        """Insert a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         previous = self.here(branch.points[-2])
         try:
             with self.solver.system.clock.scope("location"):
-                special = singular_end(self.solver, self.span, previous, last, self.specials.beyond)
+                further = None if previous.x is last.x else point_past_end(self.solver, last, self.span)
+                found = [] if further is None else self.specials.beyond(previous, further)
         except ConvergenceError as trouble:
             where = f"{self.scene.load} = {last.load:g}"
             self.observer.warn(f"The last state, at {where}, is singular, and was not resolved: {trouble}")
             return
-        if special is not None:
+        width = SAME_END * (self.high - self.low)
+        for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
             if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
                 branch.replace({id(last): special.point})
             branch.insert(special)

@@ -11,7 +11,6 @@ import pytest
 
 import rodfem
 from rodfem.app import console
-from rodfem.app.commands import COMMANDS
 
 HOME = Path(__file__).parents[2]
 
@@ -21,7 +20,7 @@ pytestmark = pytest.mark.alone
 def test_every_command_is_listed_and_has_help(capsys: pytest.CaptureFixture[str]) -> None:
     console.main(["--help"])
     listed = capsys.readouterr().out
-    for command in COMMANDS:
+    for command in console.COMMANDS:
         assert f"\n  {command} " in listed
         with pytest.raises(SystemExit) as left:
             console.main([command, "--help"])

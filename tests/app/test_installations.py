@@ -11,31 +11,21 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from golden_cases import numbers
-from hemitropic_cases import scene
 from mpi4py import MPI
 
 import rodfem
-from rodfem import Discretization, Plan, libraries
+from rodfem import libraries
 from rodfem.app.console import main
 from rodfem.errors import SetupError
-from rodfem.linalg import compiler
 
 COMM = MPI.COMM_WORLD
 HOME = Path(__file__).parents[2]
 RECORDED = {b["name"]: b["special"] for b in numbers()["demo hemitropic"]}
 
 pytestmark = pytest.mark.versions
-
-
-def loads_of(scene: rodfem.Scene) -> dict[str, Any]:
-    """Loads of the special points of the first branch, on this rank alone."""
-    mesh = Discretization("reduced", elements=8, degree=6)
-    diagram = rodfem.trace(scene, mesh, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
-    return {"loads": [s.point.load for s in diagram.branches[0].special]}
 
 
 def test_a_run_with_all_that_it_can_do(folder: Path) -> None:
@@ -60,13 +50,6 @@ def test_a_run_with_all_that_it_can_do(folder: Path) -> None:
     if COMM.rank == 0:
         main(["view", str(folder / "run"), "--no-open"])
         assert str(first["load"])[:11] in (folder / "run" / "report.html").read_text()
-
-
-def test_many_rods(folder: Path) -> None:
-    found = rodfem.many([scene(), scene()], loads_of, folder / "map")
-    expected = [s["load"] for s in RECORDED["straight"]]
-    for rod in found:
-        assert rod["loads"] == pytest.approx(expected, abs=1e-10)
 
 
 # --- what must not be installed, what must be there -----------------------------------------------------------------
@@ -121,18 +104,3 @@ def test_without_a_compiler(given: str, folder: Path) -> None:
         assert "no C compiler 'no-such-compiler'" in done.stderr
     else:
         assert "apt install gcc" in done.stderr and 'pip install "rodfem[cc]"' in done.stderr
-
-
-@pytest.mark.alone
-def test_another_compiler_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = compiler.missing.__wrapped__
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setattr(os, "environ", dict(os.environ))
-    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
-    monkeypatch.setattr(compiler, "find_spec", lambda name: name == "ziglang")
-    assert found() == ""
-    assert os.environ["CC"] == f"{sys.executable} -m ziglang cc" and os.environ["LDSHARED"].endswith(" cc -shared")
-    monkeypatch.setattr(os, "environ", {"CC": sys.executable})
-    monkeypatch.setattr(compiler.shutil, "which", lambda name: name)
-    monkeypatch.setattr(compiler.sysconfig, "get_path", lambda name: "/nowhere")
-    assert re.search(r"no header files .*'apt install python3-dev'", found())

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
-import shlex
 import sys
 import sysconfig
 from math import pi
@@ -14,9 +12,8 @@ import demo_cases
 import pytest
 
 import rodfem
-from rodfem.app import console, run_terminal
-from rodfem.app.commands.run import mesh_of, rod_of
-from rodfem.app.constants import Statement
+from rodfem.app import console
+from rodfem.app.main import Statement, mesh_of, rod_of
 from rodfem.app.persons_file import load
 from rodfem.errors import InputError
 
@@ -134,18 +131,3 @@ def test_what_stands_beside_a_file_hides_no_module(tmp_path: Path, monkeypatch: 
 def test_constants_of_the_demos_are_described(name: str) -> None:
     statement = Statement(getattr(demo_cases.module(name), demo_cases.FUNCTIONS[name]))
     assert statement.constants and all(constant.words for constant in statement.constants)
-
-
-@pytest.mark.alone
-def test_another_run_in_the_folder_is_named(folder: Path) -> None:
-    """That of the same command is replaced without a word, and what is no run is none."""
-    file, date = folder / "diagram.json", "2026-11-28T20:00:00+00:00"
-    assert run_terminal._other_run(folder) == ""
-    file.write_text("{")
-    assert run_terminal._other_run(folder) == ""
-    file.write_text(
-        json.dumps({"origin": {"command": "/v/bin/python /v/bin/rodfem run a\x1bb.py --depth 0", "date": date}})
-    )
-    assert run_terminal._other_run(folder) == "run of 2026-11-28, rodfem run 'ab.py' --depth 0"
-    file.write_text(json.dumps({"origin": {"command": shlex.join(sys.orig_argv), "date": date}}))
-    assert run_terminal._other_run(folder) == ""

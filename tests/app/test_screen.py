@@ -147,20 +147,6 @@ def test_the_line_that_changes_says_what_is_known_and_what_waits(monkeypatch: py
     assert seen.text.count("\x1b[?25l") == seen.text.count("\x1b[?25h") == 1  # the cursor is back
 
 
-def test_a_short_run_draws_no_line_that_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rodfem.app.screen.SHORT", 3600.0)
-    scene, plan = hemitropic_cases.scene(span=(0.0, 0.2)), Plan(depth=1, error_bars=False)
-    plain = io.StringIO()
-    trace(scene, MESH, plan, Report(stream=plain))
-    with terminal() as (seen, stream), Report(stream=stream) as report:
-        trace(scene, MESH, plan, report)
-    assert "\x1b[2K" not in seen.text
-    assert CONTROL.sub("", seen.text).replace("\r\n", "\n") == plain.getvalue()
-    with terminal() as (seen, stream), Report(stream=stream) as report:
-        report.working("pictures")
-    assert SPINNING.search(CONTROL.sub("", seen.text))
-
-
 def test_a_log_of_a_long_run_has_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, plan = hemitropic_cases.scene(span=(0.0, 0.2)), Plan(depth=1, error_bars=False)
     plain, log = io.StringIO(), io.StringIO()
@@ -182,13 +168,6 @@ def test_a_narrow_window_breaks_lines_between_words(monkeypatch: pytest.MonkeyPa
     assert max(map(len, lines)) <= 60 and " ".join(lines).split() == plain.getvalue().split()
     drawn = re.split(r"[\r\n]", CONTROL.sub("", seen.text))
     assert any(len(line) == 60 and "…" in line for line in drawn) and max(map(len, drawn)) <= 60
-
-
-def test_an_error_leaves_the_terminal_as_it_was() -> None:
-    with terminal() as (seen, stream), pytest.raises(ZeroDivisionError), Report(stream=stream) as report:
-        report.working("a locus")
-        raise ZeroDivisionError
-    assert seen.text.endswith("\x1b[2K") and seen.text.count("\x1b[?25l") == seen.text.count("\x1b[?25h") == 1
 
 
 @pytest.mark.long

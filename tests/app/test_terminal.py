@@ -8,12 +8,11 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import demo_cases
-import h5py
 import hemitropic_cases
 import numpy as np
 import pytest
@@ -22,10 +21,8 @@ from mpi4py import MPI
 
 import rodfem
 from rodfem.app.run import run
-from rodfem.continuation.branch import NormalForm
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
-from rodfem.output.words import law_in_words
 from rodfem.problem.ends import Attachment, clamped, free
 from rodfem.problem.scene import Inertia, Ordinate, Scene
 
@@ -100,17 +97,6 @@ def test_an_energy_of_strains_that_a_rod_does_not_have(
         assert sentence[0][1] == better
     else:
         assert not sentence
-
-
-def test_strains_that_an_energy_does_not_have() -> None:
-    """An energy of stretch alone suggests a rod that stretches; those of the demos ignore nothing."""
-    stretching = replace(
-        compressed("unshearable and inextensible"),
-        energy=lambda v, k, c: (v[2] - 1) ** 2 * (1 + c.s) + k[0] ** 2 + k[1] ** 2 + k[2] ** 2,
-    )
-    assert stretching.ignored_strains == (2,)
-    known = [hemitropic_cases.scene(), *(demo_cases.scene(name) for name in ("cord", "ruler", "follower"))]
-    assert all(scene.ignored_strains == () for scene in known)
 
 
 # --- eigenvalues and indices -----------------------------------------------------------------------------------------
@@ -210,15 +196,6 @@ def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, cap
     assert capfd.readouterr().out.count("Locus of the branch point in lam and k0") == 1
 
 
-def test_a_coefficient_that_may_have_either_sign() -> None:
-    law = asdict(NormalForm("supercritical pitchfork", -13.0, 1, 200.0, -1))
-    assert (
-        law_in_words({"law": law})
-        == "supercritical pitchfork, load = load_b + c x + ..., where c is not told from zero"
-    )
-    assert "load_b - 13.0 (2e-01) x" in law_in_words({"law": law | {"uncertainty": 0.2}})
-
-
 def test_an_equilibrium_that_there_is_not() -> None:
     hemitropic = rodfem.Solver(hemitropic_cases.scene(), MESH)
     with pytest.raises(rodfem.SceneError, match=r"lam = 1.5 is outside its admissible range"):
@@ -234,16 +211,3 @@ def test_a_saved_state_of_another_scene(folder: Path) -> None:
     stretched = rodfem.Solver(compressed("unshearable"), MESH)
     with pytest.raises(rodfem.InputError, match="has no v, needed for the scene 'column': it was written for"):
         stretched.restore(folder / "states.h5", "straight", 0)
-
-
-@pytest.mark.long
-def test_mu_is_an_eigenvalue_and_nothing_else(folder: Path, printed: Any) -> None:
-    """The multiplier of the unit norm has a symbol of its own, in the terminal and in the file."""
-    plan = Plan((0.0, 0.1), at=(0.05,), method="count", spectrum=1, error_bars=False)
-    out, _ = printed(compressed(), plan, folder)
-    if FIRST:
-        assert "unit-norm multiplier eta (P3)" in out
-        assert set(re.findall(r"\bmu\b.{0,10}", out)) == {"mu = omega^2"}
-        with h5py.File(folder / "states.h5") as file:
-            assert {"q", "eta"} < set(file["branches/straight"])
-            assert "mu" not in file["branches/straight"]

@@ -15,7 +15,7 @@ from scipy.linalg import eigvals
 
 from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram.held import at_load
+from rodfem.diagram.equilibria import at_load
 from rodfem.forms.energy import bending_and_twist
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.nonsymmetric import NonsymmetricSolver

@@ -7,14 +7,12 @@ the special point, whose eigenvalue at a fold is as large as the square root of 
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from classics import pressed_ring
-from demo_cases import scene
 
-from rodfem import ConvergenceError, Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, load, pinned, trace
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, pinned, trace
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
@@ -75,12 +73,6 @@ def test_what_vanishes_at_a_special_point_is_zero() -> None:
     assert all(is_undecided(column(), s) for s in found)
 
 
-@pytest.mark.long
-def test_a_file_says_the_same(folder: Path) -> None:
-    again = load(column().save(folder / "column"), bedded())
-    assert len(singular(again)) == 7 and all(is_undecided(again, s) for s in singular(again))
-
-
 def test_a_state_far_away_on_the_richer_mesh_is_not_taken() -> None:
     """By its state alone a fold is not known as one.  Newton's method goes from there to a state with mu = -0.56."""
     diagram = column()
@@ -115,15 +107,6 @@ def test_equilibria_at_the_load_of_a_special_point() -> None:
         if special.kind == "fold":
             below, above = (len(diagram.at(lam + d)) for d in (-1e-3, 1e-3))
             assert abs(below - above) == 2 and len(found) == (below + above) / 2
-
-
-def test_a_fold_of_a_coarser_mesh_is_at_no_load_of_the_finest() -> None:
-    diagram = trace(scene("cord"), Discretization("auto", 3, 3), Plan(depth=1, accuracy=1e-8))
-    (fold,) = diagram.special("fold")
-    assert fold.point.mesh < len(diagram.solvers) - 1
-    with pytest.raises(ConvergenceError, match="was located on a coarser mesh than the finest"):
-        diagram.at(fold.point.load)
-    assert diagram.assess(fold).undecided == 1
 
 
 @pytest.mark.long

@@ -16,7 +16,7 @@ from typing import Any
 import classics
 import numpy as np
 import pytest
-from closed_forms import column, double
+from closed_forms import double
 from hemitropic_cases import specials
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
@@ -84,47 +84,6 @@ def swept(strong: float, span: tuple[float, float], share: float = 1.0) -> Diagr
 
 columns = cache(swept)
 """The same, once for each set of arguments."""
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("span", [(18.0, 22.2), (22.2, 18.0), (19.0, 21.0)])
-@pytest.mark.parametrize(
-    "strong", [1 + 1e-6, 1.005, 1.01, *(pytest.param(x, marks=pytest.mark.long) for x in (1.001, 1.012, 1.02))]
-)
-def test_two_flutters(strong: float, span: tuple[float, float]) -> None:
-    """In one step, or in two that follow one another: what is born lies where the other one was before."""
-    diagram = columns(strong, span)
-    found = critical(diagram[0])
-    agree(found, [BECK, BECK * strong])
-    order = found if span[0] < span[1] else found[::-1]
-    assert [numbers for _, _, *numbers in order] == ([[0, 2], [2, 4]] if span[0] < span[1] else [[4, 2], [2, 0]])
-    adds_up(diagram)
-
-
-@pytest.mark.alone
-@pytest.mark.parametrize("strong", [1.005, pytest.param(1.02, marks=pytest.mark.long)])
-def test_numbers_between_two_flutters(strong: float) -> None:
-    """Of complex eigenvalues, by the frequency equation of either plane, at every row."""
-    for p in columns(strong, (19.0, 21.0))[0].points:
-        if min(abs(p.load - BECK), abs(p.load - BECK * strong)) > 1e-3:
-            growing = 0
-            for EI in (1.0, strong):
-                roots = [column(complex(*mu), p.load, EI) for mu in p.omega2 if mu[1] > 0]
-                near = [abs(r - complex(*mu)) for r, mu in zip(roots, [m for m in p.omega2 if m[1] > 0], strict=True)]
-                growing += 2 * sum(1 for d, r in zip(near, roots, strict=True) if d < 1e-6 * abs(r))
-            assert p.negative == growing == 2 * (p.load > BECK) + 2 * (p.load > BECK * strong)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("strong", [1 + 1e-9, pytest.param(1 + 1e-10, marks=pytest.mark.long)])
-def test_flutters_that_are_one_to_round_off(strong: float) -> None:
-    """Four eigenvalues that are taken for two equal pairs: the bar of their load has those of both."""
-    for span in ((19.0, 21.0), (10.0, 30.0)):
-        found = critical(columns(strong, span)[0])
-        for exact in (BECK, BECK * strong):
-            assert any(abs(load - exact) <= bar < 1e-6 for load, bar, *_ in found)
 
 
 def humped(strong: float, top: float, curvature: float, span: tuple[float, float]) -> Scene:
@@ -206,16 +165,6 @@ def test_flutter_and_divergence(strong: float, span: tuple[float, float]) -> Non
     adds_up(diagram)
     for a, b in pairwise(critical(diagram[0])):
         assert a[0] < b[0]
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("span", [(4.5, 18.0), (18.0, 4.5)])
-def test_one_diverges_where_the_other_comes_back(span: tuple[float, float]) -> None:
-    """At one load: no step parts the two, the number of negative eigenvalues is the same, and it is said."""
-    diagram = columns(BACK / DIVERGES, span, SHARE)
-    agree(critical(diagram[0], "divergence"), [DIVERGES])
-    assert any("pass through zero" in said for said in diagram.warnings)
 
 
 @cache

@@ -6,7 +6,6 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from hard.isolas import scene
 
 from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, trace
 from rodfem.forms.energy import bending_and_twist
@@ -14,25 +13,6 @@ from rodfem.forms.energy import bending_and_twist
 pytestmark = pytest.mark.alone
 
 EXCESS = 0.04
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("at", [0.0, 0.07])
-def test_a_closed_branch_ends_at_its_start(at: float) -> None:
-    """At a load between the folds there are two states of the isola: each is reported once."""
-    plan = Plan(at=(at,), tries=6, error_bars=False)
-    _, isola = trace(scene(EXCESS), Discretization("auto", 6, 6), plan)
-    first, last = isola.points[0], isola.points[-1]
-    assert isola.ended == "closed loop"
-    assert last.load == first.load
-    assert (last.ordinate, last.energy) == pytest.approx((first.ordinate, first.energy), abs=1e-12)
-    assert (last.slope, last.negative) == (pytest.approx(first.slope, abs=1e-9), first.negative)
-    folds = sorted(s.point.load for s in isola.special if s.kind == "fold")
-    assert folds == pytest.approx([-sqrt(EXCESS), sqrt(EXCESS)], abs=1e-6)
-    asked = [s.point for s in isola.special if s.kind == "user"]
-    assert [p.load for p in asked] == [at, at]
-    assert sorted(p.negative for p in asked) == [0, 1]
-    assert len({round(p.ordinate, 9) for p in asked}) == 2
 
 
 @pytest.mark.long

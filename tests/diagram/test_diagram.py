@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,17 +36,6 @@ def test_nothing_is_printed_and_no_file_is_written(
     assert [s.negative_after for s in found.special()] == [2]
     assert capfd.readouterr() == ("", "")
     assert list(folder.iterdir()) == []
-
-
-@pytest.mark.alone
-def test_nothing_outside_the_package_assembles_what_traces() -> None:
-    """Demos, benchmarks and documentation state scenes and call :func:`rodfem.trace`, or compute by a Solver."""
-    home = Path(__file__).parents[2]
-    files = [*home.glob("demos/*.py"), *home.glob("benchmarks/**/*.py"), home / "README.md"]
-    files += [home / "docs" / name for name in ("rods.md", "python.md")]
-    assert len(files) > 20
-    inside = re.compile(r"\b(Explorer|BranchSolver|System)\b")
-    assert {(str(f), found) for f in files for found in inside.findall(f.read_text())} == set()
 
 
 def test_branches_and_special_points(diagram: Diagram) -> None:

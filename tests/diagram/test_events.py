@@ -81,21 +81,6 @@ def test_two_zeros_near_each_other(gap: float) -> None:
     assert not found.warnings
 
 
-def test_several_zeros_in_a_range() -> None:
-    """Of a sine that has two thirds of a half-wave in a step."""
-    exact = [50 * (1 - n * np.pi / 400) for n in range(400, 0, -1) if 0.9 < n * np.pi / 400 < 1]
-    found = straight(lambda z: np.sin(400 * z), error_bars=False)
-    assert [s.point.load for s in found.special("length")] == pytest.approx(exact, rel=0, abs=1e-9)
-    assert not found.warnings
-
-
-def test_a_jump_is_found() -> None:
-    """Where the sign changes there is a point, also if no value is zero."""
-    found = straight(lambda z: 1.0 if z > 0.9613 else -1.0, error_bars=False)
-    (event,) = found.special("event")
-    assert event.point.load == pytest.approx(50 * (1 - 0.9613), abs=1e-9)
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("of", "exact"),
@@ -169,27 +154,6 @@ def test_states_with_round_off_of_their_own(monkeypatch: pytest.MonkeyPatch) -> 
     found = [s for s in rodfem.trace(COLUMN, MESH, plan)[0].special if s.event]
     assert len(found) == len(exact) == 50
     assert all(abs(s.point.load - exact[s.note]) <= s.located_to < 1e-6 for s in found)
-
-
-def test_an_event_that_is_zero_on_a_part_is_said_to_be() -> None:
-    """Of a ramp the zeros are no places: it is said of the steps on which it is zero."""
-    ramp = Event("ramp", of=lambda state: max(state.load - 2, 0.0))
-    found = rodfem.trace(COLUMN, MESH, replace(PLAN, events=(ramp,)))
-    assert not found.special("event")
-    last = max(row.load for row in found[0].points if row.load < 2)
-    assert any(f"'ramp' is zero all along between loads 0 and {last:.8g}" in note for note in found.notes)
-
-
-def test_events_at_the_edge_of_their_values() -> None:
-    """A distance from the end of the range, and an angle that is zero where the rod is straight."""
-    edge = Event("edge", of=lambda state: float(np.sqrt(4.0 - state.load)))
-    found = rodfem.trace(COLUMN, MESH, replace(PLAN, events=(edge,)))
-    assert [s.point.load for s in found.special("event")] == [4.0]
-    rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 15.0))
-    angle = Event("angle", of=lambda state: 2 * np.arccos(abs(state.q[-1, 0])) - 1.0)
-    found = rodfem.trace(rod, Discretization("auto", 8, 6), Plan(depth=1, events=(angle,)))
-    (event,) = found.special("event")
-    assert event.point.load == pytest.approx(4 * ellipk(np.sin(0.5) ** 2) ** 2, rel=1e-7)
 
 
 def test_a_sweep_refuses_events() -> None:

@@ -7,13 +7,11 @@ from dataclasses import replace
 
 import classics
 import demo_cases
-import numpy as np
 import pytest
 
 from rodfem import Discretization, Plan, Scene, trace
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.first_state import is_straight
 
 pytestmark = pytest.mark.alone
 
@@ -53,28 +51,9 @@ def test_only_what_is_straight_is_called_so(scene: Callable[[], Scene], name: st
 
 
 @pytest.mark.long
-def test_a_side_branch_leaves_the_first_branch() -> None:
-    diagram = trace(classics.arch(1.0, dead=False), Discretization("auto", 16, 6), Plan(depth=1, error_bars=False))
-    assert "Branch 1, which leaves the first branch at " in diagram.in_words()
-
-
-def test_straight_is_a_matter_of_shape_alone() -> None:
-    s = np.linspace(0.0, 1.0, 50)[:, None] ** 2
-    way = np.array([0.3, -0.2, 1.0])
-    for size in (1e-9, 1.0, 1e9):
-        assert is_straight(size * (1.0 + s * way))
-        assert not is_straight(size * (s * way + 1e-4 * s * (1.0 - s) * np.array([1.0, 0.0, 0.0])))
-    assert is_straight(s * way - 2.0 * s * (1.0 - s) * way)  # it goes back and forth
-
-
-@pytest.mark.long
 def test_no_two_branches_have_one_name() -> None:
     """What leaves a branch that a search found was called ``branch 1``, as what leaves the first: files have one."""
     explorer = Explorer.__new__(Explorer)
-    first, found = Branch("straight", None, 0), Branch("found 1 at 0.5", None, 0)
-    explorer.branches = [first, Branch("branch 1", ("straight", 0), 1), found]
-    other = Branch(explorer._name(found), ("found 1 at 0.5", 0), 1)
-    assert other.name == "branch 2"
-    explorer.branches.append(other)
-    assert [explorer._name(branch) for branch in (first, found, other)] == ["branch 3", "branch 3", "branch 2.1"]
+    explorer.branches = [Branch("branch 1", ("straight", 0), 1), Branch("found 1 at 0.5", None, 0)]
+    assert explorer._unused("branch ") == "branch 2"
     assert explorer._unused("found ", " at 0.5") == "found 2 at 0.5"  # of another load with these digits, say

@@ -33,10 +33,6 @@ def cantilever(
     return column("cantilever", ends, span, energy=energy, **given)
 
 
-def constant(v: Any, k: Any, c: Any) -> Any:
-    return bending_and_twist(k, (1.0, 9.0, 1.0))
-
-
 def branch_points(diagram: Diagram) -> list[float]:
     return [s.point.load for s in diagram.special("branch point")]
 
@@ -63,22 +59,6 @@ def test_a_pair_where_stiffness_and_thrust_both_grow(above: float, other: float,
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("mesh", [MESH, Discretization("auto", 64, 2)])
-def test_a_pair_of_a_planar_rod_whose_stiffness_and_thrust_both_grow(mesh: Discretization) -> None:
-    """As above with ``n = 3``; the stiffness out of the plane grows as well, and is not in the saddle matrix."""
-    rod = cantilever(
-        lambda v, k, c: ((1 + c.P**2) / 2) ** 3 * bending_and_twist(k, (1.0, 9.0, 1.0)),
-        lambda c: EULER * (1 + 1e-4) * c.P**3,
-        (0.25, 2.3),
-        planar="e1",
-    )
-    growth = (1 + 1e-4) ** (1 / 3)
-    half = sqrt(growth**2 - 1)
-    found = branch_points(trace(rod, mesh, Plan(depth=0, error_bars=False)))
-    np.testing.assert_allclose(found, [growth - half, growth + half], rtol=0, atol=1e-4)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("foundation", "width"),
     [
@@ -100,32 +80,6 @@ def test_a_pair_on_a_foundation_that_grows(foundation: Callable[[Any], Any], wid
     assert not diagram.warnings
 
 
-def on_a_parabola(rate: float, middle: float, half: float, width: float, **given: Any) -> Scene:
-    """Stiffness and thrust grow as ``exp(rate P)``; the thrust over Euler's is one at ``middle +- half``."""
-    grows = lambda c: ufl.exp(rate * (c.P - 1.2))  # noqa: E731
-    return cantilever(
-        lambda v, k, c: grows(c) * bending_and_twist(k, (1.0, 9.0, 1.0)),
-        lambda c: EULER * grows(c) * (1 - width * ((c.P - middle) ** 2 - half**2)),
-        (0.25, 2.3),
-        **given,
-    )
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("mesh", "rate", "middle", "half", "width"),
-    [
-        (MESH, -3.0, 1.7, 0.005, 1.0),  # far softer than at the first state
-        (Discretization("auto", 8, 4), 6.0, 0.577969481203928, 0.004279936560449184, 0.97),  # a row beside the pair
-    ],
-)
-def test_a_pair_where_all_grows_or_falls_by_orders(
-    mesh: Discretization, rate: float, middle: float, half: float, width: float
-) -> None:
-    found = branch_points(trace(on_a_parabola(rate, middle, half, width, planar="e1"), mesh, Plan(depth=0)))
-    np.testing.assert_allclose(found, [middle - half, middle + half], rtol=0, atol=1e-6)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
     "energy",
@@ -141,19 +95,6 @@ def test_a_locus_knows_what_is_sharp_at_its_own_parameters(energy: Any) -> None:
     found = diagram.locus(diagram.special("branch point")[0], "b", (0.0, 1.0), (0.0, 4.0))
     assert "does not integrate the equations about s = 0.43" in found.note
     assert np.isnan(found.error[found.values[:, 1] > 0.1]).all()
-
-
-@pytest.mark.long
-def test_a_potential_that_is_narrow_in_the_position_and_even_in_the_deflection() -> None:
-    """On a straight column it has no force, but a stiffness, which no place of the quadrature sees."""
-    rod = cantilever(
-        constant,
-        lambda c: c.P,
-        potential=lambda x, c: 25.0 * bell(x.r[2] - 0.4321) / (WIDTH * sqrt(pi)) * x.r[1] ** 2,
-    )
-    diagram = trace(rod, MESH, Plan(depth=0))
-    assert any("does not integrate the equations" in said for said in diagram.warnings)
-    assert all(np.isnan(s.error_estimate) for s in diagram.special("branch point"))
 
 
 @pytest.mark.long

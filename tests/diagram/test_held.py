@@ -10,7 +10,7 @@ import pytest
 
 from rodfem import Discretization, Solver
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram.held import at_load
+from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 
 

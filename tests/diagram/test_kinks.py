@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from io import StringIO
-from math import isfinite, isnan, pi
+from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,8 @@ import ufl
 from classics import column
 from mpi4py import MPI
 
-from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene, clamped, free, load, trace
+from rodfem import Diagram, Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, load, trace
 from rodfem.app.terminal import Report
-from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.pieces import pieces_of, typical_state
 from rodfem.output.words import words_of
@@ -39,15 +38,6 @@ def test_a_bilinear_material_has_no_bar_where_it_is_beyond_its_kink() -> None:
     assert isfinite(below.ordinate_error) and below.note == ""  # the moment P(1 - ..) is below 1 everywhere
     assert isnan(beyond.ordinate_error) and isnan(beyond.error_estimate) and "not estimated" in beyond.note
     assert any("does not integrate the equations" in said for said in found.warnings)
-
-
-@pytest.mark.long
-def test_a_condition_without_a_kink_keeps_its_bars() -> None:
-    """Two sides of a comparison that are one function."""
-    same = lambda k: ufl.conditional(ufl.lt(k, -0.5), 0.4 * k**2, 0.4 * k * k) + 0.1 * k**2  # noqa: E731
-    found = bent(same, (2.0,))
-    assert found.warnings == []
-    assert all(isfinite(s.ordinate_error) for s in found[0].special)
 
 
 def one_sided() -> Diagram:
@@ -95,13 +85,6 @@ def test_the_reason_is_the_kink_wherever_one_reads_it(tmp_path: Path) -> None:
     assert {p.kind for p in pieces_of(found.data["branches"][0])} == {"stability undecided"}
 
 
-def test_one_row_on_a_kink_says_nothing_of_those_beside_it() -> None:
-    columns = {"load": [0.0, 1.0, 2.0], "ordinate": [0.0] * 3, "negative": [1, 0, 0], "kink": ["stored energy", "", ""]}
-    branch = {"name": "a", "parent": None, "columns": columns | {"zero": [0] * 3}, "special": []}
-    assert [p.kind for p in pieces_of(branch)] == ["stable"]
-    assert [x.verdict for x in words_of(branch)] == ["undecided", "stable", "stable"]
-
-
 @pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 @pytest.mark.alone
@@ -114,17 +97,3 @@ def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
     found = trace(rod, Discretization("auto", 6, 4))
     assert isnan(found[0].special[-1].ordinate_error)
     assert any("does not integrate the equations" in said for said in found.warnings)
-
-
-@pytest.mark.long
-@pytest.mark.short
-def test_terms_that_cancel_are_named() -> None:
-    """FFCx 0.5 cannot take a form of such terms: its traceback was all that was said.  Later ones can: Euler's load."""
-    cancels = lambda x, c: c.P * x.r[2] + 3 * x.r[2] ** 2 - 3 * x.r[2] ** 2  # noqa: E731
-    rod = column("cancels", (clamped(), End(energy=cancels)), (0.0, 3.0))
-    try:
-        (branch,) = trace(rod, Discretization("auto", 4, 4), Plan(depth=0))
-    except SceneError as refused:
-        assert "terms cancel each other" in str(refused)
-    else:
-        assert branch.special[0].point.load == pytest.approx(pi**2 / 4, abs=1e-6)

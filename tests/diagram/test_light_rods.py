@@ -7,18 +7,13 @@ critical: the statics of a cantilever under a follower load is regular at every 
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin, sqrt
+from math import cos, hypot, sin, sqrt
 
-import numpy as np
 import pytest
-from mpi4py import MPI
 
-from rodfem import Attachment, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, trace
+from rodfem import Attachment, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free, trace
 from rodfem.continuation.kinds import END
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.frequencies import orthonormal
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.stability.spectrum import SHIFT
 
 pytestmark = pytest.mark.alone
 POLE = 20.190728556
@@ -66,34 +61,3 @@ def test_a_sign_that_changes_through_infinity_is_no_divergence() -> None:
     assert all(point.negative == (point.load > POLE) for point in branch.points)
     (said,) = [w for w in diagram.warnings if "through infinity" in w]
     assert float(said.split("P = ")[1].split()[0]) == pytest.approx(POLE, abs=1e-5)
-
-
-@pytest.mark.parametrize(("elements", "number", "target"), [(40, 10, SHIFT), (6, 8, 1e4)])
-def test_each_finite_eigenvalue_once(elements: int, number: int, target: float) -> None:
-    """Beside the tip, which hardly moves, those of a rod clamped and hinged: about ``((j + 1/4) pi)^4 / rho``.
-
-    The thrust is small.  Of ten one is doubtful by its round-off; beside eight there is an infinite one among them.
-    """
-    solver = Solver(light(1e-4, (0.0, 30.0)), Discretization(elements=elements))
-    pencil = NonsymmetricSolver(solver.equilibria.system).at(solver.equilibrium(1.0).x)
-    lowest, *others = np.sort_complex(pencil.near(number, target).values)
-    assert lowest == pytest.approx(slowest(1.0), rel=1e-3)
-    waves = [((j + 0.25) * pi) ** 4 / 1e-4 for j in range(1, number)]
-    np.testing.assert_allclose(others[: number - 1], waves, rtol=0.06)
-
-
-def test_near_the_pole_no_other_is_finite() -> None:
-    """A rod without mass has one finite eigenvalue, whichever number is asked for."""
-    load = 20.19074
-    solver = Solver(light(0.0, (0.0, 30.0)), Discretization(elements=6))
-    pencil = NonsymmetricSolver(solver.equilibria.system).at(solver.equilibrium(load).x)
-    for number in (1, 3, 6, 12):
-        for target in (SHIFT, 1e4):
-            (found,) = pencil.near(number, target).values
-            assert found == pytest.approx(slowest(load), rel=0.02)
-
-
-def test_what_has_no_mass_is_no_part_of_a_basis() -> None:
-    vectors = np.eye(4, 2, dtype=complex)
-    assert not orthonormal(MPI.COMM_WORLD, vectors, 0.0 * vectors).any()
-    assert np.allclose(abs(orthonormal(MPI.COMM_WORLD, vectors, 4.0 * vectors)[:2]), np.eye(2) / 2)

@@ -103,15 +103,6 @@ def test_states_at_a_branch_point() -> None:
     assert len(found.at(special.point.load)) == 1
 
 
-@pytest.mark.long
-def test_nothing_is_found_beside_the_only_state() -> None:
-    """Far below its first critical load the cantilever has one equilibrium."""
-    assert len(tips(1.0)) == 1
-    found = trace(cantilever(1.0), plan=Plan(at=(1.0,), tries=6, error_bars=False))
-    assert len(found) == 1
-    assert [p.ordinate for p in found.at(1.0)] == pytest.approx(tips(1.0), abs=1e-6)
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("span", [(0.0, HIGH), (HIGH, 0.0)])
 def test_branches_that_are_found_at_an_end_of_the_range(span: tuple[float, float]) -> None:

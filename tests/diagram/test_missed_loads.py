@@ -34,40 +34,6 @@ def near_its_greatest(
 @pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
-@pytest.mark.parametrize(
-    ("kind", "top", "mesh", "curvature", "hidden"),
-    [
-        ("flutter", 3e-3, COARSE, 1.0, False),
-        ("flutter", 1e-5, COARSE, 1.0, True),
-        ("flutter", 1e-5, COARSE, 1e-3, True),
-        ("flutter", -1e-1, COARSE, 1.0, False),
-        ("flutter", 1e-9, FINE, 1.0, False),
-        ("flutter", 6e-11, FINE, 1.0, True),
-        ("flutter", 1e-11, FINE, 1.0, True),
-        ("flutter", -1e-9, FINE, 1.0, False),
-        ("divergence", 1e-6, COARSE, 1.0, False),
-        ("divergence", 1e-7, COARSE, 1.0, True),
-        ("divergence", 1e-7, COARSE, 1e-3, True),
-        ("divergence", -1e-4, COARSE, 1.0, False),
-        ("divergence", 1e-9, FINE, 1.0, True),
-        ("divergence", -1e-6, FINE, 1.0, False),
-    ],
-)
-def test_two_loads_or_none(
-    kind: str, top: float, mesh: Discretization, curvature: float, at: float, hidden: bool
-) -> None:
-    """Both are found, within their bars, or there are none, or what hides them is said: round-off, or the mesh."""
-    diagram = near_its_greatest(kind, top, at, mesh, curvature)
-    found = loads(diagram, kind, at)
-    exact = [at - sqrt(top / curvature), at + sqrt(top / curvature)] if top > 0 and not hidden else []
-    assert [abs(load - x) <= bar for (load, bar), x in zip(found, exact, strict=True)] == [True] * len(exact)
-    said = [any(words in one for words in ("is not known", "on a richer one")) for one in diagram.warnings]
-    assert said == [True] * hidden
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
 @pytest.mark.parametrize(("kind", "top"), [("late flutter", 5e-12), ("divergence", 1e-9), ("divergence", 1e-13)])
 def test_round_off_hides_two_loads(kind: str, top: float, at: float) -> None:
     """It is said without another mesh, too: on this one flutter begins 5e-12 later than that of the column."""

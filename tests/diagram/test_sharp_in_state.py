@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, isfinite, isnan, sin, sqrt
+from math import cos, isnan, sin, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -74,19 +74,6 @@ def test_bars_hold_or_there_are_none() -> None:
             assert isnan(bar) if width < 1e-2 else abs(ordinate - told[width][load]) <= bar < 1e-4
 
 
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("power", [lambda k: ufl.sqrt(k**2), lambda k: (k * k) ** 0.5, lambda k: k * ufl.sign(k)])
-def test_an_absolute_value_by_other_names(power: Any) -> None:
-    """``M = k + 4 (k - 1)`` beyond the curvature 1, by a ramp of ``|k - 1|``: the bars at 1.5 to 3 were finite."""
-    ramp = lambda k: (k - 1 + power(k - 1)) / 2  # noqa: E731
-    found = bent(lambda k: 0.5 * k**2 + 2 * ramp(k) ** 2, (6, 4), (0.5, *LOADS))
-    below = next(s for s in found[0].special if s.point.load == 0.5)
-    assert isfinite(below.ordinate_error)  # the curvature is below 1 everywhere
-    assert all(isnan(bar) for _, _, bar in ordinates(found))
-    assert any("does not integrate the equations" in said for said in found.warnings)
-
-
 def lateral(threshold: float) -> Diagram:
     """A strip under a force across, which buckles sideways; softer in its plane beyond a curvature."""
 
@@ -122,17 +109,3 @@ def _saved(locus: Locus, folder: Path) -> Path:
     path = folder / "locus.json"
     locus.save(path)
     return path
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_a_foundation_of_constant_force_has_a_kink() -> None:
-    """``|y|``: its second derivative is zero on either side, and the first one jumps where the rod is straight."""
-    rod = Scene(
-        "friction", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: ufl.dot(k, k) / 2, {"P": 0.0}, "P",
-        (clamped(), free(lambda c: (0.0, 0.0, -c.P))), Ordinate("y", s=1.0, of=lambda r, q: r[1]), (0.0, 3.0),
-        potential=lambda x, c: 0.1 * abs(x.r[1]),
-    )  # fmt: skip
-    found = trace(rod, Discretization(elements=4, degree=4), Plan(depth=0))
-    assert any("have a kink at the very state" in said for said in found.warnings)
-    assert all(point.stable is not True for point in found[0].points)

@@ -5,17 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import classics
-import numpy as np
 import pytest
-import ufl
 from classics import column, push
-from hard.thrusts import THIN, on_soft_springs
-from scipy.linalg import eigvals
+from hard.thrusts import THIN
 
 from rodfem import Diagram, Discretization, End, Inertia, Plan, Scene, clamped, free, trace
 from rodfem.codim2.unstable import NEAREST
 from rodfem.forms import loads
-from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
 
@@ -25,26 +21,6 @@ BECK = 20.0509536189738
 
 def swept(scene: Scene, **plan: Any) -> Diagram:
     return trace(scene, MESH, Plan(depth=0, **plan))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("k", [*(pytest.param(k, marks=pytest.mark.long) for k in (1e-3, 1e-6)), 1e-8])
-def test_flutter_of_a_stiff_rod_on_soft_springs(k: float) -> None:
-    """Springs k and k/2 across its ends, a thrust that follows: two degrees of freedom, flutter from ``P = k/3`` on.
-
-    With a round-off of 1e-5 of ``EI/(m L^4)``, whatever the rod does, all complex pairs were real ones below 1e-5.
-    """
-    diagram = swept(on_soft_springs(k))
-    (flutter,) = diagram.special("flutter")
-    assert abs(flutter.point.load - k / 3) <= flutter.error_estimate + 3e-3 * k**2  # what bending adds
-    assert not diagram.warnings
-    point = diagram[0].points[70]
-    P = point.load / k
-    exact = eigvals([[1.5, 0.5 + P], [0.5, 0.5]], [[1.0, 0.5], [0.5, 1 / 3]])
-    found = np.array([complex(*value) for value in point.omega2[:2]]) / k
-    assert point.negative == 2 == diagram.assess(point).negative and sorted(found.imag) == pytest.approx(
-        sorted(exact.imag), rel=1e-2
-    )
 
 
 @pytest.mark.long
@@ -67,23 +43,6 @@ def test_springs_that_soften_with_the_parameter() -> None:
     assert flutter.point.load == pytest.approx(20 / 3, abs=1e-4) and not diagram.warnings
     found = diagram.locus(flutter, "B2", (1.2, 1.4))
     assert found.index.tolist() == [[0, 2]] * len(found.values)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("kr", "most"), [pytest.param(1e-5, 1.6, marks=pytest.mark.long), (1e-6, 1.28), (1e-7, 1.6)])
-def test_divergence_of_a_stiff_rod_on_a_soft_hinge(kr: float, most: float) -> None:
-    """A fifth of the thrust follows: ``theta'' = -3 (kr - 0.8 P) theta``, which is located, or said to lie between."""
-    hinge = End(
-        position=lambda c: (0.0, 0.0, 0.0), energy=lambda x, c: loads.rotational_spring(x.q, (c.kr, 1.7 * c.kr, 1.0))
-    )
-    tip = free(force=lambda c: (0.0, 0.0, -0.8 * c.P), follower=lambda c: (0.0, 0.0, -0.2 * c.P))
-    diagram = swept(column("hinge", (hinge, tip), (0.0, most * kr), inertia=THIN, constants={"kr": kr, "B2": 1.3}))
-    for point in diagram[0].points:
-        if abs(point.load / kr - 1.25) > 1e-2:
-            assert point.negative == int(point.load > 1.25 * kr)
-            assert point.omega2[0][0] / kr == pytest.approx(3 * (1 - 0.8 * point.load / kr), abs=1e-2)
-    found = [s.point.load / kr for s in diagram.special("divergence")]
-    assert found == pytest.approx([1.25], abs=1e-5) or (diagram[0].unexplained and diagram.warnings)
 
 
 @pytest.mark.long
@@ -112,51 +71,6 @@ def test_flutter_that_comes_and_goes_beyond_dozens_of_slow_motions() -> None:
     found = swept(rod, error_bars=False)
     loads = [s.point.load for s in found.special("flutter")]
     assert loads == pytest.approx([5.05, 5.45], abs=1e-8) and not found.warnings
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("above", [2e-4, -2e-4])
-def test_flutter_in_a_step_where_no_load_turns(above: float) -> None:
-    """A thrust of ``p`` and a stiffness of ``(1 + p^2)/2`` times: both grow, and their ratio is greatest at ``p = 1``.
-
-    It passes Beck's load within 0.02 of that.
-    """
-    inertia, constants = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)), {"p": 1.0, "b": 1.0 + above}
-    rod = column(
-        "ratio", (clamped(), free(follower=lambda c: (0.0, 0.0, -BECK * c.b * c.p))), (0.25, 2.3),
-        load="p", inertia=inertia, constants=constants,
-        energy=lambda v, k, c: bending_and_twist(k, ((1 + c.p**2) / 2, 10.0, 0.02)),
-    )  # fmt: skip
-    found = swept(rod, error_bars=False)
-    b = 1.0 + above
-    exact = [b - np.sqrt(b**2 - 1.0), b + np.sqrt(b**2 - 1.0)] if above > 0 else []
-    assert [s.point.load for s in found.special("flutter")] == pytest.approx(exact, rel=1e-8)
-    assert not found.warnings
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("growth", "ratio", "exact"),
-    [
-        (3.0, lambda p: 1 + 0.3 * (0.001**2 - (p - 0.005) ** 2), (0.004, 0.006)),  # in the first step
-    ],
-)
-def test_flutter_in_a_step_where_thrust_and_stiffness_grow(
-    growth: float, ratio: Any, exact: tuple[float, float]
-) -> None:
-    """Both grow exponentially; their ratio passes Beck's within a fifth of a row."""
-    inertia, constants = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)), {"p": 0.0}
-    rod = column(
-        "growing",
-        (clamped(), free(follower=lambda c: (0.0, 0.0, -BECK * ufl.exp(growth * c.p) * ratio(c.p)))),
-        (0.0, 1.0),
-        load="p",
-        inertia=inertia,
-        constants=constants,
-        energy=lambda v, k, c: bending_and_twist(k, (ufl.exp(growth * c.p), 10.0 * ufl.exp(growth * c.p), 0.02)),
-    )
-    found = swept(rod, error_bars=False)
-    assert [s.point.load for s in found.special("flutter")] == pytest.approx(exact, abs=1e-7) and not found.warnings
 
 
 @pytest.mark.long

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -38,10 +37,6 @@ def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tup
     out = StringIO()
     diagram = trace(scene, Discretization("pointwise", 4, 6), observer=Report(stream=out))
     return diagram[0], diagram.data, out.getvalue()
-
-
-def named(kinds: Callable[[str], bool], data: dict) -> bool:
-    return all(kinds(name) for row in data["branches"][0]["columns"]["motion"] for name in row)
 
 
 @pytest.mark.long
@@ -105,14 +100,6 @@ def test_curves_meet_as_square_roots(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.long
 @pytest.mark.alone
-def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the rod bends alike in all planes the vectors of a frequency are any in a plane, its name is not."""
-    for scene in (classics.partly_following(1.0, (0.0, 25.0), 1.0), classics.partly_following(0.2, (0.0, 25.0), 1.0)):
-        assert named(lambda name: name == "bending", swept(scene, monkeypatch)[1])
-
-
-@pytest.mark.long
-@pytest.mark.alone
 def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thrust that follows in part: one plane diverges, holds again and flutters, before the other one diverges."""
     share, strong = 0.45, 3.0
@@ -166,19 +153,6 @@ def test_constraints_that_follow_from_others_are_refused() -> None:
     """Without it a singular pencil, with an eigenvalue that is any number, is what frequencies are computed of."""
     with pytest.raises(SceneError, match="Constraints depend on one another"):
         trace(TWICE_HELD, Discretization(elements=5, degree=6))
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), pytest.param(5, 7, marks=pytest.mark.long)])
-def test_a_singular_pencil_has_the_eigenvalues_of_its_motions(
-    elements: int, degree: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Without a look at its constraints round-off adds no eigenvalue to those of a beam, clamped and hinged."""
-    monkeypatch.setattr("rodfem.diagram.first_state.require_independent_constraints", lambda *given: None)
-    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 2)
-    diagram = trace(TWICE_HELD, Discretization(elements=elements, degree=degree), Plan(error_bars=False))
-    assert diagram[0].points[0].omega2[0] == pytest.approx([TURNING**4, 0.0], rel=1e-6)
 
 
 @pytest.mark.few(1)
@@ -274,36 +248,6 @@ def pflueger(z: np.ndarray) -> list[float]:
     return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
-@pytest.mark.few(1)
-@pytest.mark.alone
-@pytest.mark.parametrize("light", [1e-3, 1e-5])
-@pytest.mark.usefixtures("few_loads")
-def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
-    """Two masses on a rod of 1e-5 of theirs: the eigenvalues that flutter, 27.5, are beside others of 1e10."""
-    inertia = Inertia(rho_A=lambda c: light, rho_I=lambda c: (0.0, 0.0, 0.0))
-    scene = replace(classics.beck(tip=1.0, middle=1.0, span=(0.0, 25.0)), inertia=inertia, planar="e1")
-    diagram = trace(scene, Discretization("pointwise", 4, 6))
-    (point,) = specials(diagram[0], "flutter")
-    assert not diagram.warnings
-
-    def equations(z: np.ndarray) -> list[float]:
-        """Zero where two eigenvalues of the rod with masses of one at its middle and its tip meet."""
-
-        def determinant(mu: complex) -> complex:
-            A, body = np.eye(4, k=1, dtype=complex), np.eye(4, dtype=complex)
-            A[3, 0], A[3, 2], body[3, 0] = light * mu, -z[0], mu
-            y = (expm(A / 2) @ body @ expm(A / 2))[:, 2:]
-            return complex(np.linalg.det(np.array([y[2], y[3] + mu * y[0]])))
-
-        return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
-
-    P, _ = fsolve(equations, [point.point.load, point.omega2], xtol=1e-13)
-    assert abs(point.point.load - P) <= point.error_estimate < 1e-9
-    assert [p.negative for p in diagram[0].points if p is not point.point] == [
-        2 * (p.load > P) for p in diagram[0].points if p is not point.point
-    ]
-
-
 @pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -336,17 +280,3 @@ def test_memory_does_not_grow_with_the_states_whose_frequencies_are_found(monkey
         used.append(resident())
     assert cleaned == [2]
     assert used[-1] - used[PILE] < 0.25 * (used[PILE - 2] - used[1]) + 512
-
-
-@pytest.mark.long
-def test_long_pencil_on_any_number_of_ranks() -> None:
-    """22001 unknowns: cut at the ranks where there are several (exact: the frequency equation)."""
-    solver = Solver(classics.partly_following(1.0, (0.0, 25.0)), Discretization("pointwise", 2000, 1)).equilibria
-    x, outcome = solver.at_load(solver.start(10.0), 10.0)
-    assert outcome.converged
-    vibration = NonsymmetricSolver(solver.system).at(x)
-    for target in (1.0, 26.0):
-        values = vibration.near(2, target).values
-        assert abs(values - column(26.7885149853, 10.0)).min() < 3e-7 * 26.8
-        assert abs(values.imag).max() < 1e-5
-    assert np.isclose(vibration.near(2, 1.0).values, column(132.59, 10.0, 10.0), rtol=1e-6).any()

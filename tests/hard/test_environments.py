@@ -23,7 +23,7 @@ from ffcx.codegeneration import jit
 from mpi4py import MPI
 
 import rodfem
-from rodfem import code_cache, compat
+from rodfem import compat
 from rodfem.fem import form_compiler
 
 pytestmark = pytest.mark.alone
@@ -122,20 +122,6 @@ def test_a_user_without_a_home() -> None:
         assert "This user has no home folder" in said and "set XDG_CACHE_HOME" in said
 
 
-def test_nobody_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def homeless() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.setattr(code_cache.Path, "home", homeless)
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setenv("HOME", "")
-    with pytest.raises(RuntimeError):
-        code_cache.have_home()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    code_cache.have_home()
-    assert os.environ["HOME"] == str(tmp_path)
-
-
 # --- a cache that is broken -----------------------------------------------------------------------------------------
 
 
@@ -185,25 +171,3 @@ def test_what_a_killed_process_was_compiling_is_compiled_at_once(tmp_path: Path)
     objects, *_ = jit.compile_forms([form()], cache_dir=tmp_path)
     assert len(objects) == 1 and not list(tmp_path.glob("*.compiling"))
     assert time.monotonic() - start < 9.0  # FFCx's own patience is 10 s
-
-
-def test_what_another_process_compiles_is_awaited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """FFCx gives up after ten seconds: a compiler on a busy machine takes longer."""
-    tries: list[int] = []
-
-    def search(*_: object) -> str:
-        tries.append(1)
-        if len(tries) < 3:
-            raise TimeoutError
-        return "found"
-
-    monkeypatch.setattr(form_compiler, "_SEARCH", search)
-    lock = tmp_path / "some.c"
-    lock.touch()
-    assert form_compiler._by_name("some", [], tmp_path, 10) == "found" and len(tries) == 3
-    tries.clear()
-    long_ago = time.time() - 2 * form_compiler.PATIENCE
-    os.utime(lock, (long_ago, long_ago))
-    with pytest.raises(TimeoutError):
-        form_compiler._by_name("some", [], tmp_path, 10)
-    assert len(tries) == 1

@@ -29,8 +29,7 @@ MATRICES = {
     "rodfem.linalg.orthogonal",
 }
 """Linear algebra, which knows nothing of rods."""
-COMMAND_LINE = ("rodfem.app.cli", "rodfem.app.options", "rodfem.app.constants", "rodfem.app.main")
-COMMAND_LINE += ("rodfem.app.console", "rodfem.app.commands.", "rodfem.app.script")
+COMMAND_LINE = ("rodfem.app.cli", "rodfem.app.main", "rodfem.app.console", "rodfem.app.script")
 """Beginnings of the names of modules that know options."""
 BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances"}
 BELOW_MATRICES |= {"rodfem.beside", "rodfem.code_cache"}

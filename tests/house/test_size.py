@@ -14,13 +14,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 37245,
-    "files of Python": 251,
+    "lines of Python": 36589,
+    "files of Python": 232,
     "lines of C": 957,
-    "module constants with a number": 480,
-    "functions of a complexity above 10": 68,
-    "functions of six parameters or more": 48,
-    "places that warn": 36,
+    "module constants with a number": 474,
+    "functions of a complexity above 10": 56,
+    "functions of six parameters or more": 40,
+    "places that warn": 33,
     "files that import internals of UFL and FFCx": 11,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)

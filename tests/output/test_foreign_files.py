@@ -15,7 +15,7 @@ import pytest
 
 import rodfem
 from rodfem import Discretization, Plan
-from rodfem.app.commands import info
+from rodfem.app import console
 from rodfem.errors import InputError
 from rodfem.output import plot_diagram, plot_modes, render
 
@@ -138,7 +138,7 @@ def test_a_table_of_what_is_not_there(entry: tuple[str | int, ...], good: Path, 
     changed(*entry)(data)
     (bad / "diagram.json").write_text(json.dumps(data))
     with pytest.raises(InputError, match=f"has no {entry[-1]}: run the scene again"):
-        info.main([str(bad)])
+        console.info([str(bad)])
 
 
 def put(name: str, value: Any) -> Callable[[h5py.File], None]:

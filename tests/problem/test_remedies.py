@@ -14,13 +14,12 @@ from mpi4py import MPI
 
 import rodfem
 from rodfem.app.cli import ARGUMENT, Parser
-from rodfem.app.constants import Statement
-from rodfem.app.main import parser_of
+from rodfem.app.main import Statement, parser_of
 from rodfem.errors import POINTWISE, Argument, ConvergenceError, InputError, Remedy, SceneError, SetupError
 from rodfem.problem.scene import Scene
 
 HOME = Path(__file__).parents[2] / "rodfem"
-COMMAND_LINE = ("app/cli.py", "app/options.py", "app/console.py", "app/commands/")
+COMMAND_LINE = ("app/cli.py", "app/main.py", "app/console.py")
 PROGRAMS = (*COMMAND_LINE, "output/plot_modes.py", "output/plot_diagram.py", "output/render.py")
 """Modules that are run themselves, and may know their own options."""
 

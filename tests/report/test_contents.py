@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from rodfem.app.commands.list import first_loss
+from rodfem.app.console import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
 from rodfem.output.digits import eigenvalue_in_words, number

@@ -16,7 +16,6 @@ from output.test_formats import MESH, RUNS
 from problem.test_docs import scenes
 
 from rodfem.app import console
-from rodfem.app.commands import view
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError
@@ -176,9 +175,9 @@ def test_unfit_folders_are_refused_in_a_sentence(results: Path, tmp_path: Path) 
 
 def test_commands(results: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
-    monkeypatch.setattr(view.webbrowser, "open", opened.append)
-    monkeypatch.setattr(view, "WITHOUT", ())
-    for name in view.SCREENS:
+    monkeypatch.setattr(console.webbrowser, "open", opened.append)
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in console.DISPLAYS:
         monkeypatch.delenv(name, raising=False)
     console.main(["view", str(results / "short")])
     monkeypatch.setenv("DISPLAY", ":0")

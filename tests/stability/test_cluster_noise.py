@@ -13,7 +13,7 @@ from hard.fuzz import wider
 
 from rodfem import Discretization, Parameter, Plan, Scene, Solver, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram.held import at_load
+from rodfem.diagram.equilibria import at_load
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.cluster import Measured, closed, cluster_of, measure, noise_of
 from rodfem.stability.inertia import EPS, NOISE

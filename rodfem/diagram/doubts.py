@@ -1,0 +1,131 @@
+"""What rows of a branch leave open: eigenvalues that stay zero, equations that a mesh does not integrate, kinks.
+
+Eigenvalues that stay zero along a branch, without a symmetry of the scene, are those of a family of states at one load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite, nan
+
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.kinds import END
+from rodfem.continuation.observer import Observer
+from rodfem.fem.newton import TOLERANCE
+from rodfem.fem.quadrature_check import QuadratureCheck
+from rodfem.stability.near_zero import resolve
+
+ROWS = 4
+"""Rows one after the other that have as many zero eigenvalues, before these are said to stay."""
+
+
+class PersistentZeros:
+    """Watches the rows of a run for zero eigenvalues; an ``observer`` hears of the first that stay."""
+
+    def __init__(self, observer: Observer, width: float) -> None:
+        """Nothing is said yet; ``width`` is that of the range of loads."""
+        self.observer, self.width, self.reported = observer, width, False
+
+    def extra(self, solver: BranchSolver, point: Point) -> int:
+        """Zero eigenvalues, beside symmetries' and the branch's own, of a point."""
+        vertical = abs(point.slope) < VERTICAL * self.width  # the branch itself is a family at one load
+        return point.zero - solver.system.active_drifts(point.x) - vertical
+
+    def damp(self, solver: BranchSolver, point: Point) -> None:
+        """Damp Newton's method of a ``solver`` where those of a ``point`` are zero, to round-off."""
+        extra = self.extra(solver, point)
+        solver.damp(_exact(solver, (point,), extra) if extra > 0 else 0)
+
+    def check(self, solver: BranchSolver, history: Sequence[Point], point: Point, level: int) -> None:
+        """Damp Newton's method where eigenvalues stay zero, and say so once.
+
+        With damping the tangent is one of other equations, by the tolerance of a count over the least eigenvalue: of
+        one that is not zero but within that tolerance, beside a fold, the load's part of it has no digit.
+
+        ``history`` has the rows of a ``solver`` before the ``point``; a branch has had ``level`` zeros all along.
+        """
+        extra = self.extra(solver, point)
+        recent = [p for p in history[-ROWS:] if p.arclength > 0.0]  # a branch point has zeros of its own
+        if extra <= 0 or not recent or any(p.zero != point.zero for p in recent):
+            solver.damp(0)
+            return
+        if not solver.system.damping:
+            solver.damp(_exact(solver, (point,), extra))
+        if len(recent) == ROWS and point.zero <= level and not self.reported:
+            self.reported = True
+            self._say(solver, recent[0], point, extra)
+
+    def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
+        """Report eigenvalues that are zero at two rows: to round-off, or to what Newton's method leaves of a state."""
+        load, exact = solver.system.scene.load, _exact(solver, (before, point), extra)
+        if exact:
+            self.observer.note(
+                f"  {exact} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
+                "move freely at one and the same load"
+            )
+        if extra > exact:
+            self.observer.note(
+                f"  {extra - exact} eigenvalue(s) stay within {TOLERANCE:.0e} of zero, relative to the lowest bending "
+                f"eigenvalue, from {load} = {before.load:.8g} to {point.load:.8g} at least, without being zero to "
+                "round-off: Newton's method leaves that open of a state, their sign is undecided"
+            )
+
+
+def _exact(solver: BranchSolver, points: Sequence[Point], extra: int) -> int:
+    """How many ``extra`` eigenvalues, counted as zero at ``points``, are zero to round-off at one of them."""
+    exact, last = 0, points[-1]
+    own = last.zero - solver.system.active_drifts(last.x) - extra
+    for point in points:
+        low, high = resolve(solver.inertia.at(point.x))
+        exact = min(max(exact, high - low - own), extra)
+    return exact
+
+
+class Quadrature:
+    """Examines branches on the meshes of several ``solvers``, and tells an ``observer`` what is left open."""
+
+    def __init__(self, solvers: Sequence[BranchSolver], observer: Observer, load: str) -> None:
+        """Examine nothing yet; ``load`` is the name of the load."""
+        self.solvers, self.observer, self.load = solvers, observer, load
+        self._by_mesh: dict[int, QuadratureCheck] = {}
+
+    def examine(self, branch: Branch) -> None:
+        """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so.
+
+        Of a state that the mesh does not resolve its bar says so.
+        """
+        first = branch.points[:1] if branch.parent is None else []
+        asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
+        found = [(point, self._check(point)(point.x)) for point in first]
+        found += [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
+        self._kinks(branch, [*first, *(special.point for special in asked)])
+        for point, words in [each for each in found if each[1] and not each[0].kink][:1]:
+            self.observer.warn(f"{branch.name}: at {self.load} = {point.load:.6g} {words}")
+
+    def _without_bars(self, special: SpecialPoint) -> str:
+        """Take the bars of a special point away where the equations are not integrated, and say why."""
+        point = special.point
+        if words := self._check(point)(point.x):
+            special.error_estimate = special.ordinate_error = point.estimate = special.omega2_error = nan
+            special.resolved = None
+            special.note = "; ".join(filter(None, (special.note, "not estimated: see the warnings")))
+        return words
+
+    def _kinks(self, branch: Branch, asked: Sequence[Point]) -> None:
+        """Leave the stability of rows on a kink undecided, and say so, where one of some points is on a kink."""
+        if not any(self._check(point).kink(point.x) for point in asked):
+            return
+        for point in branch.points:
+            point.kink = self._check(point).kink(point.x)
+        loads = [f"{point.load:.6g}" for point in branch.points if point.kink]
+        where = " to ".join(dict.fromkeys((loads[0], loads[-1])))
+        self.observer.warn(
+            f"{branch.name}: the equations have a kink at the very state at {self.load} = {where}: the second "
+            "derivative depends on the side, the index holds for one side only, and stability is undecided there."
+        )
+
+    def _check(self, point: Point) -> QuadratureCheck:
+        if point.mesh not in self._by_mesh:
+            self._by_mesh[point.mesh] = QuadratureCheck(self.solvers[point.mesh].system)
+        return self._by_mesh[point.mesh]
