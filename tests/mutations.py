@@ -894,7 +894,7 @@ FAULTS = {
         "tests/stability/test_soft_modes.py",
     ),
     "segments-beside-undecided-rows": Fault(
-        "rodfem/output/intervals.py",
+        "rodfem/output/pieces.py",
         "if self.kind == UNDECIDED and self.soft else",
         "if False else",
         "tests/output/test_summary.py",
@@ -1064,7 +1064,7 @@ FAULTS = {
         "rodfem/output/files.py", "_trimmed(value[row])", "_trimmed(value[row - 1])", f"{FILES} {DIAGRAM}"
     ),
     "files-of-two-runs": Fault(
-        "rodfem/output/contents.py",
+        "rodfem/output/states.py",
         'if run != data.get("run"):',
         "if False:",
         f"{FILES} {KILLS} tests/output/test_foreign_files.py",

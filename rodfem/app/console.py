@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _versions() -> str:
     """A line for the program, and one for each library that computes."""
-    from rodfem.output.origin import versions  # imports dolfinx, which takes a second
+    from rodfem.output.files import versions  # imports dolfinx, which takes a second
 
     found = {"rodfem": rodfem.__version__, **versions()}
     return "\n".join(f"{name:<8}{version}" for name, version in found.items())

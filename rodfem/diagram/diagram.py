@@ -21,9 +21,8 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.modes.typical import typical_modes
-from rodfem.output.files import as_data, save_run
+from rodfem.output.files import as_data, origin, save_run
 from rodfem.output.folder import PICTURES, locked, picture_at
-from rodfem.output.origin import origin
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene

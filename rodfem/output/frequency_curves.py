@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.modes.modes import RIGID
-from rodfem.output.intervals import Interval, intervals_of
-from rodfem.output.pieces import STABLE
+from rodfem.output.pieces import STABLE, Interval, intervals_of
 from rodfem.output.style import PALETTE
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
-from rodfem.file_format import DIAGRAM
-from rodfem.output.contents import read_diagram
+from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output.pieces import COUNTED, STABLE, Piece, endings
 from rodfem.output.program import status_of, terse
 from rodfem.output.smooth import drawn
@@ -282,7 +281,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
 
     def draw() -> Path:
-        diagram = read_diagram(given.diagram, ("title", "parameter_label", "ordinate", "branches"))
+        diagram = read_json(given.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
         return draw_diagram(diagram, given.output or given.diagram.with_suffix(".png"))
 
     return status_of(draw, given.diagram)

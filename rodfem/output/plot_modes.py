@@ -25,7 +25,8 @@ from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Glyph, Solid, between, curve_of, striped
+from rodfem.output.solids import Glyph, Solid, between, striped
+from rodfem.output.states import curve_of
 from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
 from rodfem.output.view import POINT, axes_of, axis_of
 from rodfem.problem.quaternions import directors

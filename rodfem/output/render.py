@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Glyph, Solid, curve_of, striped
+from rodfem.output.solids import Glyph, Solid, striped
+from rodfem.output.states import curve_of
 from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE
 from rodfem.output.view import axes_of, thickness
 from rodfem.problem.quaternions import directors

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
@@ -157,17 +156,6 @@ def across(direction: Floats) -> Floats:
     """Some unit vector (3,) across a direction."""
     out = np.cross(direction, np.eye(3)[int(np.argmin(abs(direction)))])
     return np.asarray(out / np.linalg.norm(out))
-
-
-def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Centreline (n, 3) and unit quaternions (n, 4) at arclengths ``at`` (n,) of a state, by splines through its nodes.
-
-    The nodes are at ``s`` (m,), with positions ``r`` (m, 3) and quaternions ``q`` (m, 4) of any length and sign.
-    """
-    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
-    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
-    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
-    return CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 
 def rod(centres: Floats, frames: Floats, profile: Floats, color: str) -> Solid:

@@ -12,8 +12,18 @@ from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
-from rodfem.output.intervals import Interval, changes_at, coexisting, intervals_in, intervals_of, without_stable
-from rodfem.output.pieces import MEETS, PLANAR, STABLE, UNDECIDED
+from rodfem.output.pieces import (
+    MEETS,
+    PLANAR,
+    STABLE,
+    UNDECIDED,
+    Interval,
+    changes_at,
+    coexisting,
+    intervals_in,
+    intervals_of,
+    without_stable,
+)
 from rodfem.output.words import is_sweep, many
 
 MOST_INTERVALS, MOST_NAMES = 6, 6

@@ -1,6 +1,6 @@
 """The table of a diagram: each column of a branch, and each entry of a special point, declared once, in ``table.md``.
 
-A row there has the name, type and unit of an entry, what it means, and when it is there.  Files are written and checked
+A row there has the name, type and unit of an entry, what it means, and when it is there.  Files are written
 by it, ``docs/files.md`` has it, and so have the glossary, the page, and the tables of other programs.  A new column is
 one row there, and the line that computes it in :class:`~rodfem.continuation.branch.Point`.
 """
@@ -11,17 +11,15 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
-from math import inf, isfinite, nan
+from math import inf, nan
 from typing import Any
 
 import numpy as np
 
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
-from rodfem.continuation.kinds import KINDS
 from rodfem.stability.soft_mode import SoftMode
 
 Data = Mapping[str, Any]
-Test = Callable[[Any], bool]
 Source = Callable[[Any], Any]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+?) \| ([^|]*?) ?\| (.+?) \| ([^|]*?) ?\|$", re.MULTILINE)
 PAGE = (files("rodfem.output") / "table.md").read_text(encoding="utf-8")
@@ -154,51 +152,3 @@ def _law(law: Data) -> NormalForm:
 def _number(value: Any) -> Any:
     """Value of a file, in which null stands for what is not finite."""
     return nan if value is None else value
-
-
-def _is_count(x: Any) -> bool:
-    return isinstance(x, int) and not isinstance(x, bool) and 0 <= x < 2**31
-
-
-TYPES: dict[str, tuple[Test, str]] = {
-    "number": (
-        lambda x: isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) < 1e300 and isfinite(x),
-        "a finite number",
-    ),
-    "integer": (_is_count, "a whole number"),
-    "text": (lambda x: isinstance(x, str), "a text"),
-    "boolean": (lambda x: isinstance(x, bool), "true or false"),
-    "object": (lambda x: isinstance(x, dict), "an object"),
-    "place": (
-        lambda x: isinstance(x, list) and len(x) == 2 and isinstance(x[0], str) and _is_count(x[1]),
-        "a name and a number",
-    ),
-    "kind": (lambda x: isinstance(x, str) and x in KINDS, f"one of {', '.join(KINDS)}"),
-    "name": (
-        lambda x: isinstance(x, str) and x not in ("", ".", "..") and "/" not in x and "\0" not in x,
-        "a name without slashes",
-    ),
-}
-"""Types, each with its test and in words."""
-
-
-def test_of(kind: str) -> tuple[Test, str]:
-    """Test of a type of :class:`Entry`, of one row where it has a dimension ``P``, and the type in words."""
-    kind = kind.replace("text, integer (2)", "place")
-    base, size, null = re.fullmatch(r"(\w+)(?: \(([^)]*)\))?( or null)?", kind).groups()  # type: ignore[union-attr]
-    test, words = TYPES[base]
-    sizes = [x for x in (size or "").split(", ") if x not in ("", "P")]
-    if null and not sizes:
-        return _or_none(test), f"{words} or null"
-    test = _or_none(test) if null else test
-    for number in reversed(sizes):
-        test, words = _all(test, None if number == "k" else int(number)), f"a list of {words.split(' ')[-1]}s"
-    return test, words
-
-
-def _or_none(test: Test) -> Test:
-    return lambda x: x is None or test(x)
-
-
-def _all(test: Test, size: int | None) -> Test:
-    return lambda x: isinstance(x, list) and (size is None or len(x) == size) and all(map(test, x))

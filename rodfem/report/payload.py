@@ -10,9 +10,9 @@ from typing import Any
 import h5py
 
 from rodfem.errors import InputError
-from rodfem.file_format import STATES, UNREADABLE
-from rodfem.output.contents import check_run, read_diagram
+from rodfem.file_format import DIAGRAM, STATES, UNREADABLE, read_json
 from rodfem.output.digits import with_unit
+from rodfem.output.states import check_run
 from rodfem.output.style import mesh_in_words, ordinate_in_words
 from rodfem.report.branches import DERIVED, ordinates_of
 from rodfem.report.labels import html_of, plain_of
@@ -36,7 +36,7 @@ class Loaded(dict[str, Any]):
 
 def payload_of(folder: Path) -> dict[str, Any]:
     """Everything that the page of a folder shows; raises :class:`InputError` where its files are unfit."""
-    data = read_diagram(folder / "diagram.json", NEEDED)
+    data = read_json(folder / "diagram.json", DIAGRAM, NEEDED)
     if not data["branches"]:
         raise InputError(f"{folder / 'diagram.json'} has no branches: run the scene again.")
     check_run(data, folder / "states.h5")

@@ -15,8 +15,8 @@ from rodfem.modes.modes import rows_with_modes
 from rodfem.modes.recorded import read as recorded
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_diagram import is_traced
-from rodfem.output.profiles import POINTS, PROFILES, profiles_of
 from rodfem.output.solids import body_of, profile_of
+from rodfem.output.states import POINTS, PROFILES, profiles_of
 from rodfem.output.style import PALETTE
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.branches import branch_data
@@ -68,13 +68,11 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
     """Profiles of a branch, whose group of ``states.h5`` is given; ``states`` is the number of those of all branches.
 
-    Where the file has them: ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors
+    They are ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors
     at M points, nan beyond the last one of a coarser mesh; ``element`` (P,), how many of them an element has, which
     determine its polynomials, and 0 where some are left out; ``jumps`` (P,) of each of the four between elements.
     """
-    found = [one for one in (profiles_of(group, row) for row in range(len(group["load"]))) if one is not None]
-    if not found:
-        return {"profile": None, "element": None, "jumps": None}
+    found = [profiles_of(group, row) for row in range(len(group["load"]))]
     most, loaded = group[POINTS][0].size, _loaded(group)
     kept = np.unique(np.linspace(0, most - 1, min(most, max(2, BUDGET // states))).round().astype(int))
     out = np.full((len(found), most, 1 + 3 * len(PROFILES)), np.nan)

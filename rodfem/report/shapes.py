@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rodfem.errors import InputError
 from rodfem.output.glyphs import Look
 from rodfem.output.pieces import typical_state
-from rodfem.output.solids import curve_of
+from rodfem.output.states import curve_of
 from rodfem.output.view import axes_of, thickness
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting

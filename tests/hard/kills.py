@@ -35,9 +35,9 @@ sys.path.append(str(Path(__file__).parents[1]))
 from hard.folders import HOME, MPIRUN, alike, alive, branches_in, children_of, contents, surroundings
 
 from rodfem.errors import InputError
-from rodfem.output.contents import check_run
 from rodfem.output.files import load_json
 from rodfem.output.folder import LOCK
+from rodfem.output.states import check_run
 from rodfem.whole_files import DRAFTS
 
 KINDS = {"process": "a single process", "writing": "a single process, while files are written",

@@ -23,9 +23,9 @@ import rodfem
 from rodfem.app.run import Terminal, run
 from rodfem.diagram.diagram import Diagram
 from rodfem.errors import InputError
-from rodfem.output.contents import check_run
 from rodfem.output.files import load_json
 from rodfem.output.folder import LOCK, locked
+from rodfem.output.states import check_run
 from rodfem.whole_files import DRAFTS
 
 COMM = MPI.COMM_WORLD

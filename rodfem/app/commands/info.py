@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rodfem.app.cli import Parser, run_folder
-from rodfem.output.contents import read_diagram
+from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output.summary import in_sentences
 from rodfem.output.words import table_of
 
@@ -19,7 +19,7 @@ def main(words: Sequence[str]) -> None:
     parser = Parser(prog="rodfem info", description=__doc__)
     parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
     folder = parser.parse_args(words).folder
-    print("\n".join(lines(read_diagram(folder / "diagram.json", NEEDED))))
+    print("\n".join(lines(read_json(folder / "diagram.json", DIAGRAM, NEEDED))))
 
 
 def lines(data: Mapping[str, Any]) -> Iterator[str]:

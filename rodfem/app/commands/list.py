@@ -11,7 +11,7 @@ from typing import Any
 from rodfem.app.cli import Parser
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
-from rodfem.output.contents import read_diagram
+from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output.digits import number
 from rodfem.output.summary import called
 
@@ -40,7 +40,7 @@ def lines(folder: Path) -> Iterator[str]:
     for file in files:
         name = str(file.parent)
         try:
-            data = read_diagram(file, NEEDED)
+            data = read_json(file, DIAGRAM, NEEDED)
             yield _row(name, data["scene"], _date(data, file), *_sizes(data), first_loss(data))
         except InputError as trouble:
             yield f"{name:<{WIDTHS[0]}} {trouble}"
