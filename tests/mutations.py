@@ -758,7 +758,7 @@ FAULTS = {
         "rodfem/problem/scene.py", '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "tests/problem/test_mass.py"
     ),
     "pictures-draw-chords": Fault(
-        "rodfem/output/smooth.py",
+        "rodfem/output/plot_diagram.py",
         "SEEN = 2e-4",
         "SEEN = 1e3",
         "tests/output/test_smooth.py",
@@ -1375,7 +1375,7 @@ FAULTS = {
         LOCI,
     ),
     "stable-side-beyond-a-crossing": Fault(
-        "rodfem/output/stable_region.py", "if crossed or not side", "if not side", LOCI
+        "rodfem/output/plot_locus.py", "if crossed or not side", "if not side", LOCI
     ),
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/criteria.py", "curve.part > IMPERFECT", "curve.part > 1e9", LOCI

@@ -16,13 +16,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.spatial import KDTree
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
 from rodfem.file_format import DIAGRAM, read_json
-from rodfem.output.pieces import COUNTED, STABLE, Piece, endings
+from rodfem.output.pieces import COUNTED, STABLE, Piece, endings, pieces_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.smooth import drawn
 from rodfem.output.style import (
     END,
     FONT,
@@ -68,6 +68,8 @@ NEAR = 0.01
 """Distance from an image, relative to the ranges of load and ordinate, up to which a branch is that image."""
 GAP = 11.0
 """Pixels between an index and lines."""
+SEEN = 2e-4
+"""Distance from the chord above which a step is no straight line, in parts of the branch's range."""
 
 
 class Line(NamedTuple):
@@ -269,6 +271,41 @@ def _accuracy(special: Branches) -> list[str]:
     known = [abs(bar) for bar in bars if bar is not None and math.isfinite(bar)]
     share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
     return [f"error of the loads of special points at most {at_most(max(known))}{share}"] if known else []
+
+
+# --- branches between their rows
+
+
+def between(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
+    """Loads and values of a column between rows, (7, 2), by the row before, of the steps that are no straight lines.
+
+    A long step, as the first one from a branch point, would show as a chord.  The load is the cubic Hermite spline of
+    its values and slopes ``dP/ds``: at a pitchfork ``P_0 + c s^2``, as it is there.  The slopes of other columns are
+    Akima's, which keep corners.  ``branch`` is one of ``diagram.json``, ``name`` that of the column.
+    """
+    columns = branch["columns"]
+    s, slopes, loads, values = (np.array(columns[x], dtype=float) for x in ("arclength", "slope", "load", name))
+    if len(s) < 3 or not np.isfinite([s, slopes, loads, values]).all() or (np.diff(s) <= 0).any():
+        return {}
+    shares = np.linspace(0.0, 1.0, 9)[1:-1]
+    places = s[:-1, None] + shares * np.diff(s)[:, None]
+    curves = CubicHermiteSpline(s, loads, slopes)(places), Akima1DInterpolator(s, values)(places)
+    seen, smooth = np.zeros(len(places), dtype=bool), np.ones(len(places), dtype=bool)
+    for rows, curve in zip((loads, values), curves, strict=True):
+        off = abs(curve - rows[:-1, None] - shares * np.diff(rows)[:, None]).max(axis=1)
+        seen |= off > SEEN * np.ptp(rows)
+        smooth &= off <= np.maximum(0.5 * abs(np.diff(rows)), 150 * SEEN * np.ptp(rows))
+    return {int(row): np.column_stack([curve[row] for curve in curves]) for row in np.flatnonzero(seen & smooth)}
+
+
+def drawn(branch: Mapping[str, Any]) -> list[tuple[Piece, Floats]]:
+    """Pieces of a branch, each with its curve (k, 2) of loads and ordinates, with points between rows."""
+    rows = np.column_stack([np.asarray(branch["columns"][key], dtype=float) for key in ("load", "ordinate")])
+    more, found = between(branch, "ordinate"), []
+    for piece in pieces_of(branch):
+        parts = [part for i in range(piece.first, piece.last) for part in (rows[i : i + 1], more.get(i, rows[:0]))]
+        found.append((piece, np.vstack([*parts, rows[piece.last]])))
+    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

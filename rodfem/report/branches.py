@@ -12,10 +12,9 @@ from scipy.interpolate import CubicSpline
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.modes.modes import RIGID
-from rodfem.output.frequency_curves import curves, ranges_of, top
 from rodfem.output.pieces import endings, pieces_of
-from rodfem.output.plot_frequencies import SPECIAL
-from rodfem.output.smooth import between
+from rodfem.output.plot_diagram import between
+from rodfem.output.plot_frequencies import SPECIAL, curves, ranges_of, top
 from rodfem.output.words import readings_of, words_of
 from rodfem.report.packing import plain
 from rodfem.report.shapes import Shapes

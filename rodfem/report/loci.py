@@ -10,8 +10,7 @@ from typing import Any
 from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number, with_unit
-from rodfem.output.plot_locus import LINES
-from rodfem.output.stable_region import in_words, plane_of, stable_region
+from rodfem.output.plot_locus import LINES, in_words, plane_of, stable_region
 from rodfem.report.labels import html_of
 from rodfem.tolerances import same_special
 

@@ -10,10 +10,9 @@ import pytest
 from rodfem.app import console
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
-from rodfem.output.frequency_curves import COLORS
 from rodfem.output.glossary import ENTRIES, NAMES, explanation
 from rodfem.output.plot_diagram import MARKERS
-from rodfem.output.plot_frequencies import PARTS
+from rodfem.output.plot_frequencies import COLORS, PARTS
 from rodfem.output.plot_locus import POINTS
 from rodfem.output.style import LINES as STYLES
 from rodfem.output.table import COLUMNS, PAGE, SPECIAL

@@ -30,7 +30,9 @@ pytestmark = pytest.mark.alone
 
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
-    columns = {"load": [float(i) for i in range(len(negative))], "ordinate": ordinate, "negative": negative}
+    rows = range(len(negative))
+    columns = {"load": list(map(float, rows)), "ordinate": ordinate, "negative": negative, "arclength": rows}
+    columns["slope"] = [None] * len(rows)
     return {"name": name, "parent": None, "columns": columns | more.pop("columns", {}), "special": [], **more}
 
 

@@ -29,7 +29,7 @@ from scipy.ndimage import uniform_filter
 
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
-from rodfem.output.stable_region import COUNT
+from rodfem.output.plot_locus import COUNT
 from rodfem.output.view import POINT
 from rodfem.report.packing import packed
 from rodfem.report.page import page_of

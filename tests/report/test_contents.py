@@ -16,8 +16,8 @@ from rodfem.app.commands.list import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
 from rodfem.output.digits import eigenvalue_in_words, number
-from rodfem.output.frequency_curves import curves
 from rodfem.output.pieces import endings
+from rodfem.output.plot_frequencies import curves
 from rodfem.output.solids import between, body_of
 from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise
