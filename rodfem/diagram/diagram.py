@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rodfem.codim2.locus import Locus
-    from rodfem.output.snapshot import Snapshot
+    from rodfem.output.render import Snapshot
 
 
 class Diagram:
@@ -338,7 +338,7 @@ class Diagram:
         A notebook shows what is returned.  Raises :class:`ImportError` where PyVista is missing, and
         :class:`~rodfem.errors.InputError` for a path that is no PNG's.
         """
-        from rodfem.output.snapshot import snapshot
+        from rodfem.output.render import snapshot
 
         self._can_write(path, (".png",))
         shown = point.point if isinstance(point, SpecialPoint) else point

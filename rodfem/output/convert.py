@@ -20,6 +20,7 @@ from rodfem.whole_files import with_added, write_whole
 Floats = NDArray[np.float64]
 KINDS = ("Vertices", "Lines", "Strips", "Polygons")
 """Kinds of cells of PolyData, in the order of their offsets."""
+CELLS = ("NumberOfCells", "NumberOfConnectivityIds", "Offsets", "Connectivity")
 
 
 def to_vtkhdf(folder: Path, target: Path) -> list[Path]:
@@ -62,48 +63,35 @@ def write_curves(
 
     A step is one row of a branch, a polyline with its fields; its time is the number of the row.  The format is VTK's
     own: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html, version 2.0, ``PolyData`` with
-    steps.
-
-    ``path`` is the file, by custom ``*.vtkhdf``; ``curves`` are the points (m, 3) of each step, where m may differ from
-    step to step, ``fields`` by name values (m,) or (m, k) at the points of each step, and ``numbers`` by name one
-    number for each step, (steps,).  Raises :class:`~rodfem.errors.InputError` where the file cannot be written.
+    steps.  ``curves`` are the points (m, 3) of each step, where m may differ from step to step, ``fields`` by name
+    values (m,) or (m, k) at the points of each step, and ``numbers`` by name one number for each step, (steps,).
     """
-    sizes = np.array([len(curve) for curve in curves])
-    steps = len(sizes)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    sizes, steps = np.array([len(curve) for curve in curves]), len(curves)
+    starts, each = np.cumsum(sizes) - sizes, np.arange(steps)
 
-    def add(file: object) -> None:
-        root = file.create_group("VTKHDF")  # type: ignore[attr-defined]
+    def add(file: Any) -> None:
+        root = file.create_group("VTKHDF")
         root.attrs["Version"] = (2, 0)
         root.attrs.create("Type", np.bytes_("PolyData"))
         root["NumberOfPoints"], root["Points"] = sizes, np.concatenate(curves)
+        none = np.zeros(steps, int)
+        offsets = np.column_stack([none, sizes]).ravel()  # each step's are one more than it has cells
+        lines = np.ones(steps, int), sizes, offsets, np.concatenate([np.arange(m) for m in sizes])
         for kind in KINDS:
-            cells = root.create_group(kind)
-            lines = kind == "Lines"
-            cells["NumberOfCells"] = np.full(steps, int(lines))
-            cells["NumberOfConnectivityIds"] = sizes if lines else np.zeros(steps, int)
-            # each step has an array of offsets of its own, one longer than it has cells
-            cells["Offsets"] = np.array([x for m in sizes for x in (0, m)]) if lines else np.zeros(steps, int)
-            cells["Connectivity"] = np.concatenate([np.arange(m) for m in sizes]) if lines else np.zeros(0, int)
-        at_points, per_step = root.create_group("PointData"), root.create_group("FieldData")
+            parts = lines if kind == "Lines" else (none, none, none, none[:0])
+            for name, part in zip(CELLS, parts, strict=True):
+                root[f"{kind}/{name}"] = part
         time = root.create_group("Steps")
         time.attrs["NSteps"] = steps
         time["Values"] = np.arange(steps, dtype=float)
-        time["PartOffsets"], time["NumberOfParts"] = np.arange(steps), np.ones(steps, int)
-        time["PointOffsets"] = starts
-        before = np.zeros((steps, len(KINDS)), int)
-        before[:, 1] = np.arange(steps)
-        time["CellOffsets"] = before
-        places = np.zeros((steps, len(KINDS)), int)
-        places[:, 1] = starts
-        time["ConnectivityIdOffsets"] = places
-        offsets = time.create_group("PointDataOffsets")
+        time["PartOffsets"], time["NumberOfParts"], time["PointOffsets"] = each, np.ones(steps, int), starts
+        here = np.array([kind == "Lines" for kind in KINDS], dtype=int)
+        time["CellOffsets"], time["ConnectivityIdOffsets"] = np.outer(each, here), np.outer(starts, here)
         for name, values in fields.items():
-            at_points[name], offsets[name] = np.concatenate(values), starts
-        offsets, shapes = time.create_group("FieldDataOffsets"), time.create_group("FieldDataSizes")
+            root[f"PointData/{name}"], time[f"PointDataOffsets/{name}"] = np.concatenate(values), starts
         for name, column in numbers.items():
-            per_step[name], offsets[name] = column, np.arange(steps)
-            shapes[name] = np.ones((steps, 2), int)
+            root[f"FieldData/{name}"], time[f"FieldDataOffsets/{name}"] = column, each
+            time[f"FieldDataSizes/{name}"] = np.ones((steps, 2), int)
 
     write_whole({path: with_added(path, add, first=True)})
 

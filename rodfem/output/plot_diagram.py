@@ -22,7 +22,6 @@ from scipy.spatial import KDTree
 from rodfem.continuation.kinds import IMPERFECT, KINDS
 from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output.pieces import COUNTED, STABLE, Piece, endings, pieces_of
-from rodfem.output.program import status_of, terse
 from rodfem.output.style import (
     END,
     FONT,
@@ -40,6 +39,7 @@ from rodfem.output.style import (
     ordinate_in_words,
     save,
     sheet,
+    status_of,
     tex,
 )
 from rodfem.output.view import POINT
@@ -310,8 +310,8 @@ def drawn(branch: Mapping[str, Any]) -> list[tuple[Piece, Floats]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the diagram named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = terse(
-        argparse.ArgumentParser(prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram.")
+    parser = argparse.ArgumentParser(
+        prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram."
     )
     parser.add_argument("diagram", type=Path, help="diagram.json of a scene")
     parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")

@@ -24,10 +24,9 @@ from scipy.spatial.transform import Rotation
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import Look, glyphs_of
-from rodfem.output.program import status_of, terse
 from rodfem.output.solids import Glyph, Solid, between, striped
 from rodfem.output.states import curve_of
-from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
+from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS, status_of
 from rodfem.output.view import POINT, axes_of, axis_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
@@ -224,8 +223,8 @@ class _Panel:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the modes named on the command line; returns 0, or 2 after one sentence on standard error."""
-    parser = terse(
-        argparse.ArgumentParser(prog="python -m rodfem.output.plot_modes", description="Draw the modes of a state.")
+    parser = argparse.ArgumentParser(
+        prog="python -m rodfem.output.plot_modes", description="Draw the modes of a state."
     )
     parser.add_argument("modes", type=Path, help="modes.h5 of a run with --modes")
     parser.add_argument("--branch", required=True, help="name of the branch")
