@@ -51,11 +51,6 @@ finds and classifies the points where it is lost, follows what branches off, and
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
 that breaks one has a zero eigenvalue for it, which is counted as zero.
 
-Data flows one way: ``problem.scene`` -> ``fem.system`` (the bordered saddle point) -> ``fem.newton`` ->
-``stability.inertia`` -> ``continuation.follow``, ``continuation.special_points`` -> ``diagram.explorer`` ->
-``output.files``, and imports go the other way.  Pictures are drawn from saved files alone.  The mathematics is in
-``forms``.
-
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
 Type checkers read ``__init__.pyi``.
 """
@@ -65,8 +60,6 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from typing import Any
-
-from rodfem.lazy import submodule
 
 __version__ = "0.1.0"
 
@@ -116,19 +109,17 @@ __doc__ = f"{__doc__ or ''}\nPublic names, by module (``help(rodfem.Scene)`` des
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module, or a module of the package, at first use.
+    """Load a public name from its module at first use.
 
-    ``from rodfem import *`` asks for ``__all__``, and so does ``help(rodfem)``, which would print every class in full,
-    1400 lines: it gets none.
+    ``help(rodfem)`` asks for ``__all__`` as ``from rodfem import *`` does, but gets none: it would print every class.
     """
     if name == "__all__" and sys._getframe(1).f_globals.get("__name__") != "pydoc":
         return _NAMES
-    if name in _HOMES:
-        return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
-    module = submodule("rodfem", name)
-    if module is None:
+    if name not in _HOMES:
         raise AttributeError(f"module 'rodfem' has no attribute {name!r}; it has {', '.join(_NAMES)}")
-    return module
+    if name == "section":
+        return import_module("rodfem.problem.section")
+    return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:

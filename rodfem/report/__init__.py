@@ -3,7 +3,3 @@
 ``page`` puts it together, ``payload`` collects its data, and ``static`` holds its template, style and ES modules.
 ``static/vendor`` has plotly.js and three.js with their licences.
 """
-
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.report")

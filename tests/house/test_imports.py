@@ -32,8 +32,7 @@ MATRICES = {
 COMMAND_LINE = ("rodfem.app.cli", "rodfem.app.options", "rodfem.app.constants", "rodfem.app.main")
 COMMAND_LINE += ("rodfem.app.console", "rodfem.app.commands.", "rodfem.app.script")
 """Beginnings of the names of modules that know options."""
-BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances"}
-BELOW_MATRICES |= {"rodfem.beside", "rodfem.code_cache"}
+BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances", "rodfem.code_cache"}
 """Other modules that they may import."""
 FORMS = "rodfem.forms"
 """The folder ``forms`` beside the package, as which it is installed."""
@@ -192,5 +191,5 @@ def test_arrows_are_what_the_interpreter_follows() -> None:
     while new:
         reached |= new
         new = set().union(*(arrows()[module] for module in new)) - reached
-    packages = {"rodfem", "rodfem.lazy", *(name for name in modules() if (HOME / name.replace(".", "/")).is_dir())}
+    packages = {"rodfem", *(name for name in modules() if (HOME / name.replace(".", "/")).is_dir())}
     assert loaded - packages == reached - packages
