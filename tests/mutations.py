@@ -1076,7 +1076,7 @@ FAULTS = {
         f"{FILES} tests/output/test_foreign_files.py",
     ),
     "folder-without-a-lock": Fault(
-        "rodfem/output/folder.py",
+        "rodfem/whole_files.py",
         "if comm.bcast(place in HELD):",
         "if comm.bcast(True):",
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",

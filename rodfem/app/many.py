@@ -19,10 +19,10 @@ from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
-from rodfem.output.folder import locked
 from rodfem.problem.arguments import checked, each, function, path
 from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, end_together, on_first
+from rodfem.whole_files import locked
 
 Work = Callable[[Scene], dict[str, Any]]
 

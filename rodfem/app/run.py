@@ -22,11 +22,11 @@ from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN, traced
 from rodfem.fem.fields import Discretization
 from rodfem.output.files import save_json
-from rodfem.output.folder import locked
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
+from rodfem.whole_files import locked
 
 atexit.register(gc.freeze)  # what there is at the end goes with the process: a search for garbage in it takes 0.15 s
 

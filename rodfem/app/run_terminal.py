@@ -18,8 +18,8 @@ from rodfem.diagram.plan import Plan
 from rodfem.fem.system import System
 from rodfem.modes.typical import typical_modes
 from rodfem.output.files import save_run
-from rodfem.output.folder import remove_earlier
 from rodfem.ranks import on_first
+from rodfem.whole_files import remove_earlier
 
 
 def _other_run(folder: Path) -> str:

@@ -22,14 +22,13 @@ from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.modes.typical import typical_modes
 from rodfem.output.files import as_data, origin, save_run
-from rodfem.output.folder import PICTURES, locked, picture_at
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
-from rodfem.whole_files import draft_of
+from rodfem.whole_files import PICTURES, draft_of, locked, picture_at
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

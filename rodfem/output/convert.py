@@ -63,8 +63,8 @@ def write_curves(
 
     A step is one row of a branch, a polyline with its fields; its time is the number of the row.  The format is VTK's
     own: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html, version 2.0, ``PolyData`` with
-    steps.  ``path`` is the file, ``curves`` are the points (m, 3) of each step, where m may differ from step to step, ``fields`` by name
-    values (m,) or (m, k) at the points of each step, and ``numbers`` by name one number for each step, (steps,).
+    steps.  ``path`` is the file, ``curves`` are the points (m, 3) of each step, where m may differ from step to step,
+    ``fields`` by name values (m,) or (m, k) at the points of each step, and ``numbers`` by name one number a step.
     """
     sizes, steps = np.array([len(curve) for curve in curves]), len(curves)
     starts, each = np.cumsum(sizes) - sizes, np.arange(steps)

@@ -28,7 +28,7 @@ from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
-from rodfem.whole_files import draft_of, write_whole
+from rodfem.whole_files import draft_of, picture_at, write_whole
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Branch, Point
@@ -240,8 +240,6 @@ class Snapshot:
     def save(self, path: Path | str) -> Path:
         """Write it; its folder is made.  Raises :class:`InputError` where it cannot be written."""
         path = Path(path)
-        from rodfem.output.folder import picture_at
-
         picture_at(path, (".png",))
         write_whole({path: self.png})
         return path

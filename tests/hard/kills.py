@@ -36,9 +36,8 @@ from hard.folders import HOME, MPIRUN, alike, alive, branches_in, children_of, c
 
 from rodfem.errors import InputError
 from rodfem.output.files import load_json
-from rodfem.output.folder import LOCK
 from rodfem.output.states import check_run
-from rodfem.whole_files import DRAFTS
+from rodfem.whole_files import DRAFTS, LOCK
 
 KINDS = {"process": "a single process", "writing": "a single process, while files are written",
          "rank": "one of two ranks", "mpirun": "mpirun itself"}  # fmt: skip

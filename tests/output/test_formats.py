@@ -444,10 +444,3 @@ def test_old_modes_and_diagrams_that_lack_something(copied: Path, capfd: pytest.
     assert (
         "has no entries by name, so it is no rodfem diagram: give the diagram.json of a run" in capfd.readouterr().err
     )
-
-
-@pytest.mark.few(3)
-@pytest.mark.parametrize("version", [0, "1", None, 1.5])
-def test_versions_that_are_none(version: Any) -> None:
-    with pytest.raises(InputError, match="where a whole number from 1 on was expected"):
-        DIAGRAM.check({"format": {"name": DIAGRAM.name, "version": version}}, "file")

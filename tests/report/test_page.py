@@ -20,9 +20,9 @@ from rodfem.app.commands import view
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError
-from rodfem.output.folder import remove_earlier
 from rodfem.report.page import STATIC, page_of, write_report
 from rodfem.report.payload import payload_of
+from rodfem.whole_files import remove_earlier
 
 HOSTILE = "</script><img src=x onerror=alert(1)>{{payload}}"
 pytestmark = pytest.mark.alone
