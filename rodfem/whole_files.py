@@ -1,8 +1,8 @@
 """Files that are written whole: a kill at any moment, or a full disk, leaves the old file or the new one, readable.
 
 A file is written as a draft next to its place, and then takes that place in one step.  Numbers are flushed to the disk
-before, so that a power cut does not lose them; pictures can be drawn again.  One process writes into a folder at a time,
-and removes the drafts that killed ones left.
+before, so that a power cut does not lose them; pictures can be drawn again.  One process writes into a folder at a
+time, and removes the drafts that killed ones left.
 
 HDF5 files are made in memory: the library does not recover from a full disk, and a file to which it appends is
 unreadable where it is killed.  An addition therefore costs a copy of the file, some 4 ms for each MB.

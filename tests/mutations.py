@@ -255,8 +255,8 @@ FAULTS = {
     ),
     "no-new-folders": Fault(
         "rodfem/whole_files.py",
-        "        path.parent.mkdir(parents=True, exist_ok=True)\n",
-        "",
+        "        path.parent.mkdir(parents=True, exist_ok=True)\n        try:\n",
+        "        try:\n",
         "tests/codim2/test_locus.py",
     ),
     "mirror-images-by-what-richer-meshes-decide": Fault(
@@ -518,9 +518,9 @@ FAULTS = {
         "tests/codim2/test_locus.py",
     ),
     "loci-of-small-loads-start-everywhere": Fault(
-        "rodfem/report/loci.py",
-        'natural.get("load", 1.0), natural.get(',
-        "1.0, dict().get(",
+        "rodfem/report/branches.py",
+        '(natural["load"], natural["ordinate"])',
+        "(1.0, 1.0)",
         "tests/codim2/test_locus.py",
     ),
     "moments-without-a-natural-size": Fault(
@@ -1357,7 +1357,7 @@ FAULTS = {
         IN_WORDS,
     ),
     "bars-of-loci-stay-off-the-page": Fault(
-        "rodfem/report/loci.py",
+        "rodfem/report/branches.py",
         "found.append([] if None in pair else",
         "found.append([] if True else",
         IN_WORDS,

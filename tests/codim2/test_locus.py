@@ -40,7 +40,7 @@ from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_locus import _about, draw_locus, stable_region
 from rodfem.problem.ends import clamped, free, pinned
 from rodfem.problem.scene import Ordinate, Parameter, Scene
-from rodfem.report.loci import loci_of
+from rodfem.report.branches import loci_of
 
 pytestmark = pytest.mark.alone
 

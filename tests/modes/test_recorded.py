@@ -24,7 +24,7 @@ from rodfem.modes.recorded import Typical, read
 from rodfem.modes.typical import EVENLY, FEWEST, typical_rows
 from rodfem.problem.scene import Inertia, Scene
 from rodfem.ranks import in_words
-from rodfem.report.payload import payload_of
+from rodfem.report.page import payload_of
 
 pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 6)

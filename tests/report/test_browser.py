@@ -31,9 +31,8 @@ from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
 from rodfem.output.plot_locus import COUNT
 from rodfem.output.view import POINT
-from rodfem.report.packing import packed
-from rodfem.report.page import page_of
-from rodfem.report.payload import payload_of
+from rodfem.report.markup import packed
+from rodfem.report.page import page_of, payload_of
 
 REQUIRED = os.environ.get("RODFEM_BROWSER") == "required"
 if not REQUIRED:

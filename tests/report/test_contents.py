@@ -21,9 +21,8 @@ from rodfem.output.plot_frequencies import curves
 from rodfem.output.solids import between, body_of
 from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise
-from rodfem.report.labels import html_of, plain_of
-from rodfem.report.packing import packed, plain, script_json
-from rodfem.report.shapes import shapes_of, stations
+from rodfem.report.markup import html_of, packed, plain, plain_of, script_json
+from rodfem.report.rods import shapes_of, stations
 from rodfem.writhe import writhe
 
 pytestmark = pytest.mark.alone

@@ -20,8 +20,7 @@ from rodfem.app.commands import view
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError
-from rodfem.report.page import STATIC, page_of, write_report
-from rodfem.report.payload import payload_of
+from rodfem.report.page import STATIC, page_of, payload_of, write_report
 from rodfem.whole_files import remove_earlier
 
 HOSTILE = "</script><img src=x onerror=alert(1)>{{payload}}"
