@@ -60,9 +60,8 @@ def as_data(
 ) -> dict[str, Any]:
     """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
 
-    ``systems`` are those of the meshes that the points name by their number; ``discretization`` is the one with most
-    unknowns, and ``meshes`` has all.  ``branches`` are those of the diagram, ``span`` the range of the load,
-    ``accuracy`` that of the plan; ``clock`` has the times.
+    ``systems`` are those of the meshes that the points of ``branches`` name by their number; ``discretization`` is the
+    one with most unknowns.  ``span`` is the range of the load, ``accuracy`` that of the plan; ``clock`` has the times.
     """
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
@@ -122,10 +121,7 @@ def origin() -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the libraries that compute, each by its name in lower case.
-
-    That of MUMPS is absent where PETSc has it in another form than a shared library.
-    """
+    """Versions of Python and of the libraries that compute, each by its name in lower case."""
     from slepc4py import SLEPc  # after what compat loads first
 
     found = {
@@ -140,11 +136,7 @@ def versions() -> dict[str, str]:
 
 
 def _mumps() -> str:
-    """Version of the MUMPS that PETSc is linked with, or nothing where that cannot be asked.
-
-    It is asked of MUMPS's own Fortran subroutine ``MUMPS_SET_VERSION(VERSION_STR)``, with the length of the text as its
-    hidden last argument.
-    """
+    """Version of the MUMPS that PETSc is linked with, by its ``MUMPS_SET_VERSION``; nothing where it has none."""
     try:
         ask = ctypes.CDLL(compat.PETSc.__file__).mumps_set_version_
     except (AttributeError, OSError):
@@ -181,13 +173,10 @@ def save_run(
 ) -> None:
     """Add ``branches`` to ``states.h5`` of a folder, and replace ``diagram.json``; collective, written on rank 0.
 
-    Both are written before either takes its place: a disk that is full changes none.  ``states.h5`` takes it first, so
-    that it has all branches of a ``diagram.json`` of the same run.  Raises :class:`InputError` on every rank where the
-    folder cannot be written.
-
-    ``data`` are the contents of ``diagram.json``, ``branches`` those that ``states.h5`` has not yet, ``solvers`` those
-    of the meshes that points name, and ``modes`` those of the typical states of each of the branches.  ``first`` says
-    that ``states.h5`` is a new one.
+    ``data`` are the contents of ``diagram.json``, ``solvers`` those of the meshes that points name, ``modes`` those of
+    the typical states of each of the branches; ``first`` says that ``states.h5`` is a new one.  Both files are written
+    before either takes its place, ``states.h5`` first, so that it has all branches of a ``diagram.json`` of the same
+    run.  Raises :class:`InputError` on every rank where the folder cannot be written.
     """
     states = folder / "states.h5"
     image = states_of(branches, solvers, states, run=data["run"], first=first, modes=modes)
@@ -214,14 +203,10 @@ def states_of(
 ) -> bytes:
     """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
 
-    Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
-    every further field and scalar with P rows, strains, forces and moments (:mod:`rodfem.fem.resultants`), and under
-    ``special/<i>`` the null vectors of its special points: displacement ``r``, ``rotation`` in the space frame, and the
-    change of ``q``.  The ``modes`` of each branch, if given, are in the group of :mod:`rodfem.modes.recorded`.  Below
-    the branch are the groups of :func:`rodfem.problem.supports.write`, for pictures; the file has the
-    name of the ``first`` branch and the bending stiffness under ``section``.  ``solvers`` are those of the meshes that
-    points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file, which stays as it is;
-    ``run`` names the run that it is of.
+    ``docs/files.md`` has the groups.  Null vectors of special points are motions; the groups of
+    :func:`rodfem.problem.supports.write` and the bending stiffness under ``section`` are for pictures.  ``solvers`` are
+    those of the meshes that points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file,
+    which stays as it is unless it is the ``first``; ``run`` names the run, and ``modes`` are recorded of each branch.
     """
     sampled = [_sampled(branch, solvers) for branch in branches]
     system = solvers[0].system
@@ -275,9 +260,8 @@ def _trimmed(row: Any) -> Any:
 def load_state(path: Path, branch: str, row: int, solver: BranchSolver) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
-    Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other
-    formulation, or lacks an unknown of the scene.  ``path`` is that of ``states.h5``, ``row`` the number of the row of
-    ``branch``; the state is one of ``solver``.
+    ``path`` is that of ``states.h5``, ``row`` a number of ``branch``; the state is one of ``solver``.  Raises
+    :class:`InputError` where the file is another one, has the row in the other formulation, or lacks an unknown.
     """
     system = solver.system
     sample = _sample(path, branch, row, system.fields.discretization.formulation)

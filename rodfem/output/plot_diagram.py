@@ -83,27 +83,23 @@ class Line(NamedTuple):
 def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     """Draw every branch as ordinate against load, with its stability and its special points.
 
-    Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
+    Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues next to it; those of a
     planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
     dots, with the least and the greatest index.  Where a stable and another part lie on each other, the other one is
-    drawn upon the stable one, which is wider.  A step in which the index changes without a special point that says so
-    has a mark of warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of
-    the opposite ordinate, are thin lines: they were not traced.
+    drawn upon the stable one, which is wider.  A step in which the index changes without a special point has a mark of
+    warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of the opposite
+    ordinate, are thin lines: they were not traced.
 
     ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
-    200 dpi.  Its suffix decides the format (.png, .pdf, .svg), and its folder is created.  Raises :class:`InputError`
-    for contents of another or a newer format, :class:`ValueError` where there are no branches, columns of one differ in
-    length, or the format is unknown, and :class:`KeyError` where an entry is missing.
+    200 dpi.  Its suffix decides the format (.png, .pdf, .svg).  Raises :class:`InputError` for another format of file.
     """
     return save(figure_of(diagram), path)
 
 
 def figure_of(diagram: Mapping[str, Any]) -> Figure:
-    """Figure of a diagram, as :func:`draw_diagram` writes it; raises :class:`ValueError` as that does."""
-    DIAGRAM.check(diagram, "The diagram")
-    branches = diagram.get("branches")
-    if not branches:
-        raise ValueError("the diagram has no branches: expected those of a diagram.json; try that of a scene")
+    """Figure of a diagram, as :func:`draw_diagram` writes it."""
+    DIAGRAM.check(diagram, "The diagram", ("branches",))
+    branches = diagram["branches"]
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(diagram["title"], _about(diagram))
         handles, lines = draw_branches(axes, branches)

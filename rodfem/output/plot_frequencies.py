@@ -55,11 +55,10 @@ ENTRIES: dict[str, dict[str, Any]] = {
 def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> Path:
     """Draw the square roots of the left-most eigenvalues against the load, as in Kumar & Healey (2010), figure 11.
 
-    One line a curve, one colour a kind of motion: eigenvalues that are double are two lines on each other, of one
-    colour.  Real frequencies are lines, a complex pair is a cross (real part) and a plus (imaginary part), what has
-    diverged is a plus; flutter loads are stars, divergence loads triangles, and unstable ranges are shaded.  The axis
-    shows the ``most`` left-most eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any
-    ``omega2``, and InputError for contents of another or a newer format.
+    One line a curve, one colour a kind of motion.  Real frequencies are lines, a complex pair is a cross (real part)
+    and a plus (imaginary part), what has diverged is a plus; flutter loads are stars, divergence loads triangles, and
+    unstable ranges are shaded.  The axis shows the ``most`` left-most eigenvalues.  Returns ``path``; raises
+    :class:`ValueError` without any ``omega2``, and :class:`InputError` for another format of file.
     """
     return save(figure_of(diagram, most), path)
 

@@ -39,15 +39,18 @@ AFTER, ASIDE = 0.3, 11.0
 def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Draw loci of one scene in the plane of its two parameters, one over the other.
 
-    The first parameter, the load, is upwards.  Beside each curve stand the indices of the equilibria on its two sides
+    The first parameter, the load, is upwards.  Next to each curve stand the indices of the equilibria on its two sides
     where they were counted, as ``0|1``.  The stable side of a curve is shaded as far as the next curve, or the bound of
     the load: there stability is known as far as these curves tell, as no other one was looked for.
 
-    ``loci`` are the contents of files written by :meth:`rodfem.codim2.locus.Locus.save`, of the same two parameters;
-    ``path`` is the picture to write, and to return.  Raises :class:`InputError` for contents of another or a newer
-    format, and :class:`ValueError` without any locus, or if they are not of the same parameters.
+    ``loci`` are the contents of files written by :meth:`rodfem.codim2.locus.Locus.save`; ``path`` is the picture to
+    write, and to return.  Raises :class:`InputError` for another format of file, and :class:`ValueError` without any
+    locus, or if they are not of the same two parameters.
     """
-    _check(loci)
+    if any(one["parameters"] != loci[0]["parameters"] for one in loci) or not loci:
+        raise ValueError("Give loci, one at least, of the same two parameters.")
+    for one in loci:
+        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(loci[0]["title"], _about(loci))
         axes.margins(0.04, 0.12)
@@ -63,16 +66,6 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
         for one in loci:
             _write_indices(axes, one)
     return save(figure, path)
-
-
-def _check(loci: Sequence[Mapping[str, Any]]) -> None:
-    """Raise what :func:`draw_locus` raises for loci that are no picture."""
-    if not loci:
-        raise ValueError("There is no locus to draw: give the contents of at least one file.")
-    for one in loci:
-        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
-    if any(one["parameters"] != loci[0]["parameters"] for one in loci):
-        raise ValueError("The loci are of different parameters: draw them one by one.")
 
 
 def _draw_curves(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:

@@ -41,9 +41,8 @@ LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
 POINTS, SLENDER = 100, 65.0
 """Points along a rod; its size over its radius."""
-FRAMES, RATE, PERIODS, FAINTEST, RISING = 60, 20, 2.0, 0.06, 0.8
-"""Of an animation: pictures, pictures a second, periods of an oscillation, amplitude at which a growing mode starts,
-and the share of the time in which it grows; in the rest it goes back, pale, so that the loop joins."""
+FRAMES, RISING = 60, 0.8
+"""Pictures of an animation, and the share of its time in which a mode grows; in the rest it goes back, pale."""
 TEETH, BENT = 15, 0.05
 """Lines along d1 where a mode hardly displaces the rod; deflection of a rod, over its size, that is one."""
 GROWTH = 1e-9
@@ -53,11 +52,10 @@ GROWTH = 1e-9
 def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence[int] = ()) -> Path:
     """Draw the modes of one state, each in a panel of its own.
 
-    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state, as in ``states.h5``.  ``output`` is the picture
-    to write, and to return; an animation where its suffix is .gif, in which unstable modes grow like
-    ``exp(sqrt(-mu) t)``, then go back, and stable ones oscillate, each in a time of its own: its end joins its
-    beginning.  ``chosen`` are numbers of modes, from 1 on; all where none is given.  Raises :class:`InputError` if the
-    file has no such modes.
+    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state, ``chosen`` are numbers of modes, from 1 on
+    (none: all).  ``output`` is the picture to write, and to return; an animation if its suffix is .gif, in which
+    unstable modes grow like ``exp(sqrt(-mu) t)``, then go back, and stable ones oscillate, each in a time of its own.
+    Raises :class:`InputError` if the file has no such modes.
     """
     modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)
@@ -74,18 +72,17 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         words, top = f"{heading(path)}{branch}, load {modes.load:.6g}", 1 - 0.1 / figure.get_figheight()
         figure.suptitle(words, fontsize=14, y=top, va="top")
         panels = [_Panel(figure.add_subplot(rows, columns, i), modes, setting, n) for i, n in enumerate(numbers, 1)]
-        _animate(figure, panels, draft) if moving else _draw(figure, panels, draft)
+        if moving:
+            _animate(figure, panels, draft)
+        else:
+            for panel in panels:
+                panel.draw()
+            figure.savefig(draft)
     return output
 
 
-def _draw(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
-    for panel in panels:
-        panel.draw()
-    figure.savefig(path)
-
-
 def _animate(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
-    writer = PillowWriter(fps=RATE)
+    writer = PillowWriter(fps=20)
     with writer.saving(figure, str(path), figure.dpi):
         for frame in range(FRAMES):
             for panel in panels:
@@ -100,9 +97,9 @@ def amplitude(root: complex, grows: bool, time: float) -> complex:
     """
     if not grows:
         return complex(np.cos(2 * np.pi * time))
-    most = np.log(1 / FAINTEST) / root.real
+    most = np.log(1 / 0.06) / root.real  # from a faint amplitude on
     if root.imag:
-        most = min(most, PERIODS * 2 * np.pi / abs(root.imag))
+        most = min(most, 4 * np.pi / abs(root.imag))  # two periods
     back = max(0.0, time - RISING) / (1 - RISING)
     grown = np.exp(root * most * (min(time / RISING, 1.0) - 1))
     return complex(grown + back**2 * (3 - 2 * back) * (np.exp(-root * most) - grown))
@@ -123,11 +120,8 @@ class _Panel:
         self.r, turned = curve_of(modes.s, modes.r, modes.q, s)
         self.frames = directors(turned)
         u, w = (CubicSpline(modes.s, part[number].astype(complex))(s) for part in (modes.displacement, modes.rotation))
-        span, mu, error = (
-            float(np.linalg.norm(np.ptp(self.r, axis=0))),
-            complex(modes.value[number]),
-            modes.error[number],
-        )
+        span, mu = float(np.linalg.norm(np.ptp(self.r, axis=0))), complex(modes.value[number])
+        error = modes.error[number]
         size = drawn_size(u, w, span)
         self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
         self.combed = size * np.linalg.norm(abs(u), axis=1).max() < 0.5 * LARGEST[0] * span

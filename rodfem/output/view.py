@@ -43,16 +43,13 @@ def view_of(
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
     ``reference`` and ``moved`` (n, 3) are the centreline of the state that the rod has left, and the displacement from
-    it.  All other arguments are directions (3,): ``axis`` that of the rod (None: from one end of ``reference`` to the
-    other), ``down`` that of a load along the rod, of gravity, which is downwards, ``load`` that of a force across the
-    rod, or of its deflection, which is not along the line of sight, ``side`` what is upwards where a straight rod has
-    not moved.  With ``feet`` the rod is held in two places or more, and may be an arch.
+    it.  Directions (3,) are ``axis``, that of the rod (None: its chord), ``down``, that of gravity, ``load``, that of a
+    force across the rod, or of its deflection, and ``side``, upwards where a straight rod has not moved.  With ``feet``
+    the rod is held in two places or more, and may be an arch.
 
     Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is the
-    principal direction of the displacement across it.  A load that is not nearly along that direction is vertical
-    instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is horizontal,
-    whichever way the rod moves and the load pulls, but for an arch on whose crown the load presses: its crown is above
-    its feet.  A closed rod is shown in the plane nearest to it.
+    principal direction of the displacement across it, or a load that is not nearly along that; then the rod is seen
+    from aside.  A closed rod is shown in the plane nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
@@ -92,10 +89,9 @@ def _loaded(right: Floats, up: Floats, load: Floats, arch: Floats | None) -> tup
 
 
 def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
-    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), held and loaded so.
+    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``.
 
-    ``setting`` holds and loads it, ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to
-    show, by default of dead forces.
+    ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to show, by default of dead forces.
     """
     load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
     along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}
