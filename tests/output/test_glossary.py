@@ -37,13 +37,6 @@ def test_every_word_has_an_entry() -> None:
         assert explanation(word), word
 
 
-def test_entries_of_a_special_point_in_files() -> None:
-    text = (HOME / "docs" / "files.md").read_text()
-    part = text[text.index("### `branches[].special[]`") : text.index("## `states.h5`")]
-    for name in re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE):
-        assert name == "kind" or explanation(name)
-
-
 def test_the_page_of_files_has_the_table() -> None:
     rows = [line for line in PAGE.splitlines() if line.startswith("| `")]
     assert len(rows) == len(COLUMNS) + len(SPECIAL) > 40

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +14,13 @@ from matplotlib.image import imread
 
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
-from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
 from rodfem.file_format import LOCUS
-from rodfem.output import plot_diagram
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
-from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, dense, draw_branches, draw_diagram, figure_of
+from rodfem.output.plot_diagram import UNEXPLAINED, dense, draw_branches, draw_diagram, figure_of
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.style import PALETTE
-from rodfem.problem.scene import Ordinate
 
 pytestmark = pytest.mark.alone
 
@@ -100,12 +96,6 @@ def test_what_is_unexplained_is_marked(folder: Path) -> None:
     assert abs(y - 150) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
 
 
-def test_a_singular_first_state_is_marked() -> None:
-    plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
-    assert SINGULAR not in legend(plain | {"singular_start": 0})
-    assert SINGULAR in legend(plain | {"singular_start": 1})
-
-
 def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) -> None:
     def point(row: int, **more: Any) -> dict[str, Any]:
         found = {"kind": "imperfect bifurcation", "row": row, "load": float(row), "ordinate": 0.0}
@@ -138,12 +128,6 @@ def test_indices_stand_beside_the_curves_and_names_in_the_legend() -> None:
         for line in far:
             places = np.column_stack([line["columns"][x] for x in ("load", "ordinate")])
             assert not box.count_contains(dense(figure.axes[0], places))
-
-
-def test_branches_of_one_hue_have_other_marks() -> None:
-    axes = Figure().subplots()
-    handles = draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
-    assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
 
 
 def test_an_end_before_the_end_of_the_range_is_marked() -> None:
@@ -212,30 +196,3 @@ def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
     assert checked > 1
     unstable = [p.ordinate for p in buckled.points if p.negative]
     assert unstable and min(unstable) > 0.1  # nowhere where a circle is stable
-
-
-def test_ordinates_along_the_rod_are_checked() -> None:
-    ring = scene("ring", twisting=1.5, span=(1.0, 1.2))
-    for of, sentence in (
-        (lambda x, c: x.d1, r"ordinate along the rod has the shape \(3,\): return a scalar"),
-        (lambda x, c: x.k[2] * c.nothing, "asks for a constant 'nothing'"),
-        (lambda x: x.k[2], r"ordinate along the rod is no function of 2 argument\(s\)"),
-    ):
-        with pytest.raises(SceneError, match=sentence):
-            replace(ring, ordinate=Ordinate("twist", s=None, of=of))
-
-
-@pytest.mark.versions
-def test_pixels_are_those_of_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loads of any size: lines are sampled at the scale at which they are drawn."""
-    seen: list[int] = []
-
-    def counted(axes: Any, curve: np.ndarray) -> Any:
-        found = dense(axes, curve)
-        seen.append(len(found))
-        return found
-
-    monkeypatch.setattr(plot_diagram, "dense", counted)
-    large = {"columns": {"load": [0.0, 1e5, 2e5, 3e5]}}
-    figure_of(diagram(branch("straight", [0.0] * 4, [0, 0, 1, 1], **large), branch("other", [0, 1, 2, 3], [1] * 4)))
-    assert seen and max(seen) < 2000
