@@ -42,8 +42,8 @@ OF_A_RUN = (
 """Files that a run may leave beside its diagram and states."""
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
 """Suffixes of pictures of diagrams; without one it is PNG."""
-HELD: set[Path] = set()
-"""Folders that this process holds."""
+FOLDERS: set[Path] = set()
+"""Folders whose lock this process has."""
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
 
@@ -118,17 +118,17 @@ def locked(folder: Path, comm: MPI.Comm) -> Iterator[None]:
     removed.  Raises :class:`InputError` on every rank where the folder cannot be written, or is in use.
     """
     place = folder.resolve()
-    if comm.bcast(place in HELD):
+    if comm.bcast(place in FOLDERS):
         yield
         return
     files: list[int] = []
     on_first(comm, lambda: files.append(_acquired(folder)))
-    HELD.update([place] if files else [])
+    FOLDERS.update([place] if files else [])
     try:
         yield
         comm.barrier()  # all have written what they write
     finally:
-        HELD.discard(place)
+        FOLDERS.discard(place)
         for file in files:
             with suppress(OSError):  # the folder is gone
                 (folder / LOCK).unlink()

@@ -1077,7 +1077,7 @@ FAULTS = {
     ),
     "folder-without-a-lock": Fault(
         "rodfem/whole_files.py",
-        "if comm.bcast(place in HELD):",
+        "if comm.bcast(place in FOLDERS):",
         "if comm.bcast(True):",
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
     ),

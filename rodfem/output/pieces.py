@@ -67,7 +67,7 @@ def pieces_of(branch: Branch) -> list[Piece]:
     rows = len(columns["load"])
     known = {(row, side): index for row, *sides in _indices(branch) for side, index in enumerate(sides)}
     kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
-    off, steps = _off_kinks(columns["negative"], kink), []
+    off, steps = _from_neighbours(columns["negative"], kink), []
     for a, b in pairwise(range(rows)):
         on = kink[a] if kink[b] else ""
         own = columns["negative"] if on else off
@@ -107,7 +107,7 @@ def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
     columns = branch["columns"]
     for point in (point for point in branch.get("special", []) if point["kind"] in COUNTED):
         yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
-        yield from _beside(columns["load"], point) if point.get("negative_after") is not None else ()
+        yield from _neighbours(columns["load"], point) if point.get("negative_after") is not None else ()
     if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
         near = _at_the_origin(columns["arclength"], columns["undecided"])
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
@@ -117,7 +117,7 @@ def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
     return [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
 
 
-def _beside(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
+def _neighbours(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
     """Rows on either side of a special point at its load, to its error bar, with the index there."""
     row, bar = int(point["row"]), max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0)
     for step, side in ((-1, "before"), (1, "after")):
@@ -127,7 +127,7 @@ def _beside(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[
             other += step
 
 
-def _off_kinks(negative: list[int], kink: list[str]) -> list[int]:
+def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
     """Index of each row; of one on a kink, where it is that of one side, that of the row beside it off the kink."""
     negative, rows = list(negative), range(len(kink))
     for a, b in (*pairwise(rows), *pairwise(reversed(rows))):

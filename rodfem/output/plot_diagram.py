@@ -224,7 +224,7 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
     for number in sorted(range(len(lines)), key=lambda number: -len(curves[number])):
         line, curve = lines[number], curves[number]
         half = np.array([0.33 * len(line.piece.label) + 0.1, 0.45]) * FONT * axes.figure.dpi / 72
-        places = _beside(curve, half)
+        places = _label_places(curve, half)
         tree = KDTree(np.concatenate(taken))
         corner = np.array([*product((-1, 0, 1), repeat=2)]) * half
         room = np.array([min(tree.query(place + corner)[0].min(), GAP) for place in places])
@@ -239,7 +239,7 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
             axes.annotate(line.piece.label, tuple(at), color=line.colour, in_layout=False, **style)
 
 
-def _beside(curve: Floats, half: Floats) -> Floats:
+def _label_places(curve: Floats, half: Floats) -> Floats:
     """Places (k, 2) for a word of ``half`` (2,) pixels beside a curve (n, 2), those in its middle first."""
     rows = ((0.5 + np.array([0, 0.15, -0.15, 0.3, -0.3, 0.4, -0.4])) * (len(curve) - 1)).round().astype(int)
     tangent = curve[np.minimum(rows + 4, len(curve) - 1)] - curve[np.maximum(rows - 4, 0)]

@@ -71,7 +71,7 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     intervals, load, name = intervals_of(branch), data["parameter"], _subject(branch, data)
     if not intervals:
         return f"{name} has one state only; {_end(branch)}."
-    start, stop = told_apart(intervals[0].loads[0], intervals[-1].loads[1], width=_width(data))
+    start, stop = distinct_digits(intervals[0].loads[0], intervals[-1].loads[1], width=_width(data))
     if len(intervals) == 1:
         coarse = any(special.get("resolved") is False for special in branch["special"])
         state, doubt = _state(intervals[0], data), UNRESOLVED if coarse else ""
@@ -143,14 +143,14 @@ def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
     load, stable = data["parameter"], intervals_in(data["branches"], STABLE)
     undecided = [x.covers for x in intervals_in(data["branches"], UNDECIDED)]
     for a, b in without_stable(stable, *sorted(data["range"])):
-        first, last = told_apart(a, b, width=_width(data))
+        first, last = distinct_digits(a, b, width=_width(data))
         doubt = any(low < b and high > a for low, high in undecided)
         but = ", but there are states of undecided stability" if doubt else ""
         yield f"From {load} = {first} to {last} no stable state was found{but}."
     pairs = list(coexisting(stable))
     for one, other, a, b in pairs[:MOST_NAMES]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
-        first, last = told_apart(a, b, width=_width(data))
+        first, last = distinct_digits(a, b, width=_width(data))
         yield f"From {load} = {first} to {last} two stable states coexist, of {names}: hysteresis is possible."
     if more := pairs[MOST_NAMES:]:
         yield f"So do {many(len(more), 'further pair')} of stable states at other loads."
@@ -181,7 +181,7 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
     if found := changes_at(branch, row):
         return known_digits(found[0]), " and ".join(_event(special, branch, branches) for special in found)
     column, segment = branch["columns"]["load"], row if after.rank > one.rank else row - 1
-    a, b = told_apart(column[segment], column[segment + 1])
+    a, b = distinct_digits(column[segment], column[segment + 1])
     unexplained = any(change["row"] == segment for change in branch.get("unexplained") or ())
     what = "changes its index without a special point that says why" if unexplained else _change(one, after)
     return f"some load between {a} and {b}", what
@@ -239,7 +239,7 @@ def _least_zeros(branch: Mapping[str, Any]) -> int:
     return min(branch["columns"]["zero"])
 
 
-def told_apart(*loads: float, width: float = 0.0) -> list[str]:
+def distinct_digits(*loads: float, width: float = 0.0) -> list[str]:
     """Loads with as many digits as a range of that ``width`` needs: by default from the first load to the last."""
     width = width or abs(loads[-1] - loads[0])
     more = ceil(log10(max(map(abs, loads)) / width)) if width and any(loads) else 0

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from math import inf, nan
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -29,21 +30,20 @@ def _soft(attribute: str) -> Source:
     return lambda point: [plain(getattr(mode, attribute)) for mode in point.soft]
 
 
-def _of_point(name: str) -> Source:
-    return lambda special: getattr(special.point, name)
-
-
+ATTRIBUTES = {
+    "ordinate_error_estimate": "ordinate_error",
+    "omega2_error_estimate": "omega2_error",
+    "followed": "switched",
+}
+"""Attributes of a special point that have another name than its entries."""
 OF_POINT: dict[str, Source] = {
     **{("soft" if name == "name" else f"soft_{name}"): _soft(name) for name in ("name", "value", "uncertainty")},
     "unstable": lambda point: point.negative if point.omega2 else None,
 }
 OF_SPECIAL: dict[str, Source] = {
-    **{name: _of_point(name) for name in ("load", "ordinate", "energy", "zero")},
+    **{name: attrgetter(f"point.{name}") for name in ("load", "ordinate", "energy", "zero")},
     "kind": lambda special: str(special.kind),
-    "ordinate_error_estimate": lambda special: special.ordinate_error,
-    "omega2_error_estimate": lambda special: special.omega2_error,
     "meets": lambda special: list(special.connects_to) if special.connects_to else None,
-    "followed": lambda special: special.switched,
     "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
 }
 """Where values come from that are no attributes of their name."""
@@ -70,7 +70,7 @@ class Entry:
 
     def value(self, point: Point | SpecialPoint) -> Any:
         """What a file has of a point; numbers that are not finite become null."""
-        return plain(getattr(point, self.name) if self.of is None else self.of(point))
+        return plain(getattr(point, ATTRIBUTES.get(self.name, self.name)) if self.of is None else self.of(point))
 
     def kept(self, column: Sequence[Any]) -> bool:
         """Whether a branch has this column: it is always there, or a row has something in it."""
@@ -137,9 +137,8 @@ def soft_modes(row: Data) -> list[SoftMode]:
 
 def special_values(entry: Data) -> dict[str, Any]:
     """Attributes of a special point of a file, as :class:`~rodfem.continuation.branch.SpecialPoint` takes them."""
-    names = {f"{name}_error_estimate": f"{name}_error" for name in ("ordinate", "omega2")} | {"followed": "switched"}
-    read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")] + [*names]
-    values = {names.get(name, name): _number(entry.get(name)) for name in read}
+    read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")]
+    values = {ATTRIBUTES.get(name, name): _number(entry.get(name)) for name in read}
     values |= {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
     values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
     return values | {"law": _law(entry["law"]) if entry["law"] else None}

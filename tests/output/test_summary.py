@@ -12,7 +12,7 @@ import golden_cases
 import pytest
 
 from rodfem import Discretization, Plan, trace
-from rodfem.output.summary import in_sentences, told_apart
+from rodfem.output.summary import distinct_digits, in_sentences
 
 pytestmark = pytest.mark.alone
 
@@ -52,7 +52,7 @@ def known(name: str) -> str:
     ],
 )
 def test_ends_of_a_narrow_range_are_told_apart(loads: tuple[float, float], words: list[str]) -> None:
-    assert told_apart(*loads) == words
+    assert distinct_digits(*loads) == words
 
 
 @pytest.mark.long

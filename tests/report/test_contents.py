@@ -233,6 +233,3 @@ def test_readings_are_those_of_the_file() -> None:
     first, second, third, fourth = readings_of(one | {"ended": ""}, {"load": 10.0, "ordinate": 1.0})
     assert first == {"load": "0.00 (1e-02)", "ordinate": "0.500 (1e-03)"}
     assert second == {"load": "1.000000 (1e-06)"} and third == {} and fourth == {"load": "3 (given)"}
-    squeezed = branch([0, 0], special(1, "end")) | {"ended": "stretch reaches zero"}
-    assert readings_of(squeezed, {})[1] == {"load": "1.000000 (1e-06)"}
-    assert readings_of(one, {})[0] == {}
