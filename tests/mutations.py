@@ -683,7 +683,7 @@ FAULTS = {
         "rodfem/fem/equations.py", 'others["potential"] = potential', 'others["potential"] = L', WORK
     ),
     "writhe-of-one-polygon": Fault(
-        "rodfem/writhe.py", "(4 * polygons[-1] - polygons[-2]) / 3", "polygons[-1]", "tests/report/test_contents.py"
+        "rodfem/writhe.py", "(4 * fine - coarse) / 3", "fine", "tests/report/test_contents.py"
     ),
     "fewer-eigenvalues-than-asked-for": Fault(
         "rodfem/stability/assessment.py",

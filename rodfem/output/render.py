@@ -20,7 +20,7 @@ from rodfem.errors import InputError
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.solids import Glyph, Solid, striped
-from rodfem.output.states import curve_of
+from rodfem.output.states import curve_at
 from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE, status_of
 from rodfem.output.view import axes_of, thickness
 from rodfem.problem.arguments import checked
@@ -154,9 +154,10 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
             symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
             first = file["branches"][file.attrs.get("first", branch)]
             left = 0 if first == group else int(np.argmin(abs(first["load"][:] - load)))
-            reference = _curve(first, left, count)[1]
+            s, centres, turned = curve_at(group, row, count)
+            reference, setting = curve_at(first, left, count)[1], read_setting(group, row)
             caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
-            return State(*_curve(group, row, count), reference, read_setting(group, row), caption)
+            return State(s, centres, directors(turned), reference, setting, caption)
     except UNREADABLE as error:
         if isinstance(error, InputError):
             raise
@@ -171,15 +172,6 @@ def _group(branches: Any, branch: str, row: int, states: Path) -> Any:
     if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
         raise InputError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
     return branches[branch]
-
-
-def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
-    """Arclengths (count,), centres (count, 3) and directors (count, 3, 3) of a row of a branch."""
-    s, r, q = (group[key][row] for key in ("s", "r", "q"))
-    s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
-    at = np.linspace(s[0], s[-1], count)
-    centres, turned = curve_of(s, r, q, at)
-    return at, centres, directors(turned)
 
 
 def _import_pyvista() -> Any:

@@ -23,7 +23,7 @@ from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
 from rodfem.output.plot_modes import GROWTH, drawn_size
 from rodfem.output.solids import body_of, profile_of
-from rodfem.output.states import POINTS, PROFILES, curve_of, profiles_of
+from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
 from rodfem.output.view import axes_of, thickness
 from rodfem.problem.quaternions import directors
@@ -174,18 +174,15 @@ def shapes_of(group: Any, count: int) -> Shapes:
     The centre of a rod that nothing holds, which may be anywhere, is the origin.  Raises :class:`InputError` where a
     state is not finite, or no curve.
     """
-    s, r, q = (np.asarray(group[name]) for name in ("s", "r", "q"))
-    at, rows = np.linspace(s[0, 0], np.nanmax(s[0]), count), []
-    for row, known in enumerate(np.isfinite(s)):  # the rows of a mesh with fewer nodes end in nan
-        try:
-            rows.append(curve_of(s[row, known], r[row, known], q[row, known], at))
-        except ValueError as trouble:  # of the splines
-            sentence = f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again."
-            raise InputError(sentence) from trouble
-    positions, quaternions = (np.array(part) for part in zip(*rows, strict=True))
+    try:
+        rows = [curve_at(group, row, count) for row in range(len(group["s"]))]
+    except ValueError as trouble:  # of the splines
+        sentence = f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again."
+        raise InputError(sentence) from trouble
+    at, positions, quaternions = (np.array(part) for part in zip(*rows, strict=True))
     if SUPPORTS in group and not any(group.get(name) for name in (SUPPORTS, FOUNDATION, TIES)):
         positions = positions - positions.mean(axis=1, keepdims=True)
-    return Shapes(at, positions, quaternions)
+    return Shapes(at[0], positions, quaternions)
 
 
 @dataclass(frozen=True)
