@@ -30,11 +30,11 @@ KEYS = {"name": "format", "version": "format_version", "program": "program"}
 
 @dataclass(frozen=True)
 class Format:
-    """Format of a kind of file: its name, its version as written now, and which file of a run has it, in words."""
+    """Format of a kind of file: its name, which file of a run has it, in words, and its version as written now."""
 
     name: str
-    version: int
     file: str
+    version: int = 1
 
     def mark(self) -> dict[str, Any]:
         """Entry ``format`` of a JSON file."""
@@ -75,11 +75,11 @@ class Format:
             )
 
 
-DIAGRAM = Format("rodfem diagram", 1, "the diagram.json of a run")
-STATES = Format("rodfem states", 1, "the states.h5 of a run")
-MODES = Format("rodfem modes", 1, f"the modes.h5 of a run with {Argument('Plan', 'modes')}")
-LOCUS = Format("rodfem locus", 1, f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
-RESULT = Format("rodfem result", 1, "a rod-00000.json, rod-00001.json ... of rodfem.many")
+DIAGRAM = Format("rodfem diagram", "the diagram.json of a run")
+STATES = Format("rodfem states", "the states.h5 of a run")
+MODES = Format("rodfem modes", f"the modes.h5 of a run with {Argument('Plan', 'modes')}")
+LOCUS = Format("rodfem locus", f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
+RESULT = Format("rodfem result", "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
 UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, AttributeError, RuntimeError)

@@ -62,10 +62,6 @@ SHAPES = ("", "^", "<", "v", ">", "p", "h")
 """Marks along the curves of branches, another one whenever the hues are used up."""
 HUES = 7
 """Hues of the palette that are told apart at a glance."""
-SHORT = 15
-"""Points of a line, two pixels apart, below which its index stands beside it only if it is the only one."""
-NEAR = 0.01
-"""Distance from an image, relative to the ranges of load and ordinate, up to which a branch is that image."""
 GAP = 11.0
 """Pixels between an index and lines."""
 SEEN = 2e-4
@@ -167,7 +163,7 @@ def is_traced(branch: Mapping[str, Any], branches: Branches) -> bool:
     share = np.linspace(0.0, 1.0, 50)[:, None]
     lines = [(a + share * (b - a)).reshape(-1, 2) for c in curves for a, b in pairwise(c)]
     off = (np.concatenate([middle[None] + size, *lines]) - middle) / np.where(size > 0, size, 1.0)
-    return bool(np.hypot(*off.T).min() < NEAR)
+    return bool(np.hypot(*off.T).min() < 0.01)  # of the ranges of load and ordinate
 
 
 def _places(branch: Mapping[str, Any]) -> Floats:
@@ -231,7 +227,7 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
         inside = np.all((places - half > axes.bbox.min) & (places + half < axes.bbox.max), axis=1)
         best = int(np.argmax(np.where(inside, room, -1.0)))
         name = line.colour, line.piece.label
-        if (inside[best] and room[best] > GAP / 2 and len(curve) > SHORT) or name not in written:
+        if (inside[best] and room[best] > GAP / 2 and len(curve) > 15) or name not in written:
             written.add(name)
             taken.append(places[best] + corner)
             at = axes.transData.inverted().transform(places[best])

@@ -36,15 +36,11 @@ from rodfem.whole_files import draft_of
 __all__ = ["draw_modes", "main"]
 
 Floats = NDArray[np.float64]
-PANEL, COLUMNS, TITLES = (4.0, 2.75), 3, 0.8  # inches; those that titles take above a panel
+PANEL, TITLES = (4.0, 2.75), 0.8  # inches; those that titles take above a panel
 LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
-POINTS, SLENDER = 100, 65.0
-"""Points along a rod; its size over its radius."""
 FRAMES, RISING = 60, 0.8
 """Pictures of an animation, and the share of its time in which a mode grows; in the rest it goes back, pale."""
-TEETH, BENT = 15, 0.05
-"""Lines along d1 where a mode hardly displaces the rod; deflection of a rod, over its size, that is one."""
 GROWTH = 1e-9
 """Real part of the root of -mu, relative to it, above which a mode grows."""
 
@@ -63,7 +59,7 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         if not 1 <= number <= count:
             raise InputError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
     numbers = [n - 1 for n in chosen] or list(range(count))
-    columns = min(COLUMNS, len(numbers)) if len(numbers) != 4 else 2
+    columns = min(3, len(numbers)) if len(numbers) != 4 else 2
     rows, moving = ceil(len(numbers) / columns), output.suffix.lower() == ".gif"
     with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
@@ -116,14 +112,14 @@ class _Panel:
 
     def __init__(self, axes: Axes, modes: Modes, setting: Setting, number: int) -> None:
         self.axes, self.setting, self.shown = axes, setting, list[PolyCollection]()
-        self.s = s = np.linspace(modes.s[0], modes.s[-1], POINTS)
+        self.s = s = np.linspace(modes.s[0], modes.s[-1], 100)
         self.r, turned = curve_of(modes.s, modes.r, modes.q, s)
         self.frames = directors(turned)
         u, w = (CubicSpline(modes.s, part[number].astype(complex))(s) for part in (modes.displacement, modes.rotation))
         span, mu = float(np.linalg.norm(np.ptp(self.r, axis=0))), complex(modes.value[number])
         error = modes.error[number]
         size = drawn_size(u, w, span)
-        self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
+        self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / 65
         self.combed = size * np.linalg.norm(abs(u), axis=1).max() < 0.5 * LARGEST[0] * span
         self.root = np.sqrt(-mu)
         free = modes.motion[number] == SYMMETRY or abs(mu) <= (error if np.isfinite(error) else 0.0)
@@ -147,7 +143,7 @@ class _Panel:
         axis, off = axis_of(self.setting, self.r), self.r - self.r[0]
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
-        bent = self.setting.force is None and np.linalg.norm(most) > BENT * span
+        bent = self.setting.force is None and np.linalg.norm(most) > 0.05 * span
         view = axes_of(self.setting, self.r, moved, self.frames[0], most if bent else None)
         self.look, raised = Look(self.radius, view), moved @ view[1]
         if raised[np.argmax(abs(raised))] < 0.0:
@@ -196,7 +192,7 @@ class _Panel:
     def _rod(self, centres: Floats, frames: Floats, color: str) -> list[Solid | Glyph]:
         """Rod with a stripe along d1, and with teeth along d1 where the mode turns it only."""
         dark = to_hex(0.4 * np.array(to_rgb(color)))
-        nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1 : -1 if self.combed else 1]
+        nodes = np.linspace(0, len(centres) - 1, 17).round().astype(int)[1 : -1 if self.combed else 1]
         tips = centres + 6.0 * self.radius * frames[:, :, 0]
         teeth = [between("bar", centres[i], tips[i], 0.12 * self.radius, dark) for i in nodes]
         return [*striped((self.s, centres, frames), self.setting.section, self.radius, (color, dark), 12), *teeth]

@@ -29,8 +29,8 @@ from rodfem.output.words import is_sweep, many
 MOST_INTERVALS, MOST_NAMES = 6, 6
 """Intervals of a branch that are told one by one, and branches that are named in one sentence."""
 Branches = Sequence[Mapping[str, Any]]
-DIGITS, FEW, MOST = 10, 6, 15
-"""Significant digits of a load at most, and of one without an error bar; those of a float."""
+DIGITS, FEW = 10, 6
+"""Significant digits of a load at most, and of one without an error bar."""
 EVENTS = {
     FOLD: "turns back in a fold",
     FLUTTER: "flutters: two frequencies coincide and become complex",
@@ -55,10 +55,9 @@ def in_sentences(data: Mapping[str, Any]) -> list[str]:
     if more := told[MOST_NAMES:]:
         out.append(f"{_names(more)} have stable states, too.")
     if quiet:
-        out.append(
-            f"{_names(quiet)} {'is unstable on its' if len(quiet) == 1 else 'are unstable on their'} whole range."
-        )
-    return [*out, *([] if is_sweep(data) else _ranges(data)), *_open(data)]
+        verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
+        out.append(f"{_names(quiet)} {verb} whole range.")
+    return [*out, *_ranges(data), *_open(data)]
 
 
 def _kinds(branch: Mapping[str, Any]) -> set[str]:
@@ -243,7 +242,7 @@ def distinct_digits(*loads: float, width: float = 0.0) -> list[str]:
     """Loads with as many digits as a range of that ``width`` needs: by default from the first load to the last."""
     width = width or abs(loads[-1] - loads[0])
     more = ceil(log10(max(map(abs, loads)) / width)) if width and any(loads) else 0
-    return [f"{load:.{min(FEW + max(more, 0), MOST)}g}" for load in loads]
+    return [f"{load:.{min(FEW + max(more, 0), 15)}g}" for load in loads]
 
 
 def known_digits(special: Mapping[str, Any]) -> str:

@@ -17,15 +17,13 @@ from rodfem.problem.setting import HELD, TURNS, Setting
 
 Floats = NDArray[np.float64]
 
-TILT, STEEP, ABOVE, ASIDE = np.radians([20.0, 55.0, 35.0, 40.0])
-"""By which a picture is seen from above; that of a closed rod, to show what is across its plane; and by which a rod
-that bends and moves in different planes is seen from above, and from aside."""
-NEAR, SIDEWAYS, LEVEL = 0.9, 0.3, 0.1
-"""Cosines: from which on a direction is taken for that of the nearest axis of space, or a load for that of the motion;
-below which a chord leaves the axis of the rod's only support sideways; below which an axis of space is across."""
-ARCHED, UNSEEN = 0.05, 1e-3
-"""Mean distance of a rod from the line of its ends from which on it is an arch, and displacement, or distance of the
-ends, that a picture does not show: relative to the rod's size."""
+TILT = np.radians(20.0)
+"""By which a picture is seen from above."""
+NEAR, LEVEL = 0.9, 0.1
+"""Cosines: from which on a direction is that of the nearest axis of space, or a load that of the motion; below which an
+axis of space is across."""
+UNSEEN = 1e-3
+"""Displacement, or distance of the ends, that a picture does not show, relative to the rod's size."""
 POINT = 1e-9
 """A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
 
@@ -55,7 +53,7 @@ def view_of(
     chord = reference[-1] - reference[0] if axis is None else axis
     shape, tilt = moved.T @ moved / len(moved), TILT
     if np.linalg.norm(chord) < UNSEEN * size and down is None:
-        (right, up), tilt = _plane(reference + moved), STEEP
+        (right, up), tilt = _plane(reference + moved), np.radians(55.0)  # what is across the plane is seen
     elif down is not None:
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
@@ -85,7 +83,8 @@ def _loaded(right: Floats, up: Floats, load: Floats, arch: Floats | None) -> tup
     up = up - (up @ right) * right
     up = upwards(up / np.linalg.norm(up))
     up = up * _standing(up, arch, load)
-    return np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up), up, ABOVE  # the rod goes away, so upwards
+    turned = np.cos(np.radians(40.0)) * right + np.sin(np.radians(40.0)) * np.cross(right, up)
+    return turned, up, np.radians(35.0)  # the rod goes away, so upwards
 
 
 def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
@@ -113,7 +112,7 @@ def axis_of(setting: Setting, reference: Floats) -> Floats:
     chord, holding = reference[-1] - reference[0], [x for x in setting.supports if x.held.any() or x.turning != TURNS]
     if len(holding) == 1 and holding[0].turning == HELD:
         stem = directors(holding[0].frame)[:, 2]
-        if stem @ chord > SIDEWAYS * np.linalg.norm(chord):
+        if stem @ chord > 0.3 * np.linalg.norm(chord):
             return np.asarray(stem)
     return np.asarray(chord)
 
@@ -123,7 +122,7 @@ def _standing(up: Floats, rod: Floats | None, load: Floats) -> float:
     if rod is None:
         return 1.0
     bow, size = (rod - np.linspace(rod[0], rod[-1], len(rod))).mean(axis=0), np.linalg.norm(np.ptp(rod, axis=0))
-    arch = np.linalg.norm(bow) > ARCHED * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
+    arch = np.linalg.norm(bow) > 0.05 * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
     return sign_of(up @ bow) if arch and load @ bow < 0 else 1.0
 
 
