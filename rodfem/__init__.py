@@ -22,31 +22,23 @@ finds and classifies the points where it is lost, follows what branches off, and
     diagram = trace(column)       # without
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
-  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy` has a few).
-* **Stiffnesses**: :mod:`section <rodfem.problem.section>` has those of circles, tubes, rectangles, strips, ellipses,
-  from E, nu and dimensions, in any units.
+  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy` has a few);
+  :mod:`section <rodfem.problem.section>` has stiffnesses of cross-sections, in any units.
 * **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`, :func:`free`,
-  :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.  Positions and rotations may be functions
-  of the constants.
+  :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.
 * **Loads**: forces and moments of an :class:`End`; ``distributed``, ``follower`` and ``potential`` of a :class:`Scene`;
-  an :class:`Attachment` at any point (:mod:`rodfem.forms.loads` has potentials).  Loads without a potential make
-  ``Scene.conservative`` False: then frequencies are computed, and flutter.
+  an :class:`Attachment` at any point.  Loads without a potential make ``Scene.conservative`` False: then frequencies
+  are computed, and flutter.
 * **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
 * **Tables**: :func:`tabulated` is a function of the arclength through rows of numbers, :func:`path` one of the load.
-* **Ordinate**: the number that a diagram shows, at a point or an integral over the rod (its energy, its twist).
-* **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
-  of two of them.
-* **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
+* **Parameters**: any of them can be the load, :meth:`Scene.varying`; :meth:`Diagram.locus` follows a special point in
+  the plane of two of them.
 * **Diagram**: :func:`trace` computes without files and returns a :class:`Diagram`: ``diagram["branch 1"]``,
   ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
   ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.save(folder)``; :func:`load` reads a saved one.  :func:`run` is
-  the same with a terminal, files and pictures.
+  the same with a terminal, files and pictures, :func:`many` shares a list of scenes among the ranks.
 * **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one;
   ``solver.rebind(A=-1.5)`` is that of other constants, whose equations are not derived again.
-* **Is it stable?**: each point has its index; :meth:`Diagram.assess` decides by any of six methods, and says how far to
-  trust it; :meth:`Diagram.modes` finds how the rod moves in its left-most modes, and what a controller needs to know.
-* **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, and skips those that are finished.
-* **What is not connected**: :meth:`Diagram.search` looks for other equilibria at a load by deflation.
 
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
 that breaks one has a zero eigenvalue for it, which is counted as zero.

@@ -761,7 +761,7 @@ FAULTS = {
         "rodfem/output/plot_diagram.py",
         "SEEN = 2e-4",
         "SEEN = 1e3",
-        "tests/output/test_smooth.py",
+        "tests/output/test_plot_diagram.py",
     ),
     # rows
     "rows-of-another-branch-are-kept": Fault(
