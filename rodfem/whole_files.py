@@ -39,7 +39,7 @@ OF_A_RUN = (
     "modes-*.gif",
     "report.html",
 )
-"""Files that a run may leave beside its diagram and states."""
+"""Files that a run may leave with its diagram and states."""
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
 """Suffixes of pictures of diagrams; without one it is PNG."""
 FOLDERS: set[Path] = set()
@@ -150,7 +150,7 @@ def _acquired(folder: Path) -> int:
 
 
 def _lock(folder: Path) -> int | None:
-    """Descriptor of the lock; None where who held it has just removed it."""
+    """Descriptor of the lock; None if another process has just removed it."""
     file = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -167,7 +167,7 @@ def _lock(folder: Path) -> int | None:
 
 
 def remove_earlier(folder: Path) -> None:
-    """Remove what an earlier run left beside its diagram and states, which the next save replaces."""
+    """Remove what an earlier run left with its diagram and states, which the next save replaces."""
     with writing(folder):
         for pattern in OF_A_RUN:
             for file in folder.glob(pattern):

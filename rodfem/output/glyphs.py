@@ -78,11 +78,11 @@ def glyphs_of(
     shares = sizes / np.maximum(sizes.max(axis=0, initial=0.0), TINY)
     out: list[Glyph] = []
     for support, place, load, share in zip(setting.supports, places, loads, shares, strict=True):
-        held = _body(support, place, size, look)
-        out += held + _springs(support, place, look)
+        body = _body(support, place, size, look)
+        out += body + _springs(support, place, look)
         if support.mass:
             out.append(ball(place.at, 2.2 * look.radius, DARK))
-        out += _loads(load, share, place, 2.2 * size if held else 0.5 * BLOCK * look.radius, look)
+        out += _loads(load, share, place, 2.2 * size if body else 0.5 * BLOCK * look.radius, look)
     for tie in setting.ties:
         out += _tie(tie, s, centres, home, look)
     return out + _foundation(setting, s, centres, home, look) + _distributed(setting, s, pose, look)
@@ -223,7 +223,7 @@ def _loads(load: tuple[Floats, Floats], share: Floats, place: _Place, clear: flo
 
 
 def _distributed(setting: Setting, s: Floats, pose: tuple[Floats, Floats], look: Look) -> list[Glyph]:
-    """Arrows in proportion to a distributed force: on the rod, or beside it where the force is along the rod."""
+    """Arrows in proportion to a distributed force: on the rod, or next to it if the force is along the rod."""
     if setting.distributed is None:
         return []
     (centres, frames), (places, dead, follower) = pose, setting.distributed

@@ -22,7 +22,7 @@ from rodfem.tolerances import SAME_SPECIAL
 STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
 UNDECIDED = "stability undecided"
 COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
-"""Kinds whose index before and after is that of the steps beside."""
+"""Kinds whose index before and after is that of the steps next to them."""
 COMPLETE = ("", "end of range", "closed loop", "not traced")
 """Ends that need no mark."""
 MEETS, SQUEEZED, BEGINS = "meets", "stretch reaches zero", "begins here: "
@@ -100,7 +100,7 @@ def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> lis
 def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
     """Rows at which the index is known before and after, with both.
 
-    They are singular points, and rows beside them at the same load to its error bar: a load asked for may be that of a
+    They are singular points, and rows next to them at the same load to its error bar: a load asked for may be that of a
     special point, where the index of the row itself is not decided.  At the branch point that a branch leaves they are
     undecided rows, too, whose index is that of the next row.
     """
@@ -128,7 +128,7 @@ def _neighbours(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tu
 
 
 def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
-    """Index of each row; of one on a kink, where it is that of one side, that of the row beside it off the kink."""
+    """Index of each row; of one on a kink, where it is that of one side, that of the next row off the kink."""
     negative, rows = list(negative), range(len(kink))
     for a, b in (*pairwise(rows), *pairwise(reversed(rows))):
         negative[a] = negative[b] if kink[a] and not kink[b] else negative[a]

@@ -61,7 +61,7 @@ ENDS, IMAGE = "ends: ", "image, not traced: "
 SHAPES = ("", "^", "<", "v", ">", "p", "h")
 """Marks along the curves of branches, another one whenever the hues are used up."""
 HUES = 7
-"""Hues of the palette that are told apart at a glance."""
+"""Hues of the palette that differ at a glance."""
 GAP = 11.0
 """Pixels between an index and lines."""
 SEEN = 2e-4
@@ -136,7 +136,7 @@ def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Li
 
 
 def _kinds(lines: Sequence[Line]) -> list[Line2D]:
-    """Handles of the legend for the kinds of lines, and for the indices beside them."""
+    """Handles of the legend for the kinds of lines, and for their indices."""
     kinds = {line.piece.kind for line in lines}
     out = [Line2D([], [], color="0.45", label=kind, **style) for kind, style in LINES.items() if kind in kinds]
     in_space = any(line.piece.in_space is not None for line in lines)
@@ -213,7 +213,7 @@ def dense(axes: Axes, curve: Floats) -> Floats:
 
 
 def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[float, float]]) -> None:
-    """Write the index beside each line, where there is most room: a short line has none, unless it is the only one."""
+    """Write the index of each line where there is most room: a short line has none, unless it is the only one."""
     curves = [dense(axes, line.curve) for line in lines]
     corners = [axes.transData.transform(marks)] if marks else []
     taken, written = [*curves, *corners], set[tuple[str, str]]()
@@ -236,7 +236,7 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
 
 
 def _label_places(curve: Floats, half: Floats) -> Floats:
-    """Places (k, 2) for a word of ``half`` (2,) pixels beside a curve (n, 2), those in its middle first."""
+    """Places (k, 2) for a word of ``half`` (2,) pixels next to a curve (n, 2), those in its middle first."""
     rows = ((0.5 + np.array([0, 0.15, -0.15, 0.3, -0.3, 0.4, -0.4])) * (len(curve) - 1)).round().astype(int)
     tangent = curve[np.minimum(rows + 4, len(curve) - 1)] - curve[np.maximum(rows - 4, 0)]
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(*tangent.T), POINT)[:, None]

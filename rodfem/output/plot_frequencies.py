@@ -37,7 +37,7 @@ COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending":
 RANGES = ("#E9E4F3", "#FBE6D9", "#F3D3C6")
 """Shades of ranges of divergence, of flutter, and of both."""
 REAL = 1e-6
-"""An imaginary part smaller than this is none, relative to the root."""
+"""An imaginary part smaller than this, relative to the root, is round-off."""
 PAIR, GROWTH, DIVERGED = "complex pair, real part", "complex pair, imaginary part", "diverged, growth rate"
 LEAST = 1e-3
 """Least frequency at the top of a picture; distance of eigenvalues that have met from their mean, relative to it."""
@@ -104,7 +104,7 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
 
 
 def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
-    """Mark flutter and divergence loads, and write them beside: of divergence above the axis, where its frequency is.
+    """Mark flutter and divergence loads with their values: of divergence above the axis, where its frequency is.
 
     Returns their kinds.
     """
@@ -193,7 +193,7 @@ def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()
 
 
 def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Member]:
-    """Points of a curve, and those of a square root beside the rows of ``met``, each with its double eigenvalue."""
+    """Points of a curve, and those of a square root next to the rows of ``met``, each with its double eigenvalue."""
     out = list(members)
     for i, (load, row, mu, motion) in enumerate(members):
         mean = met.get(row, np.inf)

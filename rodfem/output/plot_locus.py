@@ -28,7 +28,7 @@ POINTS: dict[str, dict[str, Any]] = {
     "cusp": {"marker": "^", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "cusp"},
     "ends": {"marker": "o", "ms": 6.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "fold meets branch point"},
 }
-"""Markers of rows by how what is said of them begins, or for the fold's end how it reads."""
+"""Markers of rows by the first word of what happens there."""
 
 STABLE_SIDE = "#CDE9DF"
 """Colour of the stable side of a curve."""
@@ -82,14 +82,14 @@ def _draw_curves(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _indices(loci: Sequence[Mapping[str, Any]]) -> list[Line2D]:
-    """Entry of the legend for the indices beside the curves, if there are any."""
+    """Entry of the legend for the indices of the curves, if there are any."""
     pairs = [pair for one in loci for pair in one["columns"]["index"] if pair[0] >= 0]
     style = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
     return [Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **style)] if pairs else []
 
 
 def _write_indices(axes: Axes, one: Mapping[str, Any]) -> None:
-    """Write the indices on both sides beside a curve, off its start."""
+    """Write the indices on both sides of a curve, away from its start."""
     row = round(AFTER * (len(one["columns"]["index"]) - 1))
     low, high = one["columns"]["index"][row]
     if low < 0:

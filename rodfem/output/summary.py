@@ -27,7 +27,7 @@ from rodfem.output.pieces import (
 from rodfem.output.words import is_sweep, many
 
 MOST_INTERVALS, MOST_NAMES = 6, 6
-"""Intervals of a branch that are told one by one, and branches that are named in one sentence."""
+"""Intervals of a branch that have a clause each, and branches that are named in one sentence."""
 Branches = Sequence[Mapping[str, Any]]
 DIGITS, FEW = 10, 6
 """Significant digits of a load at most, and of one without an error bar."""
@@ -49,10 +49,10 @@ UNRESOLVED = ", as far as this mesh tells: it does not resolve that state"
 def in_sentences(data: Mapping[str, Any]) -> list[str]:
     """Sentences on a diagram, the contents of ``diagram.json``: its branches, ranges of stability, open questions."""
     first, *others = data["branches"]
-    told = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
-    quiet = [branch for branch in others if branch not in told and _kinds(branch)]
-    out = [_of_branch(branch, data) for branch in (first, *told[:MOST_NAMES])]
-    if more := told[MOST_NAMES:]:
+    shown = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
+    quiet = [branch for branch in others if branch not in shown and _kinds(branch)]
+    out = [_of_branch(branch, data) for branch in (first, *shown[:MOST_NAMES])]
+    if more := shown[MOST_NAMES:]:
         out.append(f"{_names(more)} have stable states, too.")
     if quiet:
         verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
@@ -83,14 +83,14 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
 
 def _changes(intervals: Sequence[Interval], data: Mapping[str, Any], stop: str) -> Iterator[tuple[str, str]]:
     """States of intervals in order, each with what happens at its end; only the first of many."""
-    told = intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
-    for one, after in zip(told, intervals[1:], strict=False):
+    shown = intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
+    for one, after in zip(shown, intervals[1:], strict=False):
         where, what = change_in_words(one, after, data["branches"])
         yield _state(one, data), f"to {where}, where it {what}"
-    if len(intervals) == len(told):
-        yield _state(told[-1], data), f"to {stop}"
+    if len(intervals) == len(shown):
+        yield _state(shown[-1], data), f"to {stop}"
     else:
-        more = many(len(intervals) - 1 - len(told), "time")
+        more = many(len(intervals) - 1 - len(shown), "time")
         yield "its stability", f"changes {more} more before {data['parameter']} = {stop}"
 
 

@@ -46,11 +46,11 @@ def branch_data(
 ) -> dict[str, Any]:
     """A ``branch`` in a ``colour``; ``shapes`` are those of its rows, ``natural`` the sizes of load and ordinate.
 
-    Whether the rod is ``planar`` is told of stable rows.
+    Words of stable rows say whether the rod is ``planar``.
     """
     columns = branch["columns"]
     words = words_of(branch, planar=planar)
-    told = list(dict.fromkeys(words))
+    different = list(dict.fromkeys(words))
     ordinates = {name: _clear(columns[name], natural.get(name, 0.0)) for name in _listed(columns)} | _derived(shapes)
     return {
         "name": branch["name"],
@@ -65,8 +65,8 @@ def branch_data(
         "readings": readings_of(branch, natural),
         "pieces": [{"rows": [x.first, x.last], "kind": x.kind, "index": x.label} for x in pieces_of(branch)],
         "special": [_special(x) for x in branch["special"]],
-        "words": [told.index(each) for each in words],
-        "told": [asdict(each) for each in told],
+        "words": [different.index(each) for each in words],
+        "told": [asdict(each) for each in different],
         "spectrum": _spectrum(branch),
         "omega2": _without_noise(columns),
         "frequencies": frequencies_of(branch),
@@ -186,7 +186,7 @@ def loci_of(folder: Path, data: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> list[list[float]] | None:
-    """The stable region beside a locus: values of the second parameter, and its two bounds of the load there."""
+    """The stable region next to a locus: values of the second parameter, and its two bounds of the load there."""
     same = [other for other in loci if other["parameters"] == one["parameters"]]
     region = stable_region(one, same)
     return region and [column.tolist() for column in region]
