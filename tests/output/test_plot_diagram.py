@@ -19,7 +19,16 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
 from rodfem.file_format import LOCUS
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
-from rodfem.output.plot_diagram import UNEXPLAINED, between, dense, draw_branches, draw_diagram, drawn, figure_of
+from rodfem.output.plot_diagram import (
+    SINGULAR,
+    UNEXPLAINED,
+    between,
+    dense,
+    draw_branches,
+    draw_diagram,
+    drawn,
+    figure_of,
+)
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.style import PALETTE
 
@@ -239,3 +248,15 @@ def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
     found = between(branch, "ordinate")
     places = np.concatenate([s[row] + np.arange(1, 8) / 8 * (s[row + 1] - s[row]) for row in found])
     np.testing.assert_allclose(np.concatenate([x[:, 1] for x in found.values()]), places * (0.55 - places), atol=1e-12)
+
+
+def test_branches_of_one_hue_have_other_marks() -> None:
+    axes = Figure().subplots()
+    handles = draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
+    assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
+
+
+def test_a_singular_first_state_is_marked() -> None:
+    plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
+    assert SINGULAR not in legend(plain | {"singular_start": 0})
+    assert SINGULAR in legend(plain | {"singular_start": 1})

@@ -7,6 +7,7 @@ from math import cos, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
 
+import classics
 import h5py
 import numpy as np
 import pytest
@@ -19,10 +20,11 @@ from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.render import _read, draw_shape_safely
-from rodfem.output.solids import SIDES, profile_of, turn
+from rodfem.output.solids import FLATTEST, SIDES, profile_of, turn
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
 from rodfem.output.view import view_of
 from rodfem.problem.ends import (
+    Attachment,
     End,
     at,
     clamped,
@@ -297,3 +299,38 @@ def test_typical_state_is_well_inside_what_it_is_said_to_be() -> None:
     assert typical_state({"branches": [planar]})[2] == "3, stable in the plane, unstable in space, index 1"
     with pytest.raises(InputError, match="no states"):
         typical_state({"branches": [branch("straight", [])]})
+
+
+def test_what_is_no_spring_and_what_is_attached() -> None:
+    """A semi-tangential moment has a potential, but holds nothing; an attachment is an end without an end."""
+    moment = End(energy=lambda x, c: loads.semi_tangential(x.d1, x.d2, c.P))
+    assert supports_of(column(clamped(), moment), STRAIGHT | {"load": 4.0})["right end"].kind == "free"
+    foot = End(position=lambda c: (0.0, 0.0, 0.0), energy=lambda x, c: loads.rotational_spring(x.q, 3.0))
+    left = supports_of(column(foot, free(push)), STRAIGHT | {"load": 4.0})["left end"]
+    assert left.kind == "pin" and left.rotation_stiffness.any() and not left.translation_stiffness.any()
+    spring = Attachment(0.5, force=push, mass=lambda c: 2.0, energy=lambda x, c: loads.spring(x.r, (7.0, 0.0, 0.0)))
+    there = supports_of(column(attachments=(spring,)), STRAIGHT | {"load": 4.0})["attachment 1"]
+    assert (there.kind, there.s, there.mass, there.force[2]) == ("spring", 0.5, 2.0, -4.0)
+    assert there.translation_stiffness[0, 0] == pytest.approx(7.0)
+    assert supports_of(classics.ring(), STRAIGHT | {"load": 0.0}) == {}
+
+
+def test_a_load_arrow_has_the_direction_of_the_load(folder: Path) -> None:
+    """A follower force turns with the end: the arrow's head is where the director points."""
+    half = sqrt(0.5)
+    turned = {"q": np.tile([half, 0, half, 0], (31, 1)), "r": np.outer(S, E1)}  # d3 = e1
+    state = _read(saved(folder / "states.h5", column(clamped(), free(follower=push)), **turned), "straight", 0)
+    (arrow,) = [x for x in state.solids(Look(0.01, state.view())) if x.color == LOAD]
+    head, tail = (arrow.points[arrow.points[:, 0].argsort()[[0, -1]]]) @ E1
+    assert 1.0 < head < tail  # it pushes against the tip, from outside
+
+
+def test_cross_sections_stay_visible() -> None:
+    """Tapered as the stiffness is, ``B = a^4``; never flatter than a bound, and round without a record."""
+    s, angles = np.array([0.0, 1.0]), np.linspace(0, 2 * pi, 401)
+    flat = [np.array([np.diag([1.0, thin])] * 2) for thin in (1e-9, 0.0)]
+    both = (np.array([16 * np.eye(2), np.eye(2)]), *flat)
+    size = [[np.ptp(x, axis=0) for x in profile_of(s, (s, J), angles)] for J in both]
+    np.testing.assert_allclose(size[0], [[2, 2], [1, 1]], rtol=1e-6)
+    np.testing.assert_allclose([a / b for a, b in (*size[1], *size[2])], FLATTEST, rtol=1e-6)
+    np.testing.assert_allclose(np.ptp(profile_of(s, None, angles), axis=1), 2.0)

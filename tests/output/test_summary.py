@@ -209,3 +209,23 @@ def test_undecided_stability_is_no_stability() -> None:
     side = branch("branch 1", loads, [0] * 4, columns={"undecided": [1] * 4}, parent=["straight", 0])
     first = branch("straight", loads, [0] * 4) | {"special": [special("branch point", 1, 1.0, 0, 0)]}
     assert "of undecided stability" in said(first, side) and "unstable on its whole range" not in said(first, side)
+
+
+def test_states_that_have_one_energy_at_one_load_alone_coexist() -> None:
+    """As a ring twisted by none and by two turns does, where its natural state is twisted by one."""
+    loads, turns = [0.0, 0.5, 1.0, 1.5, 2.0], (0.0, 2.0)
+    ring, twisted = (
+        branch(f"twist {turn:g}", loads, [0] * 5, energy=[(turn - load) ** 2 for load in loads]) for turn in turns
+    )
+    coexist = "From P = 0 to 2 two stable states coexist, of twist 0 and twist 2"
+    assert coexist in said(ring, twisted, span=(0.0, 2.0)) and "coexist" not in said(ring, ring, span=(0.0, 2.0))
+
+
+def test_many_branches_and_many_intervals_are_counted() -> None:
+    unstable = [branch(f"branch {i}", [0.0, 4.0], [1, 1]) for i in range(9)]
+    straight = branch("straight", [0.0, 4.0], [0, 0])
+    assert "9 other branches are unstable on their whole range." in said(straight, *unstable)
+    assert "Branch 0 and branch 1 are unstable on their" in said(straight, *unstable[:2])
+    turns = [special("fold", i, float(i), i % 2 == 0, i % 2, multiplicity=1) for i in range(1, 12)]
+    winding = branch("straight", [float(i) for i in range(13)], [i % 2 for i in range(13)], special=turns)
+    assert "then its stability changes" in said(winding, span=(0.0, 12.0))

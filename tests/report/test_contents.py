@@ -15,6 +15,7 @@ from scipy.integrate import quad
 from rodfem.app.commands.list import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
+from rodfem.output.digits import number
 from rodfem.output.plot_frequencies import curves
 from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise
@@ -233,3 +234,8 @@ def test_readings_are_those_of_the_file() -> None:
     first, second, third, fourth = readings_of(one | {"ended": ""}, {"load": 10.0, "ordinate": 1.0})
     assert first == {"load": "0.00 (1e-02)", "ordinate": "0.500 (1e-03)"}
     assert second == {"load": "1.000000 (1e-06)"} and third == {} and fourth == {"load": "3 (given)"}
+
+
+def test_round_off_without_an_error_bar_is_zero() -> None:
+    assert number(1.8e-17, np.inf, scale=0.4) == "0 (no estimate)" != number(1.8e-17, np.inf)
+    assert number(0.25, np.inf, scale=0.4) == "0.25 (no estimate)"
