@@ -29,16 +29,7 @@ DRAFTS = ".*.part.*"
 """Names of drafts: that of the file, whose suffix says what it is to those who write it."""
 LOCK = ".lock"
 """File whose lock says that the folder is in use; it has the process and the host in words."""
-OF_A_RUN = (
-    "modes.h5",
-    "locus*.json",
-    "locus.png",
-    "diagram.png",
-    "shape.png",
-    "modes-*.png",
-    "modes-*.gif",
-    "report.html",
-)
+OF_A_RUN = ("modes.h5", "modes-*.*", "locus*.*", "diagram.png", "shape.png", "report.html")
 """Files that a run may leave with its diagram and states."""
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
 """Suffixes of pictures of diagrams; without one it is PNG."""
