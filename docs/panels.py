@@ -13,9 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, endings
-from rodfem.output.plot_diagram import ENDS
+from rodfem.output.plot_diagram import ENDS, between
 from rodfem.output.plot_frequencies import draw_into
-from rodfem.output.smooth import between
 from rodfem.output.style import END, HALO, PALETTE, axis_label
 
 MARKERS: dict[str, dict[str, Any]] = {

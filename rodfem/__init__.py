@@ -22,39 +22,26 @@ finds and classifies the points where it is lost, follows what branches off, and
     diagram = trace(column)       # without
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
-  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy` has a few).
-* **Stiffnesses**: :mod:`section <rodfem.problem.section>` has those of circles, tubes, rectangles, strips, ellipses,
-  from E, nu and dimensions, in any units.
+  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy` has a few);
+  :mod:`section <rodfem.problem.section>` has stiffnesses of cross-sections, in any units.
 * **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`, :func:`free`,
-  :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.  Positions and rotations may be functions
-  of the constants.
+  :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.
 * **Loads**: forces and moments of an :class:`End`; ``distributed``, ``follower`` and ``potential`` of a :class:`Scene`;
-  an :class:`Attachment` at any point (:mod:`rodfem.forms.loads` has potentials).  Loads without a potential make
-  ``Scene.conservative`` False: then frequencies are computed, and flutter.
+  an :class:`Attachment` at any point.  Loads without a potential make ``Scene.conservative`` False: then frequencies
+  are computed, and flutter.
 * **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
 * **Tables**: :func:`tabulated` is a function of the arclength through rows of numbers, :func:`path` one of the load.
-* **Ordinate**: the number that a diagram shows, at a point or an integral over the rod (its energy, its twist).
-* **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
-  of two of them.
-* **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
+* **Parameters**: any of them can be the load, :meth:`Scene.varying`; :meth:`Diagram.locus` follows a special point in
+  the plane of two of them.
 * **Diagram**: :func:`trace` computes without files and returns a :class:`Diagram`: ``diagram["branch 1"]``,
   ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
   ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.save(folder)``; :func:`load` reads a saved one.  :func:`run` is
-  the same with a terminal, files and pictures.
+  the same with a terminal, files and pictures, :func:`many` shares a list of scenes among the ranks.
 * **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one;
   ``solver.rebind(A=-1.5)`` is that of other constants, whose equations are not derived again.
-* **Is it stable?**: each point has its index; :meth:`Diagram.assess` decides by any of six methods, and says how far to
-  trust it; :meth:`Diagram.modes` finds how the rod moves in its left-most modes, and what a controller needs to know.
-* **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, and skips those that are finished.
-* **What is not connected**: :meth:`Diagram.search` looks for other equilibria at a load by deflation.
 
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
 that breaks one has a zero eigenvalue for it, which is counted as zero.
-
-Data flows one way: ``problem.scene`` -> ``fem.system`` (the bordered saddle point) -> ``fem.newton`` ->
-``stability.inertia`` -> ``continuation.follow``, ``continuation.special_points`` -> ``diagram.explorer`` ->
-``output.files``, and imports go the other way.  Pictures are drawn from saved files alone.  The mathematics is in
-``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
 Type checkers read ``__init__.pyi``.
@@ -65,8 +52,6 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from typing import Any
-
-from rodfem.lazy import submodule
 
 __version__ = "0.1.0"
 
@@ -116,19 +101,17 @@ __doc__ = f"{__doc__ or ''}\nPublic names, by module (``help(rodfem.Scene)`` des
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module, or a module of the package, at first use.
+    """Load a public name from its module at first use.
 
-    ``from rodfem import *`` asks for ``__all__``, and so does ``help(rodfem)``, which would print every class in full,
-    1400 lines: it gets none.
+    ``help(rodfem)`` asks for ``__all__`` as ``from rodfem import *`` does, but gets none: it would print every class.
     """
     if name == "__all__" and sys._getframe(1).f_globals.get("__name__") != "pydoc":
         return _NAMES
-    if name in _HOMES:
-        return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
-    module = submodule("rodfem", name)
-    if module is None:
+    if name not in _HOMES:
         raise AttributeError(f"module 'rodfem' has no attribute {name!r}; it has {', '.join(_NAMES)}")
-    return module
+    if name == "section":
+        return import_module("rodfem.problem.section")
+    return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:

@@ -16,8 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rodfem import __version__
 from rodfem.errors import Argument, InputError
 
@@ -26,17 +24,17 @@ if TYPE_CHECKING:
 
 PROGRAM = f"rodfem {__version__}"
 """Name and version of the program, as files have it."""
-MARK = "format"
-"""Entry, or attribute, that says what a file is."""
+KEYS = {"name": "format", "version": "format_version", "program": "program"}
+"""Entries of a mark, and the attributes that an HDF5 file has for them."""
 
 
 @dataclass(frozen=True)
 class Format:
-    """Format of a kind of file: its name, its version as written now, and which file of a run has it, in words."""
+    """Format of a kind of file: its name, which file of a run has it, in words, and its version as written now."""
 
     name: str
-    version: int
     file: str
+    version: int = 1
 
     def mark(self) -> dict[str, Any]:
         """Entry ``format`` of a JSON file."""
@@ -44,7 +42,7 @@ class Format:
 
     def mark_attributes(self) -> dict[str, Any]:
         """Attributes of an HDF5 file."""
-        return {MARK: self.name, f"{MARK}_version": self.version, "program": PROGRAM}
+        return {KEYS[key]: value for key, value in self.mark().items()}
 
     def check(self, data: Any, where: Path | str, needs: Sequence[str] = ()) -> None:
         """Check the contents of a JSON file, named ``where`` in what is raised.
@@ -54,51 +52,34 @@ class Format:
         """
         if not isinstance(data, Mapping):
             raise InputError(f"{where} has no entries by name, so it is no {self.name}: give {self.file}.")
-        mark = data.get(MARK)
-        if mark is not None and not isinstance(mark, Mapping):
-            mark = {"name": mark}
-        self._check(mark, data, where, needs)
+        self._check(data.get("format"), data, where, needs)
 
     def check_hdf5(self, file: h5py.File, needs: Sequence[str] = ()) -> None:
         """Check an open HDF5 file, as :meth:`check` does; ``needs`` are names of groups, or of attributes."""
-        mark = None
-        if MARK in file.attrs:
-            mark = {key: file.attrs.get(name) for key, name in zip(KEYS, self.mark_attributes(), strict=True)}
-        self._check(mark, {*file.attrs, *file}, file.filename, needs)
+        mark = {key: file.attrs.get(name) for key, name in KEYS.items()}
+        self._check(mark if mark["name"] else None, {*file.attrs, *file}, file.filename, needs)
 
     def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
-        if mark is not None:
-            self._check_mark(mark, where)
-        missing = [name for name in needs if name not in entries]
-        if missing:
+        if mark is not None and mark["name"] != self.name:
+            raise InputError(f"{where} has the format {mark['name']!r}, not {self.name!r}: give {self.file}.")
+        if mark is not None and mark["version"] > self.version:
+            program, version = mark["program"], mark["version"]
+            raise InputError(
+                f"{where} was written by {program}, in version {version} of the format {self.name!r}, and {PROGRAM} "
+                f"reads versions up to {self.version}: read it with {program} or newer, or run the scene again."
+            )
+        if missing := [name for name in needs if name not in entries]:
             raise InputError(
                 f"{where} has no {', '.join(missing)}, so it is no {self.name}, or one of a version of rodfem that "
                 f"wrote less: give {self.file}, or run the scene again."
             )
 
-    def _check_mark(self, mark: Mapping[str, Any], where: Path | str) -> None:
-        name, version, program = (mark.get(key) for key in KEYS)
-        if not isinstance(name, str) or name != self.name:
-            raise InputError(f"{where} has the format {name!r}, not {self.name!r}: give {self.file}.")
-        if not isinstance(version, (int, np.integer)) or isinstance(version, bool) or version < 1:
-            raise InputError(
-                f"{where} has version {version!r} of the format {self.name!r}, where a whole number from 1 on was "
-                "expected: run the scene again."
-            )
-        if version > self.version:
-            raise InputError(
-                f"{where} was written by {program}, in version {version} of the format {self.name!r}, and {PROGRAM} "
-                f"reads versions up to {self.version}: read it with {program} or newer, or run the scene again."
-            )
 
-
-KEYS = ("name", "version", "program")
-"""Entries of a mark."""
-DIAGRAM = Format("rodfem diagram", 1, "the diagram.json of a run")
-STATES = Format("rodfem states", 1, "the states.h5 of a run")
-MODES = Format("rodfem modes", 1, f"the modes.h5 of a run with {Argument('Plan', 'modes')}")
-LOCUS = Format("rodfem locus", 1, f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
-RESULT = Format("rodfem result", 1, "a rod-00000.json, rod-00001.json ... of rodfem.many")
+DIAGRAM = Format("rodfem diagram", "the diagram.json of a run")
+STATES = Format("rodfem states", "the states.h5 of a run")
+MODES = Format("rodfem modes", f"the modes.h5 of a run with {Argument('Plan', 'modes')}")
+LOCUS = Format("rodfem locus", f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
+RESULT = Format("rodfem result", "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
 UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, AttributeError, RuntimeError)

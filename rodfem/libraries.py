@@ -8,30 +8,23 @@ package of rodfem that computes imports this module before anything else.
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
 from types import ModuleType
 
-COMPLEX = "dolfinx-solver-complex"
-"""Name on PyPI of the dolfinx with a PETSc for complex numbers."""
-BEGIN_ANEW = (
-    "install rodfem in a new virtual environment, by 'pip install \"rodfem[pip]\"', which brings dolfinx-solver-real."
-)
-
 
 def _load() -> None:
-    """Load MPI first if the libraries come from PyPI; raises :class:`SetupError` if they are of a wrong build."""
+    """Load MPI first if the libraries come from PyPI; raises :class:`SetupError` if they are of several builds."""
     if find_spec("dolfinx_solver") is None:
         return
-    from rodfem.errors import SetupError  # the first of all modules needs no other until then
-
-    if _is_installed(COMPLEX):
-        raise SetupError(f"The PETSc of {COMPLEX} has complex numbers, which rodfem does not count with: {BEGIN_ANEW}")
     try:
         import_module("dolfinx_solver")
     except ImportError as mixed:
-        reason = str(mixed).partition(". ")[0]
-        raise SetupError(f"The libraries here are of several builds ({reason}): {BEGIN_ANEW}") from mixed
+        from rodfem.errors import SetupError  # the first of all modules needs no other until then
+
+        raise SetupError(
+            f"The libraries here are of several builds ({str(mixed).partition('. ')[0]}): install rodfem in a new "
+            "virtual environment, by 'pip install \"rodfem[pip]\"', which brings dolfinx-solver-real."
+        ) from mixed
 
 
 def optional(name: str, extra: str) -> ModuleType:
@@ -41,17 +34,8 @@ def optional(name: str, extra: str) -> ModuleType:
     except ImportError as missing:
         from rodfem.errors import SetupError
 
-        raise SetupError(
-            f'{name} is not installed: apt install python3-{name}, or pip install "rodfem[{extra}]".'
-        ) from missing
-
-
-def _is_installed(name: str) -> bool:
-    try:
-        distribution(name)
-    except PackageNotFoundError:
-        return False
-    return True
+        how = f'apt install python3-{name}, or pip install "rodfem[{extra}]"'
+        raise SetupError(f"{name} is not installed: {how}.") from missing
 
 
 _load()

@@ -1,18 +1,30 @@
-"""What ranks do together: a check on the first one that all hear of, and their end."""
+"""Ranks of one job: what they do together, how they fail, and how they end, with each other and with mpirun.
+
+A fault of a numerical library that all ranks have is a failure, as that of an iteration which does not converge; one
+that a rank has alone ends all of them.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
-from mpi4py import MPI
+from rodfem.errors import INTERRUPTED, ConvergenceError, InputError
 
-from rodfem.errors import INTERRUPTED, InputError
-from rodfem.launcher import end_with_launcher
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
+RANK = ("PMIX_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK")
+"""Variables of the environment, one of which every rank has."""
 PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
 """Seconds after which a rank that others do not join failed alone; between two looks for them at last, and at first."""
 
@@ -47,12 +59,87 @@ def all_come(comm: MPI.Comm) -> bool:
     return True
 
 
+# --- faults
+
+
+@contextmanager
+def as_failure(comm: MPI.Comm) -> Iterator[None]:
+    """Raise :class:`ConvergenceError`, with the reason, for a fault that all ranks of ``comm`` have.
+
+    One that a rank has alone stays what it is: nobody goes on without that rank.
+    """
+    from numpy.linalg import LinAlgError
+    from petsc4py import PETSc
+
+    try:
+        yield
+    except (PETSc.Error, MemoryError, LinAlgError, ArithmeticError) as fault:
+        if comm.size > 1 and not all_come(comm):
+            raise
+        raise ConvergenceError(in_words(fault)) from fault
+
+
+@contextmanager
+def without(what: str, comm: MPI.Comm, warn: Callable[[str], None]) -> Iterator[None]:
+    """Go on where the block fails, on all ranks of ``comm``, and ``warn`` of ``what`` did not happen and why."""
+    try:
+        with as_failure(comm):
+            yield
+    except ConvergenceError as trouble:
+        warn(f"{what}: {trouble}")
+
+
+def in_words(fault: BaseException) -> str:
+    """Sentence for a fault."""
+    from petsc4py import PETSc
+
+    PETSC_ERR_MEM = 55
+    if isinstance(fault, MemoryError) or (isinstance(fault, PETSc.Error) and fault.ierr == PETSC_ERR_MEM):
+        return "Memory is exhausted: use fewer elements or a lower degree."
+    if isinstance(fault, PETSc.Error):
+        return f"PETSc gave up ({str(fault).splitlines()[0]}): use smaller steps or another discretisation."
+    return f"Numbers allow no answer ({fault}): use smaller steps or another discretisation."
+
+
+# --- the end of a job
+
+
+def launched() -> bool:
+    """Whether this process is a rank of a job."""
+    return any(name in os.environ for name in RANK)
+
+
+def end_with_launcher() -> None:
+    """Have the system end this process with its parent, where that started it as a rank, and the system is Linux.
+
+    It could not do so itself: a rank that waits for another one in a message hears nothing.
+    """
+    if sys.platform == "linux" and launched():
+        PR_SET_PDEATHSIG = 1  # the signal that this process gets at the end of its parent
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def first_of_job(word: str) -> bool:
+    """Whether no other rank of this job, on this machine, has asked so for ``word``; yes where that is unknown."""
+    if not launched():  # a variable may be left from the job of a parent
+        return True
+    try:  # in the folder that all ranks of a job on one machine share, and that goes with the job
+        os.close(os.open(Path(os.environ["PMIX_SERVER_TMPDIR"]) / f"rodfem-{word}", os.O_CREAT | os.O_EXCL))
+    except FileExistsError:
+        return False
+    except (KeyError, OSError):
+        pass
+    return True
+
+
 @cache
 def end_together() -> None:
     """From now on a rank that fails alone, or the death of mpirun, leaves no other rank waiting for a message.
 
     An error that nobody catches is shown as ever, and ends all ranks.  Nothing changes where there is one rank.
     """
+    from mpi4py import MPI
+
     if MPI.COMM_WORLD.size == 1:
         return
     end_with_launcher()

@@ -11,7 +11,7 @@ from math import copysign
 from sys import float_info
 
 ROUND_OFF = 4 * float_info.epsilon
-"""Relative distance of neighbours that are told apart."""
+"""Relative distance of neighbours."""
 
 
 def zero_between(f: Callable[[float], float], a: float, b: float, within: float) -> float:

@@ -1,4 +1,4 @@
-"""Timing: seconds spent in assembly, solves and stability."""
+"""Seconds spent in assembly, solves and stability."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Clock:
         self._mark = now
 
     def __call__(self, name: str) -> Clock:
-        """Measure the block of a ``with`` statement under ``name``."""
+        """Measure a block under ``name``."""
         self._next = name
         return self
 

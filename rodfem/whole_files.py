@@ -1,8 +1,8 @@
 """Files that are written whole: a kill at any moment, or a full disk, leaves the old file or the new one, readable.
 
-A file is written as a draft beside its place, and then takes that place in one step.  Numbers are flushed to the disk
-before, so that a power cut does not lose them; pictures can be drawn again.  A draft that a killed process left is
-removed by the next run in its folder (:mod:`rodfem.output.folder`).
+A file is written as a draft next to its place, and then takes that place in one step.  Numbers are flushed to the disk
+before, so that a power cut does not lose them; pictures can be drawn again.  One process writes into a folder at a
+time, and removes the drafts that killed ones left.
 
 HDF5 files are made in memory: the library does not recover from a full disk, and a file to which it appends is
 unreadable where it is killed.  An addition therefore costs a copy of the file, some 4 ms for each MB.
@@ -10,21 +10,31 @@ unreadable where it is killed.  An addition therefore costs a copy of the file, 
 
 from __future__ import annotations
 
+import fcntl
 import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+import socket
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rodfem.errors import Argument, InputError, Remedy
+from rodfem.ranks import on_first
 
 if TYPE_CHECKING:
     import h5py
+    from mpi4py import MPI
 
 DRAFTS = ".*.part.*"
 """Names of drafts: that of the file, whose suffix says what it is to those who write it."""
-NO_MEMORY = "unable to allocate memory"
-"""Words of the HDF5 library."""
+LOCK = ".lock"
+"""File whose lock says that the folder is in use; it has the process and the host in words."""
+OF_A_RUN = ("modes.h5", "modes-*.*", "locus*.*", "diagram.png", "shape.png", "report.html")
+"""Files that a run may leave with its diagram and states."""
+PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
+"""Suffixes of pictures of diagrams; without one it is PNG."""
+FOLDERS: set[Path] = set()
+"""Folders whose lock this process has."""
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
 
@@ -81,8 +91,90 @@ def with_added(path: Path, add: Callable[[h5py.File], None], *, first: bool) -> 
             add(file)
             file.flush()
             image: bytes = file.id.get_file_image()
-    except OSError as error:  # as the library calls it
-        if NO_MEMORY in str(error):
+    except OSError as error:
+        if "unable to allocate memory" in str(error):
             raise MemoryError(str(error)) from error
         raise
     return image
+
+
+# --- the folder of a run
+
+
+@contextmanager
+def locked(folder: Path, comm: MPI.Comm) -> Iterator[None]:
+    """Make ``folder``, and keep other processes from writing into it; collective over ``comm``.
+
+    The system frees the lock with the end of the process, however it ends.  Drafts of processes that were killed are
+    removed.  Raises :class:`InputError` on every rank where the folder cannot be written, or is in use.
+    """
+    place = folder.resolve()
+    if comm.bcast(place in FOLDERS):
+        yield
+        return
+    files: list[int] = []
+    on_first(comm, lambda: files.append(_acquired(folder)))
+    FOLDERS.update([place] if files else [])
+    try:
+        yield
+        comm.barrier()  # all have written what they write
+    finally:
+        FOLDERS.discard(place)
+        for file in files:
+            with suppress(OSError):  # the folder is gone
+                (folder / LOCK).unlink()
+            os.close(file)
+    comm.barrier()  # nobody sees the lock any more
+
+
+def _acquired(folder: Path) -> int:
+    """Descriptor of the lock of a folder, which is made, and in which there are no drafts any more."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        while (file := _lock(folder)) is None:
+            pass
+        os.truncate(file, 0)
+        os.pwrite(file, f"process {os.getpid()} on {socket.gethostname()}".encode(), 0)
+        for draft in folder.glob(DRAFTS):
+            draft.unlink()
+    return file
+
+
+def _lock(folder: Path) -> int | None:
+    """Descriptor of the lock; None if another process has just removed it."""
+    file = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(os.fstat(file), os.stat(folder / LOCK)):
+            return file
+    except FileNotFoundError:
+        pass
+    except (BlockingIOError, PermissionError):
+        holder = os.pread(file, 300, 0).decode(errors="replace") or "another process"
+        os.close(file)
+        raise InputError(f"The output folder {folder} is in use by {holder}", ANOTHER_FOLDER) from None
+    os.close(file)
+    return None
+
+
+def remove_earlier(folder: Path) -> None:
+    """Remove what an earlier run left with its diagram and states, which the next save replaces."""
+    with writing(folder):
+        for pattern in OF_A_RUN:
+            for file in folder.glob(pattern):
+                file.unlink()
+
+
+def picture_at(path: Path, suffixes: Sequence[str]) -> None:
+    """Make the folder of a picture; raises :class:`InputError` where it cannot be written, or has another suffix."""
+    if path.suffix.lower() not in suffixes:
+        raise InputError(
+            f"The picture {path} has an unknown format: choose one of {', '.join(filter(None, suffixes))}."
+        )
+    if path.is_dir():
+        raise InputError(f"The picture {path} is a folder: give a name in it, as in {path / 'picture.png'}.")
+    with writing(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe = path.parent / f".probe-{os.getpid()}"
+        probe.write_text("")
+        probe.unlink()

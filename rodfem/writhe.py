@@ -26,32 +26,23 @@ FEW, MOST = 16, 1024
 def writhe(curve: Callable[[Floats], Floats], ends: tuple[float, float], to: float = 1e-3) -> float:
     """Writhe of a smooth curve; of an open one the Gauss integral over it alone.
 
-    Parameters
-    ----------
-    curve
-        Points (n, 3) at parameters (n,).
-    ends
-        Parameters between which the curve is; it is closed where its points there are one.
-    to
-        Change when edges are halved, relative to it or to one, with which it is accepted: about ten times its error.
+    ``curve`` has points (n, 3) at parameters (n,) between its ``ends``; it is closed where its points there are one.
+    Edges are halved until that changes the writhe by less than ``to``, relative to it or to one: ten times its error.
     """
-    polygons = [of_polygon(_points(curve, ends, n)) for n in (FEW, 2 * FEW)]
-    found, before, edges = _extrapolated(polygons), np.inf, 4 * FEW
-    while abs(found - before) > to * max(1.0, abs(found)) and edges <= MOST:
-        polygons.append(of_polygon(_points(curve, ends, edges)))
-        found, before, edges = _extrapolated(polygons), found, 2 * edges
-    return found
 
+    def polygon(edges: int) -> float:
+        points = curve(np.linspace(*ends, edges + 1))
+        if np.allclose(points[0], points[-1], rtol=0.0, atol=SAME_PLACE * float(np.ptp(points))):
+            points[-1] = points[0]
+        return of_polygon(points)
 
-def _points(curve: Callable[[Floats], Floats], ends: tuple[float, float], edges: int) -> Floats:
-    points = curve(np.linspace(*ends, edges + 1))
-    if np.allclose(points[0], points[-1], rtol=0.0, atol=SAME_PLACE * float(np.ptp(points))):
-        points[-1] = points[0]
-    return points
-
-
-def _extrapolated(polygons: list[float]) -> float:
-    return (4 * polygons[-1] - polygons[-2]) / 3
+    coarse, edges, found = polygon(FEW), 2 * FEW, np.inf
+    while True:
+        fine = polygon(edges)
+        before, found = found, (4 * fine - coarse) / 3
+        if abs(found - before) <= to * max(1.0, abs(found)) or edges >= MOST:
+            return float(found)
+        coarse, edges = fine, 2 * edges
 
 
 def of_polygon(points: Floats) -> float:

@@ -248,8 +248,8 @@ FAULTS = {
     ),
     "no-new-folders": Fault(
         "rodfem/whole_files.py",
-        "        path.parent.mkdir(parents=True, exist_ok=True)\n",
-        "",
+        "        path.parent.mkdir(parents=True, exist_ok=True)\n        try:\n",
+        "        try:\n",
         "tests/codim2/test_locus.py",
     ),
     "mirror-images-by-what-richer-meshes-decide": Fault(
@@ -511,9 +511,9 @@ FAULTS = {
         "tests/codim2/test_locus.py",
     ),
     "loci-of-small-loads-start-everywhere": Fault(
-        "rodfem/report/loci.py",
-        'natural.get("load", 1.0), natural.get(',
-        "1.0, dict().get(",
+        "rodfem/report/branches.py",
+        '(natural["load"], natural["ordinate"])',
+        "(1.0, 1.0)",
         "tests/codim2/test_locus.py",
     ),
     "moments-without-a-natural-size": Fault(
@@ -664,7 +664,7 @@ FAULTS = {
         "rodfem/fem/equations.py", 'others["potential"] = potential', 'others["potential"] = L', WORK
     ),
     "writhe-of-one-polygon": Fault(
-        "rodfem/writhe.py", "(4 * polygons[-1] - polygons[-2]) / 3", "polygons[-1]", "tests/report/test_contents.py"
+        "rodfem/writhe.py", "(4 * fine - coarse) / 3", "fine", "tests/report/test_contents.py"
     ),
     "fewer-eigenvalues-than-asked-for": Fault(
         "rodfem/stability/assessment.py",
@@ -739,10 +739,10 @@ FAULTS = {
         "rodfem/problem/scene.py", '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "tests/problem/test_mass.py"
     ),
     "pictures-draw-chords": Fault(
-        "rodfem/output/smooth.py",
+        "rodfem/output/plot_diagram.py",
         "SEEN = 2e-4",
         "SEEN = 1e3",
-        "tests/output/test_smooth.py",
+        "tests/output/test_plot_diagram.py",
     ),
     # rows
     "rows-of-another-branch-are-kept": Fault(
@@ -875,7 +875,7 @@ FAULTS = {
         "tests/stability/test_soft_modes.py",
     ),
     "segments-beside-undecided-rows": Fault(
-        "rodfem/output/intervals.py",
+        "rodfem/output/pieces.py",
         "if self.kind == UNDECIDED and self.soft else",
         "if False else",
         "tests/output/test_summary.py",
@@ -1045,7 +1045,7 @@ FAULTS = {
         "rodfem/output/files.py", "_trimmed(value[row])", "_trimmed(value[row - 1])", f"{FILES} {DIAGRAM}"
     ),
     "files-of-two-runs": Fault(
-        "rodfem/output/contents.py",
+        "rodfem/output/states.py",
         'if run != data.get("run"):',
         "if False:",
         f"{FILES} {KILLS} tests/output/test_foreign_files.py",
@@ -1057,8 +1057,8 @@ FAULTS = {
         f"{FILES} tests/output/test_foreign_files.py",
     ),
     "folder-without-a-lock": Fault(
-        "rodfem/output/folder.py",
-        "if comm.bcast(place in HELD):",
+        "rodfem/whole_files.py",
+        "if comm.bcast(place in FOLDERS):",
         "if comm.bcast(True):",
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
     ),
@@ -1338,7 +1338,7 @@ FAULTS = {
         IN_WORDS,
     ),
     "bars-of-loci-stay-off-the-page": Fault(
-        "rodfem/report/loci.py",
+        "rodfem/report/branches.py",
         "found.append([] if None in pair else",
         "found.append([] if True else",
         IN_WORDS,
@@ -1356,7 +1356,7 @@ FAULTS = {
         LOCI,
     ),
     "stable-side-beyond-a-crossing": Fault(
-        "rodfem/output/stable_region.py", "if crossed or not side", "if not side", LOCI
+        "rodfem/output/plot_locus.py", "if crossed or not side", "if not side", LOCI
     ),
     "locus-through-an-imperfection": Fault(
         "rodfem/codim2/criteria.py", "curve.part > IMPERFECT", "curve.part > 1e9", LOCI

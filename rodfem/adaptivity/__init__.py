@@ -1,6 +1,3 @@
 """Enough digits: error bars, graded meshes, an accuracy kept along a branch."""
 
 from rodfem import libraries  # noqa: F401, before all that computes
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.adaptivity")

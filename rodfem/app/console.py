@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _versions() -> str:
     """A line for the program, and one for each library that computes."""
-    from rodfem.output.origin import versions  # imports dolfinx, which takes a second
+    from rodfem.output.files import versions  # imports dolfinx, which takes a second
 
     return "\n".join(f"{name:<8}{version}" for name, version in {"rodfem": rodfem.__version__, **versions()}.items())
 
@@ -109,13 +109,13 @@ def explain(words: Sequence[str]) -> None:
 
 def info(words: Sequence[str]) -> None:
     """Special points, meshes and accuracy of a saved diagram."""
-    from rodfem.output.contents import read_diagram
+    from rodfem.file_format import DIAGRAM, read_json
     from rodfem.output.summary import in_sentences
     from rodfem.output.words import table_of
 
     parser = Parser(prog="rodfem info", description=_summary(info))
     parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
-    data = read_diagram(parser.parse_args(words).folder / "diagram.json", OF_INFO)
+    data = read_json(parser.parse_args(words).folder / "diagram.json", DIAGRAM, OF_INFO)
     constants = ", ".join(f"{name} = {value:.6g}" for name, value in data["constants"].items())
     lines = [f"{data.get('title', data['scene'])}: {constants or 'no constants'}"]
     for mesh in data["meshes"]:
@@ -145,11 +145,11 @@ def list_diagrams(words: Sequence[str]) -> None:
 
 def _diagram(file: Path) -> str:
     """Line of a diagram; a file that is none has its reason in place of numbers."""
-    from rodfem.output.contents import read_diagram
+    from rodfem.file_format import DIAGRAM, read_json
 
     name = str(file.parent)
     try:
-        data = read_diagram(file, ("scene", "parameter", "branches"))
+        data = read_json(file, DIAGRAM, ("scene", "parameter", "branches"))
         written = datetime.fromtimestamp(file.stat().st_mtime, UTC).isoformat()
         date = str((data.get("origin") or {}).get("date") or written)[: HEADS["date"]]
         branches = data["branches"]

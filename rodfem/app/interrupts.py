@@ -15,7 +15,7 @@ from types import FrameType, TracebackType
 from typing import NoReturn
 
 from rodfem.errors import INTERRUPTED
-from rodfem.launcher import end_with_launcher, first_of_job, launched
+from rodfem.ranks import end_with_launcher, first_of_job, launched
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 KEPT = "interrupted; what was finished is kept"

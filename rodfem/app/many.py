@@ -17,13 +17,12 @@ from mpi4py import MPI
 from rodfem.app.interrupts import held
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.faults import as_failure
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
-from rodfem.output.folder import locked
 from rodfem.problem.arguments import checked, each, function, path
 from rodfem.problem.scene import Scene
-from rodfem.ranks import end_together, on_first
+from rodfem.ranks import as_failure, end_together, on_first
+from rodfem.whole_files import locked
 
 Work = Callable[[Scene], dict[str, Any]]
 

@@ -30,12 +30,12 @@ from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes, save_modes
 from rodfem.modes.typical import typical_modes
 from rodfem.output.files import save_json, save_run
-from rodfem.output.folder import locked, remove_earlier
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
 from rodfem.stability.assessment import Assessor, Verdict
+from rodfem.whole_files import locked, remove_earlier
 
 if TYPE_CHECKING:
     from rodfem.codim2.locus import Locus

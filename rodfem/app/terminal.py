@@ -23,7 +23,6 @@ from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
-from rodfem.launcher import RANK
 from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_decimals, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
@@ -31,6 +30,7 @@ from rodfem.output.table import row_data, special_data
 from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, law_in_words, many, table_of
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
+from rodfem.ranks import RANK
 from rodfem.stability.assessment import Verdict
 from rodfem.stability.soft_mode import index_range
 from rodfem.timing import WORK, Clock

@@ -1,6 +1,3 @@
 """One branch: pseudo-arclength continuation, test functions, special points, their normal forms."""
 
 from rodfem import libraries  # noqa: F401, before all that computes
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.continuation")

@@ -1,6 +1,3 @@
 """Equilibria that no branch has reached."""
 
 from rodfem import libraries  # noqa: F401, before all that computes
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.deflation")

@@ -24,22 +24,20 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.modes.typical import typical_modes
-from rodfem.output.files import as_data, save_run
-from rodfem.output.folder import PICTURES, locked, picture_at
-from rodfem.output.origin import origin
+from rodfem.output.files import as_data, origin, save_run
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
-from rodfem.whole_files import draft_of
+from rodfem.whole_files import PICTURES, draft_of, locked, picture_at
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rodfem.codim2.locus import Locus
-    from rodfem.output.snapshot import Snapshot
+    from rodfem.output.render import Snapshot
     from rodfem.report.page import Page
 
 
@@ -360,7 +358,7 @@ class Diagram:
         A notebook shows what is returned.  Raises :class:`ImportError` where PyVista is missing, and
         :class:`~rodfem.errors.InputError` for a path that is no PNG's.
         """
-        from rodfem.output.snapshot import snapshot
+        from rodfem.output.render import snapshot
 
         self._can_write(path, (".png",))
         shown = point.point if isinstance(point, SpecialPoint) else point

@@ -20,8 +20,8 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint, same
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM
-from rodfem.output.contents import check_run
 from rodfem.output.files import load_json, load_state
+from rodfem.output.states import check_run
 from rodfem.output.table import COLUMNS, SPECIAL, point_values, special_values
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene

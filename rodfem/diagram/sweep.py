@@ -29,7 +29,7 @@ from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_f
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.faults import as_failure, without
+from rodfem.ranks import as_failure, without
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.frequencies import REAL, Frequencies, named

@@ -29,7 +29,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
 from rodfem.errors import ConvergenceError
-from rodfem.faults import as_failure, without
+from rodfem.ranks import as_failure, without
 from rodfem.tolerances import DRIFT, ROUND_OFF
 
 NO_CONVERGENCE = "no convergence"

@@ -24,7 +24,7 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from rodfem import code_cache, compat
-from rodfem.beside import Job
+from rodfem.code_cache import Job
 from rodfem.errors import SceneError, SetupError
 from rodfem.linalg import compiler
 

@@ -4,6 +4,3 @@ Only the registry of methods (:mod:`rodfem.stability.registry`) knows of it.
 """
 
 from rodfem import libraries  # noqa: F401, before all that computes
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.kumar_healey")

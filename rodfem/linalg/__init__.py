@@ -1,6 +1,3 @@
 """Matrices and factorisations, which know no rods."""
 
 from rodfem import libraries  # noqa: F401, before all that computes
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.linalg")

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rodfem import code_cache
-from rodfem.beside import Job
+from rodfem.code_cache import Job
 from rodfem.errors import SetupError
 from rodfem.linalg import compiler
 

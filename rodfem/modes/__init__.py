@@ -1,6 +1,3 @@
 """Motion of a rod in a perturbation, and its left-most modes."""
 
 from rodfem import libraries  # noqa: F401, before all that computes
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.modes")

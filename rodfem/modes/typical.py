@@ -9,9 +9,9 @@ import numpy as np
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.faults import as_failure
 from rodfem.modes.eigenmotions import Eigenmotions
 from rodfem.modes.recorded import Typical
+from rodfem.ranks import as_failure
 
 EVENLY = 5
 """States of a branch, evenly along it."""

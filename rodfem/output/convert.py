@@ -4,95 +4,23 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodfem.errors import InputError
-from rodfem.file_format import STATES, UNREADABLE
+from rodfem.file_format import DIAGRAM, read_json
 from rodfem.modes.modes import load_modes, rows_with_modes
-from rodfem.output.contents import read_diagram
-from rodfem.output.profiles import POINTS, PROFILES, profiles_of
+from rodfem.output.states import rows_of
 from rodfem.output.words import row_of
-from rodfem.problem.quaternions import directors
 from rodfem.whole_files import with_added, write_whole
 
 Floats = NDArray[np.float64]
-DRIFT = "drift"
-"""Beginning of the names of scalars that are zero at every equilibrium."""
 KINDS = ("Vertices", "Lines", "Strips", "Polygons")
 """Kinds of cells of PolyData, in the order of their offsets."""
-
-
-@dataclass(frozen=True)
-class Rows:
-    """All rows of a branch.
-
-    Attributes
-    ----------
-    name
-        Of the branch.
-    columns
-        Numbers of the rows, by name (rows,): load, ordinate, index, ...
-    fields
-        At the nodes, by name, an array (m, k) for each row: ``s``, ``r``, ``q``, directors ``d1`` to ``d3``, the nodal
-        unknowns of the scene, and, along the directors, strains ``v``, curvatures ``k``, contact force ``n`` and moment
-        ``m``, which a file of an earlier version lacks.
-    """
-
-    name: str
-    columns: dict[str, Floats]
-    fields: dict[str, list[Floats]]
-
-
-def rows_of(folder: Path) -> Iterator[Rows]:
-    """Branches of the run in a folder, in order; raises :class:`InputError` where files are missing or do not fit."""
-    import h5py
-
-    data, path = read_diagram(folder / "diagram.json", ("branches", "parameter")), folder / "states.h5"
-    try:
-        with h5py.File(path, "r") as file:
-            STATES.check_hdf5(file, ("branches",))
-            for branch in data["branches"]:
-                group = file["branches"][branch["name"]]
-                stored = {name: np.asarray(x) for name, x in group.items() if isinstance(x, h5py.Dataset)}
-                yield Rows(branch["name"], _columns(branch["columns"], stored), _fields(stored))
-    except UNREADABLE as trouble:
-        if isinstance(trouble, InputError):
-            raise
-        raise InputError(
-            f"{path} does not hold the states of diagram.json beside it: run the scene again."
-        ) from trouble
-
-
-def _columns(columns: Mapping[str, list[Any]], stored: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Numbers of each row: those of the diagram, nan where there is none, and the scalar unknowns of the states."""
-    out = {}
-    for name, column in columns.items():
-        if all(x is None or isinstance(x, (int, float)) for x in column):
-            out[name] = np.array([np.nan if x is None else x for x in column])
-    scalars = {name: x for name, x in stored.items() if x.ndim == 1 and not name.startswith(DRIFT)}
-    return scalars | out
-
-
-def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
-    """Nodal values of each row, without the nodes that only rows of finer meshes have."""
-    s, out = stored["s"], dict[str, list[Floats]]()
-    others = {POINTS, *PROFILES, *PROFILES.values()}
-    nodal = {name: x for name, x in stored.items() if x.shape[:2] == s.shape and name not in others}
-    for row, there in enumerate(np.isfinite(s)):
-        here = {name: x[row, there] for name, x in nodal.items()}
-        frames = directors(here["q"])
-        here |= {f"d{i + 1}": frames[:, :, i] for i in range(3)}
-        if (profiles := profiles_of(stored, row)) is not None:
-            here |= {symbol: profiles.at_nodes(symbol, here["s"]) for symbol in PROFILES}
-        for name, values in here.items():
-            out.setdefault(name, []).append(values)
-    return out
+CELLS = ("NumberOfCells", "NumberOfConnectivityIds", "Offsets", "Connectivity")
 
 
 def to_vtkhdf(folder: Path, target: Path) -> list[Path]:
@@ -102,11 +30,16 @@ def to_vtkhdf(folder: Path, target: Path) -> list[Path]:
     """
     made = []
     for rows in rows_of(folder):
-        path = target / f"{rows.name.replace(' ', '-')}.vtkhdf"
+        path = target / f"{file_name(rows.name)}.vtkhdf"
         fields = {name: values for name, values in rows.fields.items() if name != "r"}
         write_curves(path, rows.fields["r"], fields, rows.columns)
         made.append(path)
     return made + [_write_modes(place, folder, target) for place in rows_with_modes(folder / "modes.h5")]
+
+
+def file_name(branch: str) -> str:
+    """Name of a branch in that of a file."""
+    return branch.replace(" ", "-").replace("/", "-")
 
 
 def _write_modes(place: tuple[str, int], folder: Path, target: Path) -> Path:
@@ -118,7 +51,7 @@ def _write_modes(place: tuple[str, int], folder: Path, target: Path) -> Path:
         fields[f"displacement {i}"] = [modes.displacement[i - 1].real]
         fields[f"rotation {i}"] = [modes.rotation[i - 1].real]
         numbers[f"mu {i}"] = np.array([value])
-    path = target / f"modes-{branch.replace(' ', '-')}-{row}.vtkhdf"
+    path = target / f"modes-{file_name(branch)}-{row}.vtkhdf"
     write_curves(path, [modes.r], fields, numbers)
     return path
 
@@ -130,48 +63,35 @@ def write_curves(
 
     A step is one row of a branch, a polyline with its fields; its time is the number of the row.  The format is VTK's
     own: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html, version 2.0, ``PolyData`` with
-    steps.
-
-    ``path`` is the file, by custom ``*.vtkhdf``; ``curves`` are the points (m, 3) of each step, where m may differ from
-    step to step, ``fields`` by name values (m,) or (m, k) at the points of each step, and ``numbers`` by name one
-    number for each step, (steps,).  Raises :class:`~rodfem.errors.InputError` where the file cannot be written.
+    steps.  ``path`` is the file, ``curves`` are the points (m, 3) of each step, where m may differ from step to step,
+    ``fields`` by name values (m,) or (m, k) at the points of each step, and ``numbers`` by name one number a step.
     """
-    sizes = np.array([len(curve) for curve in curves])
-    steps = len(sizes)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    sizes, steps = np.array([len(curve) for curve in curves]), len(curves)
+    starts, each = np.cumsum(sizes) - sizes, np.arange(steps)
 
-    def add(file: object) -> None:
-        root = file.create_group("VTKHDF")  # type: ignore[attr-defined]
+    def add(file: Any) -> None:
+        root = file.create_group("VTKHDF")
         root.attrs["Version"] = (2, 0)
         root.attrs.create("Type", np.bytes_("PolyData"))
         root["NumberOfPoints"], root["Points"] = sizes, np.concatenate(curves)
+        none = np.zeros(steps, int)
+        offsets = np.column_stack([none, sizes]).ravel()  # each step's are one more than it has cells
+        lines = np.ones(steps, int), sizes, offsets, np.concatenate([np.arange(m) for m in sizes])
         for kind in KINDS:
-            cells = root.create_group(kind)
-            lines = kind == "Lines"
-            cells["NumberOfCells"] = np.full(steps, int(lines))
-            cells["NumberOfConnectivityIds"] = sizes if lines else np.zeros(steps, int)
-            # each step has an array of offsets of its own, one longer than it has cells
-            cells["Offsets"] = np.array([x for m in sizes for x in (0, m)]) if lines else np.zeros(steps, int)
-            cells["Connectivity"] = np.concatenate([np.arange(m) for m in sizes]) if lines else np.zeros(0, int)
-        at_points, per_step = root.create_group("PointData"), root.create_group("FieldData")
+            parts = lines if kind == "Lines" else (none, none, none, none[:0])
+            for name, part in zip(CELLS, parts, strict=True):
+                root[f"{kind}/{name}"] = part
         time = root.create_group("Steps")
         time.attrs["NSteps"] = steps
         time["Values"] = np.arange(steps, dtype=float)
-        time["PartOffsets"], time["NumberOfParts"] = np.arange(steps), np.ones(steps, int)
-        time["PointOffsets"] = starts
-        before = np.zeros((steps, len(KINDS)), int)
-        before[:, 1] = np.arange(steps)
-        time["CellOffsets"] = before
-        places = np.zeros((steps, len(KINDS)), int)
-        places[:, 1] = starts
-        time["ConnectivityIdOffsets"] = places
-        offsets = time.create_group("PointDataOffsets")
+        time["PartOffsets"], time["NumberOfParts"], time["PointOffsets"] = each, np.ones(steps, int), starts
+        here = np.array([kind == "Lines" for kind in KINDS], dtype=int)
+        time["CellOffsets"], time["ConnectivityIdOffsets"] = np.outer(each, here), np.outer(starts, here)
         for name, values in fields.items():
-            at_points[name], offsets[name] = np.concatenate(values), starts
-        offsets, shapes = time.create_group("FieldDataOffsets"), time.create_group("FieldDataSizes")
+            root[f"PointData/{name}"], time[f"PointDataOffsets/{name}"] = np.concatenate(values), starts
         for name, column in numbers.items():
-            per_step[name], offsets[name] = column, np.arange(steps)
-            shapes[name] = np.ones((steps, 2), int)
+            root[f"FieldData/{name}"], time[f"FieldDataOffsets/{name}"] = column, each
+            time[f"FieldDataSizes/{name}"] = np.ones((steps, 2), int)
 
     write_whole({path: with_added(path, add, first=True)})
 
@@ -181,7 +101,7 @@ def to_csv(folder: Path, target: Path) -> list[Path]:
 
     Raises :class:`InputError` for a folder without a run.
     """
-    data = read_diagram(folder / "diagram.json", ("branches", "parameter"))
+    data = read_json(folder / "diagram.json", DIAGRAM, ("branches",))
     rows, special = list[dict[str, Any]](), list[dict[str, Any]]()
     for branch in data["branches"]:
         about = {"branch": branch["name"]}

@@ -1,4 +1,4 @@
-"""A bifurcation diagram as plain columnar data: made from branches, saved to ``diagram.json`` and ``states.h5``.
+"""Files of a run: a diagram as plain columnar data, ``diagram.json``, and its states, ``states.h5``.
 
 ``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium; ``meaning`` has each in
 words) and its special points, each of which is a row too.  ``states.h5`` holds the same rows as shapes and fields in
@@ -8,22 +8,27 @@ natural order along the rod, whatever the number of ranks: to draw them, or to s
 
 from __future__ import annotations
 
+import ctypes
 import json
+import platform
+import shlex
+import sys
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rodfem import compat
 from rodfem.continuation.branch import Branch, not_followed
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import InputError
 from rodfem.fem.system import System
-from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
+from rodfem.file_format import DIAGRAM, STATES, UNREADABLE, read_json
 from rodfem.modes.perturbation import Motion, Motions
 from rodfem.modes.recorded import Typical
 from rodfem.modes.recorded import write as write_typical
-from rodfem.output.contents import read_diagram
 from rodfem.output.table import COLUMNS, branch_data
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path
@@ -55,9 +60,8 @@ def as_data(
 ) -> dict[str, Any]:
     """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
 
-    ``systems`` are those of the meshes that the points name by their number; ``discretization`` is the one with most
-    unknowns, and ``meshes`` has all.  ``branches`` are those of the diagram, ``span`` the range of the load,
-    ``accuracy`` that of the plan; ``clock`` has the times.
+    ``systems`` are those of the meshes that the points of ``branches`` name by their number; ``discretization`` is the
+    one with most unknowns.  ``span`` is the range of the load, ``accuracy`` that of the plan; ``clock`` has the times.
     """
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
@@ -88,6 +92,13 @@ def as_data(
     }
 
 
+def mesh_of(system: System) -> dict[str, Any]:
+    """Discretisation, as files record it."""
+    d = system.fields.discretization
+    sizes = {"elements": d.elements, "degree": d.degree, "unknowns": system.fields.unknowns}
+    return {"formulation": d.formulation, **sizes}
+
+
 def _timing(clock: Clock, points: int) -> dict[str, Any]:
     """Times of the parts of a run, of all of it, and of each of so many points."""
     parts = {f"{name.replace(' ', '_')}_s": clock.seconds.get(name, 0.0) for name in PARTS}
@@ -95,13 +106,44 @@ def _timing(clock: Clock, points: int) -> dict[str, Any]:
 
 
 def _mesh_data(system: System) -> dict[str, Any]:
-    fields, d = system.fields, system.fields.discretization
+    vertices = system.fields.discretization.vertices
+    sizes = {name: size for name, size in mesh_of(system).items() if name != "formulation"}
+    return sizes | {"vertices": None if vertices is None else list(vertices)}
+
+
+def origin() -> dict[str, Any]:
+    """Entry ``origin`` of ``diagram.json``: what reproduces the run."""
     return {
-        "elements": d.elements,
-        "degree": d.degree,
-        "unknowns": fields.unknowns,
-        "vertices": None if d.vertices is None else list(d.vertices),
+        "command": shlex.join(sys.orig_argv),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the libraries that compute, each by its name in lower case."""
+    from slepc4py import SLEPc  # after what compat loads first
+
+    found = {
+        "python": platform.python_version(),
+        "dolfinx": compat.dolfinx.__version__,
+        "petsc": ".".join(map(str, compat.PETSc.Sys.getVersion())),
+        "slepc": ".".join(map(str, SLEPc.Sys.getVersion())),
+        "mumps": _mumps(),
+        "numpy": np.__version__,
+    }
+    return {name: version for name, version in found.items() if version}
+
+
+def _mumps() -> str:
+    """Version of the MUMPS that PETSc is linked with, by its ``MUMPS_SET_VERSION``; nothing where it has none."""
+    try:
+        ask = ctypes.CDLL(compat.PETSc.__file__).mumps_set_version_
+    except (AttributeError, OSError):
+        return ""
+    text = ctypes.create_string_buffer(b" " * 31, 32)
+    ask(text, ctypes.c_size_t(31))
+    return text.value.decode("ascii").strip()
 
 
 def as_json(data: dict[str, Any]) -> bytes:
@@ -117,7 +159,7 @@ def save_json(data: dict[str, Any], path: Path) -> None:
 @checked(path=argument_path("results/column/diagram.json"))
 def load_json(path: Path | str) -> dict[str, Any]:
     """Read a diagram; raises :class:`InputError` where there is none, or one of a newer format."""
-    return read_diagram(Path(path), ("scene", "parameter", "branches"))
+    return read_json(Path(path), DIAGRAM, ("scene", "parameter", "branches"))
 
 
 def save_run(
@@ -131,13 +173,10 @@ def save_run(
 ) -> None:
     """Add ``branches`` to ``states.h5`` of a folder, and replace ``diagram.json``; collective, written on rank 0.
 
-    Both are written before either takes its place: a disk that is full changes none.  ``states.h5`` takes it first, so
-    that it has all branches of a ``diagram.json`` of the same run.  Raises :class:`InputError` on every rank where the
-    folder cannot be written.
-
-    ``data`` are the contents of ``diagram.json``, ``branches`` those that ``states.h5`` has not yet, ``solvers`` those
-    of the meshes that points name, and ``modes`` those of the typical states of each of the branches.  ``first`` says
-    that ``states.h5`` is a new one.
+    ``data`` are the contents of ``diagram.json``, ``solvers`` those of the meshes that points name, ``modes`` those of
+    the typical states of each of the branches; ``first`` says that ``states.h5`` is a new one.  Both files are written
+    before either takes its place, ``states.h5`` first, so that it has all branches of a ``diagram.json`` of the same
+    run.  Raises :class:`InputError` on every rank where the folder cannot be written.
     """
     states = folder / "states.h5"
     image = states_of(branches, solvers, states, run=data["run"], first=first, modes=modes)
@@ -164,14 +203,10 @@ def states_of(
 ) -> bytes:
     """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
 
-    Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
-    every further field and scalar with P rows, strains, forces and moments (:mod:`rodfem.fem.resultants`), and under
-    ``special/<i>`` the null vectors of its special points: displacement ``r``, ``rotation`` in the space frame, and the
-    change of ``q``.  The ``modes`` of each branch, if given, are in the group of :mod:`rodfem.modes.recorded`.  Below
-    the branch are the groups of :func:`rodfem.problem.supports.write`, for pictures; the file has the
-    name of the ``first`` branch and the bending stiffness under ``section``.  ``solvers`` are those of the meshes that
-    points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file, which stays as it is;
-    ``run`` names the run that it is of.
+    ``docs/files.md`` has the groups.  Null vectors of special points are motions; the groups of
+    :func:`rodfem.problem.supports.write` and the bending stiffness under ``section`` are for pictures.  ``solvers`` are
+    those of the meshes that points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file,
+    which stays as it is unless it is the ``first``; ``run`` names the run, and ``modes`` are recorded of each branch.
     """
     sampled = [_sampled(branch, solvers) for branch in branches]
     system = solvers[0].system
@@ -222,19 +257,11 @@ def _trimmed(row: Any) -> Any:
     return row
 
 
-def mesh_of(system: System) -> dict[str, Any]:
-    """Discretisation, as files record it."""
-    d = system.fields.discretization
-    sizes = {"elements": d.elements, "degree": d.degree, "unknowns": system.fields.unknowns}
-    return {"formulation": d.formulation, **sizes}
-
-
 def load_state(path: Path, branch: str, row: int, solver: BranchSolver) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
-    Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other
-    formulation, or lacks an unknown of the scene.  ``path`` is that of ``states.h5``, ``row`` the number of the row of
-    ``branch``; the state is one of ``solver``.
+    ``path`` is that of ``states.h5``, ``row`` a number of ``branch``; the state is one of ``solver``.  Raises
+    :class:`InputError` where the file is another one, has the row in the other formulation, or lacks an unknown.
     """
     system = solver.system
     sample = _sample(path, branch, row, system.fields.discretization.formulation)
@@ -244,7 +271,6 @@ def load_state(path: Path, branch: str, row: int, solver: BranchSolver) -> PETSc
             f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
             "another scene, or by another version of rodfem; run the scene again."
         )
-    _check_sound(sample, path)
     try:
         return solver.shape.restore(sample)
     except UNREADABLE as trouble:
@@ -271,13 +297,3 @@ def _sample(path: Path, branch: str, row: int, formulation: str) -> dict[str, An
         raise InputError(
             f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
         ) from trouble
-
-
-def _check_sound(sample: dict[str, Any], path: Path) -> None:
-    """Raise :class:`InputError` for a state of a file with numbers that no state has."""
-    real = all(np.isrealobj(values) and np.isfinite(values).all() for values in sample.values())
-    if not real or sample["elements"] < 1 or not np.linalg.norm(sample.get("q", np.ones(4)), axis=-1).all():
-        raise InputError(
-            f"{path} has a state with numbers that are not real and finite, no elements, or no rotation somewhere: run "
-            "the scene again."
-        )

@@ -9,15 +9,18 @@ from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
 from rodfem.output.table import COLUMNS, SPECIAL
 
-LINES = (files("rodfem.output") / "glossary.md").read_text(encoding="utf-8").split("\n## ", 1)[1].splitlines()
-ENTRIES = dict(line.split(": ", 1) for line in LINES if ": " in line)
+
+def _read() -> dict[str, str]:
+    text = (files("rodfem.output") / "glossary.md").read_text(encoding="utf-8").split("\n## ", 1)[1]
+    return dict(line.split(": ", 1) for line in text.splitlines() if ": " in line)
+
+
+ENTRIES = _read()
 """Text of each entry by its names, which are between bars."""
 KNOWN = {"kind", *(name for key in ENTRIES for name in key.split(" | "))}
-ENTRIES |= {x.name: f"{x.words[0].upper()}{x.words[1:]}." for x in (*COLUMNS, *SPECIAL) if x.name not in KNOWN}
+ENTRIES |= {x.name: f"{x.words[:1].upper()}{x.words[1:]}." for x in (*COLUMNS, *SPECIAL) if x.name not in KNOWN}
 NAMES = {name: key for key in ENTRIES for name in key.split(" | ")}
 """Entry of each name."""
-NEAR = 3
-"""Names that are suggested for one that there is not."""
 
 
 def title(entry: str) -> str:
@@ -34,7 +37,7 @@ def explanation(word: str) -> list[tuple[str, str]]:
     found = _found(word)
     if not found:
         inside = [name for name in NAMES if word.lower() in name.lower().replace(",", "").split()]
-        near = inside[:NEAR] or get_close_matches(word.lower(), NAMES, n=NEAR)
+        near = inside[:3] or get_close_matches(word.lower(), NAMES)
         best = f"{' or '.join(near)}, or rodfem explain" if near else "rodfem explain"
         raise InputError(f"There is no entry {word!r}: try {best}, which lists all.")
     return [(title(NAMES[name]), ENTRIES[NAMES[name]]) for name in dict.fromkeys(found)]

@@ -58,11 +58,10 @@ class _Place:
 def glyphs_of(
     setting: Setting, s: Floats, pose: tuple[Floats, Floats], look: Look, home: Floats | None = None
 ) -> list[Glyph]:
-    """Glyphs for all that holds and loads a rod, by its ``setting``.
+    """Glyphs for all that holds and loads a rod, by its ``setting``, in a picture of this ``look``.
 
     ``s`` (n,) are arclengths, ``pose`` the centreline (n, 3) and the directors (n, 3, 3) as columns; ``home`` (n, 3) is
-    the centreline of the equilibrium from which a motion has taken the rod, None: it is there.  ``look`` is that of the
-    picture.
+    the centreline of the equilibrium from which a motion has taken the rod, None: it is there.
     """
     centres, frames = pose
     home = centres if home is None else home
@@ -72,19 +71,18 @@ def glyphs_of(
     for support in setting.supports:
         node = int(np.argmin(abs(s - support.s)))
         side = {0: -1.0, len(s) - 1: 1.0}.get(node, 0.0)
-        places.append(
-            _Place(centres[node], home[node], frames[node], side * frames[node, :, 2], side * (home[-1] - home[0]))
-        )
+        ways = side * frames[node, :, 2], side * (home[-1] - home[0])
+        places.append(_Place(centres[node], home[node], frames[node], *ways))
     loads = [support.loads(place.frame) for support, place in zip(setting.supports, places, strict=True)]
     sizes = np.array([np.linalg.norm(load, axis=1) for load in loads]).reshape(-1, 2)
     shares = sizes / np.maximum(sizes.max(axis=0, initial=0.0), TINY)
     out: list[Glyph] = []
     for support, place, load, share in zip(setting.supports, places, loads, shares, strict=True):
-        held = _body(support, place, size, look)
-        out += held + _springs(support, place, look)
+        body = _body(support, place, size, look)
+        out += body + _springs(support, place, look)
         if support.mass:
             out.append(ball(place.at, 2.2 * look.radius, DARK))
-        out += _loads(load, share, place, 2.2 * size if held else 0.5 * BLOCK * look.radius, look)
+        out += _loads(load, share, place, 2.2 * size if body else 0.5 * BLOCK * look.radius, look)
     for tie in setting.ties:
         out += _tie(tie, s, centres, home, look)
     return out + _foundation(setting, s, centres, home, look) + _distributed(setting, s, pose, look)
@@ -207,10 +205,9 @@ def _tie(tie: Tie, s: Floats, centres: Floats, home: Floats, look: Look) -> list
 
 
 def _loads(load: tuple[Floats, Floats], share: Floats, place: _Place, clear: float, look: Look) -> list[Glyph]:
-    """Arrows of a force and of a moment, of which the ``share`` (2,) of the greatest ones is not zero.
+    """Arrows of a force and of a moment, by their ``share`` (2,) of the greatest ones, ``clear`` of the support.
 
-    A force ends at the rod where it pushes against it, and begins there where it pulls; ``clear`` is the distance from
-    the rod that its support takes.
+    A force ends at the rod where it pushes against it, and begins there where it pulls.
     """
     (force, moment), out = load, list[Glyph]()
     if share[0] > POINT:
@@ -226,7 +223,7 @@ def _loads(load: tuple[Floats, Floats], share: Floats, place: _Place, clear: flo
 
 
 def _distributed(setting: Setting, s: Floats, pose: tuple[Floats, Floats], look: Look) -> list[Glyph]:
-    """Arrows in proportion to a distributed force: on the rod, or beside it where the force is along the rod."""
+    """Arrows in proportion to a distributed force: on the rod, or next to it if the force is along the rod."""
     if setting.distributed is None:
         return []
     (centres, frames), (places, dead, follower) = pose, setting.distributed

@@ -1,4 +1,4 @@
-"""Pieces of the branches of a diagram: consecutive rows of one index, why branches end, and the state that is shown.
+"""Stability along the branches of a diagram: pieces of one index, intervals of one kind of stability, ends.
 
 An index is that of the step between two rows.  It is the greater one of both rows, but at a special point that is known
 before and after.
@@ -8,21 +8,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby, pairwise
+from dataclasses import dataclass
+from itertools import combinations, groupby, pairwise
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.errors import InputError
-from rodfem.stability.soft_mode import index_range
+from rodfem.stability.soft_mode import index_range, on_kink
+from rodfem.tolerances import SAME_SPECIAL
 
 STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
 UNDECIDED = "stability undecided"
 COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
-"""Kinds whose index before and after is that of the steps beside."""
-COINCIDE = 1e-6
-"""Arclength within which a row of a branch is at the branch point that it leaves."""
-INSIDE = 0.6
-"""Where on a piece the state to show is taken, as a share of the piece's length along the branch."""
+"""Kinds whose index before and after is that of the steps next to them."""
 COMPLETE = ("", "end of range", "closed loop", "not traced")
 """Ends that need no mark."""
 MEETS, SQUEEZED, BEGINS = "meets", "stretch reaches zero", "begins here: "
@@ -62,14 +62,12 @@ class Piece(NamedTuple):
 
 
 def pieces_of(branch: Branch) -> list[Piece]:
-    """Pieces of a branch of ``diagram.json``, in order; raises ValueError where its columns differ in length."""
+    """Pieces of a branch of ``diagram.json``, in order."""
     columns = branch["columns"]
     rows = len(columns["load"])
-    if not rows == len(columns["ordinate"]) == len(columns["negative"]):
-        raise ValueError(f"columns of branch {branch['name']!r} differ in length: try to compute the diagram anew")
     known = {(row, side): index for row, *sides in _indices(branch) for side, index in enumerate(sides)}
     kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
-    off, steps = _off_kinks(columns["negative"], kink), []
+    off, steps = _from_neighbours(columns["negative"], kink), []
     for a, b in pairwise(range(rows)):
         on = kink[a] if kink[b] else ""
         own = columns["negative"] if on else off
@@ -102,24 +100,24 @@ def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> lis
 def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
     """Rows at which the index is known before and after, with both.
 
-    They are singular points, and rows beside them at the same load to its error bar: a load asked for may be that of a
+    They are singular points, and rows next to them at the same load to its error bar: a load asked for may be that of a
     special point, where the index of the row itself is not decided.  At the branch point that a branch leaves they are
     undecided rows, too, whose index is that of the next row.
     """
     columns = branch["columns"]
     for point in (point for point in branch.get("special", []) if point["kind"] in COUNTED):
         yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
-        yield from _beside(columns["load"], point) if point.get("negative_after") is not None else ()
+        yield from _neighbours(columns["load"], point) if point.get("negative_after") is not None else ()
     if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
         near = _at_the_origin(columns["arclength"], columns["undecided"])
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
 
 
 def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
-    return [row for row in range(1, len(s) - 1) if s[row] - s[0] < COINCIDE and undecided[row]]
+    return [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
 
 
-def _beside(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
+def _neighbours(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
     """Rows on either side of a special point at its load, to its error bar, with the index there."""
     row, bar = int(point["row"]), max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0)
     for step, side in ((-1, "before"), (1, "after")):
@@ -129,8 +127,8 @@ def _beside(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[
             other += step
 
 
-def _off_kinks(negative: list[int], kink: list[str]) -> list[int]:
-    """Index of each row; of one on a kink, where it is that of one side, that of the row beside it off the kink."""
+def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
+    """Index of each row; of one on a kink, where it is that of one side, that of the next row off the kink."""
     negative, rows = list(negative), range(len(kink))
     for a, b in (*pairwise(rows), *pairwise(reversed(rows))):
         negative[a] = negative[b] if kink[a] and not kink[b] else negative[a]
@@ -145,6 +143,116 @@ def _in_space(branch: Branch) -> list[int]:
     column = branch["columns"].get("negative_in_space") or [None]
     singular = {int(point["row"]) for point in branch.get("special", []) if point["kind"] in COUNTED}
     return [] if None in column else [0 if row in singular else index for row, index in enumerate(column)]
+
+
+# --- intervals of one kind of stability
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Consecutive rows of a ``branch`` of ``diagram.json`` with one ``kind`` of stability, from ``first`` to ``last``.
+
+    ``least`` and ``most`` bound the index, ``in_space`` the index among all perturbations of a planar rod (None where
+    it is not known).  Stability is undecided on a ``kink``, of the functions of that name, and where eigenvalues are
+    too near zero (``soft``).
+    """
+
+    branch: Mapping[str, Any]
+    kind: str
+    first: int
+    last: int
+    least: int
+    most: int
+    in_space: int | None
+    kink: str = ""
+    soft: bool = False
+
+    @property
+    def why(self) -> str:
+        """Why stability is undecided, in clauses."""
+        soft = "an eigenvalue is too near zero for its sign to be known on this mesh"
+        return "; ".join([on_kink(self.kink)] * bool(self.kink) + [soft] * self.soft)
+
+    @property
+    def rank(self) -> int:
+        """Of two intervals that meet, the one of greater rank has the segment between their rows.
+
+        It is the less stable one, or one that is undecided by an eigenvalue near zero: between a row of known and one
+        of undecided index that is undecided, too.
+        """
+        return 4 if self.kind == UNDECIDED and self.soft else (STABLE, PLANAR, UNDECIDED, UNSTABLE).index(self.kind)
+
+    @property
+    def loads(self) -> tuple[float, float]:
+        """Load at its first and at its last row."""
+        column = self.branch["columns"]["load"]
+        return column[self.first], column[self.last]
+
+    @property
+    def covers(self) -> tuple[float, float]:
+        """Least and greatest load of its rows."""
+        column = self.branch["columns"]["load"][self.first : self.last + 1]
+        return min(column), max(column)
+
+    def energy(self, load: float) -> float:
+        """Stored energy at a load, by linear interpolation between rows."""
+        rows = slice(self.first, self.last + 1)
+        loads, energies = (np.array(self.branch["columns"][name][rows]) for name in ("load", "energy"))
+        order = np.argsort(loads, kind="stable")
+        return float(np.interp(load, loads[order], energies[order]))
+
+
+def intervals_of(branch: Mapping[str, Any]) -> list[Interval]:
+    """Intervals of a branch in the order of its rows; none for a branch of one row."""
+    groups = groupby(pieces_of(branch), lambda piece: piece.kind)
+    return [_joined(branch, kind, list(group)) for kind, group in groups]
+
+
+def _joined(branch: Mapping[str, Any], kind: str, pieces: Sequence[Piece]) -> Interval:
+    indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
+    known = None if None in space else max(i for i in space if i is not None)
+    kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
+    soft, ends = any(piece.undecided for piece in pieces), (pieces[0].first, pieces[-1].last)
+    return Interval(branch, kind, *ends, min(indices), max(indices), known, kink, soft)
+
+
+def changes_at(branch: Mapping[str, Any], row: int) -> list[Mapping[str, Any]]:
+    """Special points in a row at which the index changes."""
+    return [s for s in branch["special"] if s["row"] == row and s["negative_before"] != s["negative_after"]]
+
+
+def without_stable(stable: Sequence[Interval], low: float, high: float) -> Iterator[tuple[float, float]]:
+    """Parts of a range of loads that no stable interval covers, from below."""
+    reached = low
+    for a, b in sorted(interval.covers for interval in stable):
+        if a - reached > SAME_SPECIAL * (high - low):
+            yield reached, min(a, high)
+        reached = max(reached, b)
+    if high - reached > SAME_SPECIAL * (high - low):
+        yield reached, high
+
+
+def coexisting(stable: Sequence[Interval]) -> Iterator[tuple[Interval, Interval, float, float]]:
+    """Pairs of stable intervals with a range of loads in common and other energies there: the pair and that range.
+
+    Those of one energy, to what linear interpolation leaves, are mirror images, or one branch twice.  Energies of
+    other states may be the same at one load, of symmetry, say, but not at two.
+    """
+    for one, other in combinations(stable, 2):
+        (a, b), (c, d) = one.covers, other.covers
+        low, high = max(a, c), min(b, d)
+        if high - low > SAME_SPECIAL * max(b - a, d - c):
+            energies = [(x.energy(low + share * (high - low)) for x in (one, other)) for share in (0.5, 0.31)]
+            if any(abs(p - q) > 1e-3 * max(abs(p), abs(q)) for p, q in energies):
+                yield one, other, low, high
+
+
+def intervals_in(branches: Sequence[Mapping[str, Any]], kind: str) -> list[Interval]:
+    """All intervals of one ``kind`` of a diagram."""
+    return [x for branch in branches for x in intervals_of(branch) if x.kind == kind]
+
+
+# --- ends, and the state that is shown
 
 
 def endings(branch: Branch) -> list[tuple[int, str]]:
@@ -180,12 +288,12 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
         length = s[piece.last] - s[piece.first]
         return piece.kind == STABLE and aside, leaves, -piece.negative, -(piece.in_space or 0), length
 
-    alone = Piece(0, 0, branches[0]["columns"]["negative"][0], None)
-    found = [(branch, piece) for branch in branches for piece in pieces_of(branch)] or [(branches[0], alone)]
+    alone = [(branches[0], Piece(0, 0, branches[0]["columns"]["negative"][0], None))]
+    found = [(branch, piece) for branch in branches for piece in pieces_of(branch)] or alone
     branch, piece = max(found, key=rank)
     columns = branch["columns"]
     s = columns["arclength"]
-    wanted = s[piece.first] + INSIDE * (s[piece.last] - s[piece.first])
+    wanted = s[piece.first] + 0.6 * (s[piece.last] - s[piece.first])  # well inside
     row = min(range(piece.first, piece.last + 1), key=lambda row: abs(s[row] - wanted))
     index = index_range(piece.negative, piece.undecided, piece.kink)
     words = piece.kind + {STABLE: "", PLANAR: f", index {piece.in_space}"}.get(piece.kind, f", index {index}")

@@ -16,14 +16,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.spatial import KDTree
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
-from rodfem.file_format import DIAGRAM
-from rodfem.output.contents import read_diagram
-from rodfem.output.pieces import COUNTED, STABLE, Piece, endings
-from rodfem.output.program import status_of, terse
-from rodfem.output.smooth import drawn
+from rodfem.file_format import DIAGRAM, read_json
+from rodfem.output.pieces import COUNTED, STABLE, Piece, endings, pieces_of
 from rodfem.output.style import (
     END,
     FONT,
@@ -41,6 +39,7 @@ from rodfem.output.style import (
     ordinate_in_words,
     save,
     sheet,
+    status_of,
     tex,
 )
 from rodfem.output.view import POINT
@@ -62,13 +61,11 @@ ENDS, IMAGE = "ends: ", "image, not traced: "
 SHAPES = ("", "^", "<", "v", ">", "p", "h")
 """Marks along the curves of branches, another one whenever the hues are used up."""
 HUES = 7
-"""Hues of the palette that are told apart at a glance."""
-SHORT = 15
-"""Points of a line, two pixels apart, below which its index stands beside it only if it is the only one."""
-NEAR = 0.01
-"""Distance from an image, relative to the ranges of load and ordinate, up to which a branch is that image."""
+"""Hues of the palette that differ at a glance."""
 GAP = 11.0
 """Pixels between an index and lines."""
+SEEN = 2e-4
+"""Distance from the chord above which a step is no straight line, in parts of the branch's range."""
 
 
 class Line(NamedTuple):
@@ -82,27 +79,23 @@ class Line(NamedTuple):
 def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     """Draw every branch as ordinate against load, with its stability and its special points.
 
-    Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
+    Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues next to it; those of a
     planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
     dots, with the least and the greatest index.  Where a stable and another part lie on each other, the other one is
-    drawn upon the stable one, which is wider.  A step in which the index changes without a special point that says so
-    has a mark of warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of
-    the opposite ordinate, are thin lines: they were not traced.
+    drawn upon the stable one, which is wider.  A step in which the index changes without a special point has a mark of
+    warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of the opposite
+    ordinate, are thin lines: they were not traced.
 
     ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
-    200 dpi.  Its suffix decides the format (.png, .pdf, .svg), and its folder is created.  Raises :class:`InputError`
-    for contents of another or a newer format, :class:`ValueError` where there are no branches, columns of one differ in
-    length, or the format is unknown, and :class:`KeyError` where an entry is missing.
+    200 dpi.  Its suffix decides the format (.png, .pdf, .svg).  Raises :class:`InputError` for another format of file.
     """
     return save(figure_of(diagram), path)
 
 
 def figure_of(diagram: Mapping[str, Any]) -> Figure:
-    """Figure of a diagram, as :func:`draw_diagram` writes it; raises :class:`ValueError` as that does."""
-    DIAGRAM.check(diagram, "The diagram")
-    branches = diagram.get("branches")
-    if not branches:
-        raise ValueError("the diagram has no branches: expected those of a diagram.json; try that of a scene")
+    """Figure of a diagram, as :func:`draw_diagram` writes it."""
+    DIAGRAM.check(diagram, "The diagram", ("branches",))
+    branches = diagram["branches"]
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(diagram["title"], _about(diagram))
         handles, lines = draw_branches(axes, branches)
@@ -143,7 +136,7 @@ def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Li
 
 
 def _kinds(lines: Sequence[Line]) -> list[Line2D]:
-    """Handles of the legend for the kinds of lines, and for the indices beside them."""
+    """Handles of the legend for the kinds of lines, and for their indices."""
     kinds = {line.piece.kind for line in lines}
     out = [Line2D([], [], color="0.45", label=kind, **style) for kind, style in LINES.items() if kind in kinds]
     in_space = any(line.piece.in_space is not None for line in lines)
@@ -170,7 +163,7 @@ def is_traced(branch: Mapping[str, Any], branches: Branches) -> bool:
     share = np.linspace(0.0, 1.0, 50)[:, None]
     lines = [(a + share * (b - a)).reshape(-1, 2) for c in curves for a, b in pairwise(c)]
     off = (np.concatenate([middle[None] + size, *lines]) - middle) / np.where(size > 0, size, 1.0)
-    return bool(np.hypot(*off.T).min() < NEAR)
+    return bool(np.hypot(*off.T).min() < 0.01)  # of the ranges of load and ordinate
 
 
 def _places(branch: Mapping[str, Any]) -> Floats:
@@ -220,21 +213,21 @@ def dense(axes: Axes, curve: Floats) -> Floats:
 
 
 def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[float, float]]) -> None:
-    """Write the index beside each line, where there is most room: a short line has none, unless it is the only one."""
+    """Write the index of each line where there is most room: a short line has none, unless it is the only one."""
     curves = [dense(axes, line.curve) for line in lines]
     corners = [axes.transData.transform(marks)] if marks else []
     taken, written = [*curves, *corners], set[tuple[str, str]]()
     for number in sorted(range(len(lines)), key=lambda number: -len(curves[number])):
         line, curve = lines[number], curves[number]
         half = np.array([0.33 * len(line.piece.label) + 0.1, 0.45]) * FONT * axes.figure.dpi / 72
-        places = _beside(curve, half)
+        places = _label_places(curve, half)
         tree = KDTree(np.concatenate(taken))
         corner = np.array([*product((-1, 0, 1), repeat=2)]) * half
         room = np.array([min(tree.query(place + corner)[0].min(), GAP) for place in places])
         inside = np.all((places - half > axes.bbox.min) & (places + half < axes.bbox.max), axis=1)
         best = int(np.argmax(np.where(inside, room, -1.0)))
         name = line.colour, line.piece.label
-        if (inside[best] and room[best] > GAP / 2 and len(curve) > SHORT) or name not in written:
+        if (inside[best] and room[best] > GAP / 2 and len(curve) > 15) or name not in written:
             written.add(name)
             taken.append(places[best] + corner)
             at = axes.transData.inverted().transform(places[best])
@@ -242,8 +235,8 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
             axes.annotate(line.piece.label, tuple(at), color=line.colour, in_layout=False, **style)
 
 
-def _beside(curve: Floats, half: Floats) -> Floats:
-    """Places (k, 2) for a word of ``half`` (2,) pixels beside a curve (n, 2), those in its middle first."""
+def _label_places(curve: Floats, half: Floats) -> Floats:
+    """Places (k, 2) for a word of ``half`` (2,) pixels next to a curve (n, 2), those in its middle first."""
     rows = ((0.5 + np.array([0, 0.15, -0.15, 0.3, -0.3, 0.4, -0.4])) * (len(curve) - 1)).round().astype(int)
     tangent = curve[np.minimum(rows + 4, len(curve) - 1)] - curve[np.maximum(rows - 4, 0)]
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(*tangent.T), POINT)[:, None]
@@ -272,17 +265,52 @@ def _accuracy(special: Branches) -> list[str]:
     return [f"error of the loads of special points at most {at_most(max(known))}{share}"] if known else []
 
 
+# --- branches between their rows
+
+
+def between(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
+    """Loads and values of a column between rows, (7, 2), by the row before, of the steps that are no straight lines.
+
+    A long step, as the first one from a branch point, would show as a chord.  The load is the cubic Hermite spline of
+    its values and slopes ``dP/ds``: at a pitchfork ``P_0 + c s^2``, as it is there.  The slopes of other columns are
+    Akima's, which keep corners.  ``branch`` is one of ``diagram.json``, ``name`` that of the column.
+    """
+    columns = branch["columns"]
+    s, slopes, loads, values = (np.array(columns[x], dtype=float) for x in ("arclength", "slope", "load", name))
+    if len(s) < 3 or not np.isfinite([s, slopes, loads, values]).all() or (np.diff(s) <= 0).any():
+        return {}
+    shares = np.linspace(0.0, 1.0, 9)[1:-1]
+    places = s[:-1, None] + shares * np.diff(s)[:, None]
+    curves = CubicHermiteSpline(s, loads, slopes)(places), Akima1DInterpolator(s, values)(places)
+    seen, smooth = np.zeros(len(places), dtype=bool), np.ones(len(places), dtype=bool)
+    for rows, curve in zip((loads, values), curves, strict=True):
+        off = abs(curve - rows[:-1, None] - shares * np.diff(rows)[:, None]).max(axis=1)
+        seen |= off > SEEN * np.ptp(rows)
+        smooth &= off <= np.maximum(0.5 * abs(np.diff(rows)), 150 * SEEN * np.ptp(rows))
+    return {int(row): np.column_stack([curve[row] for curve in curves]) for row in np.flatnonzero(seen & smooth)}
+
+
+def drawn(branch: Mapping[str, Any]) -> list[tuple[Piece, Floats]]:
+    """Pieces of a branch, each with its curve (k, 2) of loads and ordinates, with points between rows."""
+    rows = np.column_stack([np.asarray(branch["columns"][key], dtype=float) for key in ("load", "ordinate")])
+    more, found = between(branch, "ordinate"), []
+    for piece in pieces_of(branch):
+        parts = [part for i in range(piece.first, piece.last) for part in (rows[i : i + 1], more.get(i, rows[:0]))]
+        found.append((piece, np.vstack([*parts, rows[piece.last]])))
+    return found
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the diagram named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = terse(
-        argparse.ArgumentParser(prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram.")
+    parser = argparse.ArgumentParser(
+        prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram."
     )
     parser.add_argument("diagram", type=Path, help="diagram.json of a scene")
     parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")
     given = parser.parse_args(arguments)
 
     def draw() -> Path:
-        diagram = read_diagram(given.diagram, ("title", "parameter_label", "ordinate", "branches"))
+        diagram = read_json(given.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
         return draw_diagram(diagram, given.output or given.diagram.with_suffix(".png"))
 
     return status_of(draw, given.diagram)

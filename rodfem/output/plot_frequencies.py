@@ -1,10 +1,17 @@
-"""Frequencies against the load, drawn from ``diagram.json`` alone."""
+"""Frequencies against the load, drawn from ``diagram.json`` alone: curves of roots, and ranges that are unstable.
+
+Next to a flutter load ``P_f`` eigenvalues are ``mu = mu_f + c sqrt(P - P_f) + ...``.  Curves have points of this law
+between the rows there, where a chord would show a corner.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -13,26 +20,45 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
-from rodfem.continuation.kinds import FREQUENCY, KINDS
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
-from rodfem.output.frequency_curves import DIVERGED, GROWTH, PAIR, FrequencyCurve, curves, ranges_of, top
-from rodfem.output.style import HALO, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
+from rodfem.modes.modes import RIGID
+from rodfem.output.pieces import STABLE, Interval, intervals_of
+from rodfem.output.style import HALO, PALETTE, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
 
+Member = tuple[float, int, complex, str]
+"""Load, row, eigenvalue and motion of a point of a curve."""
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
-WIDTH = 1.8
-"""Width of the line of a real frequency."""
+COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}
+"""Places in the palette."""
+RANGES = ("#E9E4F3", "#FBE6D9", "#F3D3C6")
+"""Shades of ranges of divergence, of flutter, and of both."""
+REAL = 1e-6
+"""An imaginary part smaller than this, relative to the root, is round-off."""
+PAIR, GROWTH, DIVERGED = "complex pair, real part", "complex pair, imaginary part", "diverged, growth rate"
+LEAST = 1e-3
+"""Least frequency at the top of a picture; distance of eigenvalues that have met from their mean, relative to it."""
+SHARES = np.array([0.001, *np.linspace(0.125, 0.875, 7)]) ** 2
+"""Where the step next to a flutter load has points, in parts of it from there: at the first one the pair has parted."""
+PARTS = dict(zip((PAIR, GROWTH, DIVERGED), (("x", "-"), ("+", "--"), ("+", ":")), strict=True))
+"""Marker and line of roots that are not real."""
+ENTRIES: dict[str, dict[str, Any]] = {
+    what: {"color": "0.3", "marker": marker, "ls": style, "lw": 0.8, "label": what}
+    for what, (marker, style) in PARTS.items()
+} | {kind: {"ls": "none", "label": kind, **style} for kind, style in SPECIAL.items()}
+"""Entries of the legend for what is not a line."""
 
 
 def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> Path:
     """Draw the square roots of the left-most eigenvalues against the load, as in Kumar & Healey (2010), figure 11.
 
-    One line a curve, one colour a kind of motion: eigenvalues that are double are two lines on each other, of one
-    colour.  Real frequencies are lines, a complex pair is a cross (real part) and a plus (imaginary part), what has
-    diverged is a plus; flutter loads are stars, divergence loads triangles, and unstable ranges are shaded.  The axis
-    shows the ``most`` left-most eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any
-    ``omega2``, and InputError for contents of another or a newer format.
+    One line a curve, one colour a kind of motion.  Real frequencies are lines, a complex pair is a cross (real part)
+    and a plus (imaginary part), what has diverged is a plus; flutter loads are stars, divergence loads triangles, and
+    unstable ranges are shaded.  The axis shows the ``most`` left-most eigenvalues.  Returns ``path``; raises
+    :class:`ValueError` without any ``omega2``, and :class:`InputError` for another format of file.
     """
     return save(figure_of(diagram, most), path)
 
@@ -51,10 +77,6 @@ def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
     return figure
 
 
-PARTS = dict(zip((PAIR, GROWTH, DIVERGED), (("x", "-"), ("+", "--"), ("+", ":")), strict=True))
-"""Marker and line of roots that are not real."""
-
-
 def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
     """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
     motions, shown, ranges = dict[str, str](), set[str](), dict[str, Artist]()
@@ -66,20 +88,13 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
         for curve in curves(branch["columns"], branch["special"]):
             shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
         shown |= _marked(axes, branch["special"])
-    lines = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
+    lines = [Line2D([], [], color=color, lw=1.8, label=motion) for motion, color in motions.items()]
     return [*lines, *(Line2D([], [], **ENTRIES[what]) for what in ENTRIES if what in shown), *ranges.values()]
-
-
-ENTRIES: dict[str, dict[str, Any]] = {
-    what: {"color": "0.3", "marker": marker, "ls": style, "lw": 0.8, "label": what}
-    for what, (marker, style) in PARTS.items()
-} | {kind: {"ls": "none", "label": kind, **style} for kind, style in SPECIAL.items()}
-"""Entries of the legend for what is not a line."""
 
 
 def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
     """Draw one curve; returns which :data:`PARTS` it has."""
-    axes.plot(curve.loads, curve.real, "-", color=color, lw=WIDTH)
+    axes.plot(curve.loads, curve.real, "-", color=color, lw=1.8)
     drawn = set()
     for (what, part), (marker, style) in zip(curve.parts.items(), PARTS.values(), strict=True):
         if not np.isnan(part).all():
@@ -89,7 +104,7 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
 
 
 def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
-    """Mark flutter and divergence loads, and write them beside: of divergence above the axis, where its frequency is.
+    """Mark flutter and divergence loads with their values: of divergence above the axis, where its frequency is.
 
     Returns their kinds.
     """
@@ -111,3 +126,124 @@ def _about(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str
         kinds = " and ".join(kind for kind in SPECIAL if any(s["kind"] == kind for s in found))
         text += f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}"
     return text
+
+
+# --- curves and ranges
+
+
+@dataclass(frozen=True)
+class FrequencyCurve:
+    """A curve of frequencies, named by its ``motion``.
+
+    ``loads``, ``rows`` of the branch and ``roots`` with non-negative real part have the shape (n,).
+    A conjugate pair is two curves, of which one has its roots left out of ``real`` and ``parts``.
+    """
+
+    motion: str
+    loads: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    roots: NDArray[np.complex128]
+
+    @property
+    def colour(self) -> str:
+        """Colour of the motion."""
+        return PALETTE[COLORS.get(self.motion, 7) % len(PALETTE)]
+
+    @property
+    def real(self) -> NDArray[np.float64]:
+        """Real frequencies (n,), nan where there is none."""
+        return np.where(abs(self.roots.imag) <= REAL * abs(self.roots), self.roots.real, np.nan)
+
+    @property
+    def parts(self) -> dict[str, NDArray[np.float64]]:
+        """Real and imaginary part of a complex pair, and growth rate of what has diverged, (n,), nan where none is."""
+        w = self.roots
+        straight, lower = abs(w.imag) <= REAL * abs(w), w.imag < -REAL * abs(w)
+        sideways = (w.real <= REAL * abs(w)) & ~straight
+        pair = ~straight & ~lower & ~sideways
+        values = (pair, w.real), (pair, w.imag), (sideways, abs(w.imag))
+        named = zip((PAIR, GROWTH, DIVERGED), values, strict=True)
+        return {what: np.where(chosen, part, np.nan) for what, (chosen, part) in named}
+
+
+class Range(NamedTuple):
+    """An unstable range of the load, from ``low`` to ``high``, in ``words`` and in its ``shade``."""
+
+    low: float
+    high: float
+    words: str
+    shade: str
+
+
+def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()) -> list[FrequencyCurve]:
+    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve.
+
+    With its ``special`` points curves have points between rows where two frequencies meet.
+    """
+    found: dict[int, list[Member]] = {}
+    for row, (load, *modes) in enumerate(
+        zip(*(columns[name] for name in ("load", "omega2", "motion", "curve")), strict=True)
+    ):
+        for pair, motion, number in zip(*modes, strict=True):
+            mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
+            found.setdefault(number, []).append((load, row, mu, motion))
+    met = {p["row"]: float(p["omega2"]) for p in special if p["kind"] == FLUTTER and p.get("omega2") is not None}
+    each = (_curve(_with_roots(members, met)) for members in found.values())
+    return sorted(each, key=lambda curve: (curve.motion, abs(curve.roots[0])))
+
+
+def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Member]:
+    """Points of a curve, and those of a square root next to the rows of ``met``, each with its double eigenvalue."""
+    out = list(members)
+    for i, (load, row, mu, motion) in enumerate(members):
+        mean = met.get(row, np.inf)
+        if abs(mu - mean) <= LEAST * abs(mean) < np.inf:
+            out[out.index(members[i])] = (load, row, complex(mean), motion)
+            sides = [*members[max(i - 1, 0) : i], *members[i + 1 : i + 2]]
+            for other, near, value, _ in (side for side in sides if side[1] not in met):
+                drift = (value - mean).real if value.imag else 0.0  # of the mean of a complex pair
+                values = mean + SHARES * drift + SHARES**0.5 * (value - mean - drift)
+                places = load + SHARES * (other - load), np.where(SHARES > 0.5, near, row), values
+                out += [(*place, motion) for place in zip(*places, strict=True)]
+    return out
+
+
+def _curve(members: Sequence[Member]) -> FrequencyCurve:
+    loads, rows, values, motions = zip(*sorted(members, key=lambda member: member[0]), strict=True)
+    motion = Counter(motions).most_common(1)[0][0]
+    return FrequencyCurve(motion, np.array(loads), np.array(rows), np.sqrt(np.array(values, dtype=np.complex128)))
+
+
+def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:
+    """Ranges of the load in which a branch is unstable in one way."""
+    for interval in (interval for interval in intervals_of(branch) if interval.kind != STABLE):
+        for kind, group in groupby(enumerate(_unstable(interval), interval.first), lambda step: step[1]):
+            places = [row for row, _ in group]
+            ends = [branch["columns"]["load"][row] for row in (places[0], places[-1] + 1)]
+            words = " and ".join(sorted(kind, reverse=True)) or "instability"
+            yield Range(min(ends), max(ends), f"range of {words}", RANGES[2 if len(kind) > 1 else FLUTTER in kind])
+
+
+def _unstable(interval: Interval) -> list[frozenset[str]]:
+    """Kinds of instability in each step: of either end, as at critical loads eigenvalues are still real, or zero."""
+    rows = interval.branch["columns"]["omega2"][interval.first : interval.last + 1]
+    values = [[complex(*v) for v in row] for row in rows]
+    least = REAL * max(abs(v) for row in values for v in row)
+    return [a | b for a, b in pairwise(_kinds(row, least) for row in values)]
+
+
+def _kinds(values: Sequence[complex], least: float) -> frozenset[str]:
+    """Kinds of instability among eigenvalues, of which those below ``least`` are zero."""
+    flutter = any(abs(v.imag) > REAL * abs(v) for v in values)
+    divergence = any(v.real < -least and abs(v.imag) <= REAL * abs(v) for v in values)
+    return frozenset([FLUTTER] * flutter + [DIVERGENCE] * divergence)
+
+
+def top(branch: Mapping[str, Any], most: int) -> float:
+    """Greatest of critical frequencies, imaginary parts of all roots, and real parts of the ``most`` left-most ones."""
+    highest = LEAST
+    for pairs in branch["columns"]["omega2"]:
+        roots = [complex(*pair) ** 0.5 for pair in pairs]  # in ascending order of the real parts of the squares
+        highest = max([highest, *(w.imag for w in roots), *(w.real for w in roots[:most])])
+    critical = [abs(complex(s["omega2"])) ** 0.5 for s in branch["special"] if s.get("omega2") is not None]
+    return max([highest, *critical])

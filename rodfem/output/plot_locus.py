@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
-from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
+from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, KINDS, USER
 from rodfem.file_format import LOCUS
-from rodfem.output.stable_region import in_words, plane_of, stable_region
 from rodfem.output.style import FONT, HALO, PALETTE, STYLE, at_most, explain, mesh_in_words, named, save, sheet
 from rodfem.output.view import POINT
+
+Floats = NDArray[np.float64]
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
 """Colour and dashes by kind."""
@@ -25,7 +28,7 @@ POINTS: dict[str, dict[str, Any]] = {
     "cusp": {"marker": "^", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "cusp"},
     "ends": {"marker": "o", "ms": 6.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "fold meets branch point"},
 }
-"""Markers of rows by how what is said of them begins, or for the fold's end how it reads."""
+"""Markers of rows by the first word of what happens there."""
 
 STABLE_SIDE = "#CDE9DF"
 """Colour of the stable side of a curve."""
@@ -36,15 +39,18 @@ AFTER, ASIDE = 0.3, 11.0
 def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Draw loci of one scene in the plane of its two parameters, one over the other.
 
-    The first parameter, the load, is upwards.  Beside each curve stand the indices of the equilibria on its two sides
+    The first parameter, the load, is upwards.  Next to each curve stand the indices of the equilibria on its two sides
     where they were counted, as ``0|1``.  The stable side of a curve is shaded as far as the next curve, or the bound of
     the load: there stability is known as far as these curves tell, as no other one was looked for.
 
-    ``loci`` are the contents of files written by :meth:`rodfem.codim2.locus.Locus.save`, of the same two parameters;
-    ``path`` is the picture to write, and to return.  Raises :class:`InputError` for contents of another or a newer
-    format, and :class:`ValueError` without any locus, or if they are not of the same parameters.
+    ``loci`` are the contents of files written by :meth:`rodfem.codim2.locus.Locus.save`; ``path`` is the picture to
+    write, and to return.  Raises :class:`InputError` for another format of file, and :class:`ValueError` without any
+    locus, or if they are not of the same two parameters.
     """
-    _check(loci)
+    if any(one["parameters"] != loci[0]["parameters"] for one in loci) or not loci:
+        raise ValueError("Give loci, one at least, of the same two parameters.")
+    for one in loci:
+        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(loci[0]["title"], _about(loci))
         axes.margins(0.04, 0.12)
@@ -62,16 +68,6 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     return save(figure, path)
 
 
-def _check(loci: Sequence[Mapping[str, Any]]) -> None:
-    """Raise what :func:`draw_locus` raises for loci that are no picture."""
-    if not loci:
-        raise ValueError("There is no locus to draw: give the contents of at least one file.")
-    for one in loci:
-        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
-    if any(one["parameters"] != loci[0]["parameters"] for one in loci):
-        raise ValueError("The loci are of different parameters: draw them one by one.")
-
-
 def _draw_curves(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
     """Draw the curves with the marks of their rows."""
     for one in loci:
@@ -86,14 +82,14 @@ def _draw_curves(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _indices(loci: Sequence[Mapping[str, Any]]) -> list[Line2D]:
-    """Entry of the legend for the indices beside the curves, if there are any."""
+    """Entry of the legend for the indices of the curves, if there are any."""
     pairs = [pair for one in loci for pair in one["columns"]["index"] if pair[0] >= 0]
     style = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
     return [Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **style)] if pairs else []
 
 
 def _write_indices(axes: Axes, one: Mapping[str, Any]) -> None:
-    """Write the indices on both sides beside a curve, off its start."""
+    """Write the indices on both sides of a curve, away from its start."""
     row = round(AFTER * (len(one["columns"]["index"]) - 1))
     low, high = one["columns"]["index"][row]
     if low < 0:
@@ -120,3 +116,62 @@ def _about(loci: Sequence[Mapping[str, Any]]) -> str:
     elif failed:
         text += f"; the error could not be estimated at any of {failed} points"
     return text
+
+
+# --- where an equilibrium is stable, as far as loci tell
+
+
+class StableRegion(NamedTuple):
+    """Between two loads at each value of the second parameter, all (k,): the locus, and what bounds its stable side."""
+
+    other: Floats
+    edge: Floats
+    end: Floats
+
+
+def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> StableRegion | None:
+    """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
+
+    ``one`` is the file of the locus, whose stable side is that on which its index is zero, and ``loci`` are all of the
+    plane.  None where neither side is stable all along the locus, as where another one crosses it, where it is not
+    known which side is, or where the locus has more than one load at a value of the second parameter.
+    """
+    x, y = _curve(one)
+    side, crossed = one.get("lower"), CROSSES in [mark["kind"] for mark in one["marks"]]
+    monotone = len(x) > 1 and abs(np.sign(np.diff(x)).sum()) == len(x) - 1
+    if crossed or not side or not monotone or any(next(zip(*one["columns"]["index"], strict=True))):
+        return None
+    order = np.argsort(x)
+    grid = np.linspace(x.min(), x.max(), 400)
+    edge = np.interp(grid, x[order], y[order])
+    end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
+    others = (_levels(another, grid) for another in loci if another is not one)
+    for level in chain.from_iterable(others):
+        nearer = (side * (level - edge) > 0) & (side * (level - end) < 0)
+        end = np.where(nearer, level, end)
+    return StableRegion(grid, edge, end)
+
+
+def _levels(one: Mapping[str, Any], grid: Floats) -> list[Floats]:
+    """Loads (len(grid),) at which each segment of a locus has these values of the second parameter; nan where none."""
+    (x, y), found = _curve(one), []
+    for i in np.flatnonzero(np.diff(x) != 0):
+        share = (grid - x[i]) / (x[i + 1] - x[i])
+        found.append(np.where((share >= 0) & (share <= 1), y[i] + share * (y[i + 1] - y[i]), np.nan))
+    return found
+
+
+def _curve(one: Mapping[str, Any]) -> tuple[Floats, Floats]:
+    """Second parameter and load of all rows of a locus."""
+    x, y = (np.asarray(one["columns"][name], dtype=float) for name in reversed(one["parameters"]))
+    return x, y
+
+
+def plane_of(one: Mapping[str, Any]) -> str:
+    """Words after ``stable`` or ``index`` of a locus: of a rod that is kept in a plane it is that in the plane."""
+    return " in its plane" if one.get("planar") else ""
+
+
+def in_words(one: Mapping[str, Any]) -> str:
+    """What the region of a locus is, for legends."""
+    return f"stable{plane_of(one)}, as far as these curves tell"

@@ -24,9 +24,9 @@ from scipy.spatial.transform import Rotation
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import Look, glyphs_of
-from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Glyph, Solid, between, curve_of, striped
-from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
+from rodfem.output.solids import Glyph, Solid, between, striped
+from rodfem.output.states import curve_of
+from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS, status_of
 from rodfem.output.view import POINT, axes_of, axis_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
@@ -36,16 +36,11 @@ from rodfem.whole_files import draft_of
 __all__ = ["draw_modes", "main"]
 
 Floats = NDArray[np.float64]
-PANEL, COLUMNS, TITLES = (4.0, 2.75), 3, 0.8  # inches; those that titles take above a panel
+PANEL, TITLES = (4.0, 2.75), 0.8  # inches; those that titles take above a panel
 LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
-POINTS, SLENDER = 100, 65.0
-"""Points along a rod; its size over its radius."""
-FRAMES, RATE, PERIODS, FAINTEST, RISING = 60, 20, 2.0, 0.06, 0.8
-"""Of an animation: pictures, pictures a second, periods of an oscillation, amplitude at which a growing mode starts,
-and the share of the time in which it grows; in the rest it goes back, pale, so that the loop joins."""
-TEETH, BENT = 15, 0.05
-"""Lines along d1 where a mode hardly displaces the rod; deflection of a rod, over its size, that is one."""
+FRAMES, RISING = 60, 0.8
+"""Pictures of an animation, and the share of its time in which a mode grows; in the rest it goes back, pale."""
 GROWTH = 1e-9
 """Real part of the root of -mu, relative to it, above which a mode grows."""
 
@@ -53,11 +48,10 @@ GROWTH = 1e-9
 def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence[int] = ()) -> Path:
     """Draw the modes of one state, each in a panel of its own.
 
-    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state, as in ``states.h5``.  ``output`` is the picture
-    to write, and to return; an animation where its suffix is .gif, in which unstable modes grow like
-    ``exp(sqrt(-mu) t)``, then go back, and stable ones oscillate, each in a time of its own: its end joins its
-    beginning.  ``chosen`` are numbers of modes, from 1 on; all where none is given.  Raises :class:`InputError` if the
-    file has no such modes.
+    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state, ``chosen`` are numbers of modes, from 1 on
+    (none: all).  ``output`` is the picture to write, and to return; an animation if its suffix is .gif, in which
+    unstable modes grow like ``exp(sqrt(-mu) t)``, then go back, and stable ones oscillate, each in a time of its own.
+    Raises :class:`InputError` if the file has no such modes.
     """
     modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)
@@ -65,7 +59,7 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         if not 1 <= number <= count:
             raise InputError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
     numbers = [n - 1 for n in chosen] or list(range(count))
-    columns = min(COLUMNS, len(numbers)) if len(numbers) != 4 else 2
+    columns = min(3, len(numbers)) if len(numbers) != 4 else 2
     rows, moving = ceil(len(numbers) / columns), output.suffix.lower() == ".gif"
     with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
@@ -74,18 +68,17 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         words, top = f"{heading(path)}{branch}, load {modes.load:.6g}", 1 - 0.1 / figure.get_figheight()
         figure.suptitle(words, fontsize=14, y=top, va="top")
         panels = [_Panel(figure.add_subplot(rows, columns, i), modes, setting, n) for i, n in enumerate(numbers, 1)]
-        _animate(figure, panels, draft) if moving else _draw(figure, panels, draft)
+        if moving:
+            _animate(figure, panels, draft)
+        else:
+            for panel in panels:
+                panel.draw()
+            figure.savefig(draft)
     return output
 
 
-def _draw(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
-    for panel in panels:
-        panel.draw()
-    figure.savefig(path)
-
-
 def _animate(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
-    writer = PillowWriter(fps=RATE)
+    writer = PillowWriter(fps=20)
     with writer.saving(figure, str(path), figure.dpi):
         for frame in range(FRAMES):
             for panel in panels:
@@ -100,9 +93,9 @@ def amplitude(root: complex, grows: bool, time: float) -> complex:
     """
     if not grows:
         return complex(np.cos(2 * np.pi * time))
-    most = np.log(1 / FAINTEST) / root.real
+    most = np.log(1 / 0.06) / root.real  # from a faint amplitude on
     if root.imag:
-        most = min(most, PERIODS * 2 * np.pi / abs(root.imag))
+        most = min(most, 4 * np.pi / abs(root.imag))  # two periods
     back = max(0.0, time - RISING) / (1 - RISING)
     grown = np.exp(root * most * (min(time / RISING, 1.0) - 1))
     return complex(grown + back**2 * (3 - 2 * back) * (np.exp(-root * most) - grown))
@@ -119,17 +112,14 @@ class _Panel:
 
     def __init__(self, axes: Axes, modes: Modes, setting: Setting, number: int) -> None:
         self.axes, self.setting, self.shown = axes, setting, list[PolyCollection]()
-        self.s = s = np.linspace(modes.s[0], modes.s[-1], POINTS)
+        self.s = s = np.linspace(modes.s[0], modes.s[-1], 100)
         self.r, turned = curve_of(modes.s, modes.r, modes.q, s)
         self.frames = directors(turned)
         u, w = (CubicSpline(modes.s, part[number].astype(complex))(s) for part in (modes.displacement, modes.rotation))
-        span, mu, error = (
-            float(np.linalg.norm(np.ptp(self.r, axis=0))),
-            complex(modes.value[number]),
-            modes.error[number],
-        )
+        span, mu = float(np.linalg.norm(np.ptp(self.r, axis=0))), complex(modes.value[number])
+        error = modes.error[number]
         size = drawn_size(u, w, span)
-        self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
+        self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / 65
         self.combed = size * np.linalg.norm(abs(u), axis=1).max() < 0.5 * LARGEST[0] * span
         self.root = np.sqrt(-mu)
         free = modes.motion[number] == SYMMETRY or abs(mu) <= (error if np.isfinite(error) else 0.0)
@@ -153,7 +143,7 @@ class _Panel:
         axis, off = axis_of(self.setting, self.r), self.r - self.r[0]
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
-        bent = self.setting.force is None and np.linalg.norm(most) > BENT * span
+        bent = self.setting.force is None and np.linalg.norm(most) > 0.05 * span
         view = axes_of(self.setting, self.r, moved, self.frames[0], most if bent else None)
         self.look, raised = Look(self.radius, view), moved @ view[1]
         if raised[np.argmax(abs(raised))] < 0.0:
@@ -202,7 +192,7 @@ class _Panel:
     def _rod(self, centres: Floats, frames: Floats, color: str) -> list[Solid | Glyph]:
         """Rod with a stripe along d1, and with teeth along d1 where the mode turns it only."""
         dark = to_hex(0.4 * np.array(to_rgb(color)))
-        nodes = np.linspace(0, len(centres) - 1, TEETH + 2).round().astype(int)[1 : -1 if self.combed else 1]
+        nodes = np.linspace(0, len(centres) - 1, 17).round().astype(int)[1 : -1 if self.combed else 1]
         tips = centres + 6.0 * self.radius * frames[:, :, 0]
         teeth = [between("bar", centres[i], tips[i], 0.12 * self.radius, dark) for i in nodes]
         return [*striped((self.s, centres, frames), self.setting.section, self.radius, (color, dark), 12), *teeth]
@@ -223,8 +213,8 @@ class _Panel:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the modes named on the command line; returns 0, or 2 after one sentence on standard error."""
-    parser = terse(
-        argparse.ArgumentParser(prog="python -m rodfem.output.plot_modes", description="Draw the modes of a state.")
+    parser = argparse.ArgumentParser(
+        prog="python -m rodfem.output.plot_modes", description="Draw the modes of a state."
     )
     parser.add_argument("modes", type=Path, help="modes.h5 of a run with --modes")
     parser.add_argument("--branch", required=True, help="name of the branch")

@@ -7,30 +7,39 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
+from rodfem.errors import InputError
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import Look, glyphs_of
-from rodfem.output.program import status_of, terse
-from rodfem.output.solids import Glyph, Solid, curve_of, striped
-from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE
+from rodfem.output.solids import Glyph, Solid, striped
+from rodfem.output.states import curve_at
+from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE, status_of
 from rodfem.output.view import axes_of, thickness
+from rodfem.problem.arguments import checked
+from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
-from rodfem.whole_files import draft_of
+from rodfem.whole_files import draft_of, picture_at, write_whole
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch import Branch, Point
+    from rodfem.continuation.branch_solver import BranchSolver
 
 __all__ = ["draw_shape", "draw_shape_safely", "main"]
 
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the caption
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+HOME = Path(__file__).resolve().parents[2]
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
 
@@ -46,23 +55,13 @@ def draw_shape(
     stiffnesses (:func:`rodfem.output.solids.profile_of`).  What a file does not record is not drawn: of one without
     supports the rod alone, round.  See :func:`rodfem.output.view.view_of` for the direction of view.
 
-    Parameters
-    ----------
-    states, branch, row
-        The file ``states.h5``, the name of the branch, and the row of the state in it, counted from 0.
-    path
-        Picture to write, and to return; its folder is created.  The suffix decides the format (.png, .jpg, .bmp, .tif).
-    caption
-        Line at the foot of the picture: scene, branch and load when None, nothing when empty.
-    radius
-        Mean radius of the rod; that of :func:`rodfem.output.view.thickness` when None.
-    size
-        Width and height of the picture in pixels; words keep theirs, so that a smaller picture has larger ones.
-    view
-        Axes of the picture as rows (3, 3), as :func:`view_in` gives them; those of this state when None.
-
-    Raises :class:`ValueError` where there is no such state or an argument has no meaning, :class:`ImportError` where
-    PyVista or a library that it needs is missing, and :class:`RuntimeError` where the picture comes out blank.
+    The state is in a ``row``, from 0 on, of a ``branch`` of the file ``states``; the suffix of ``path`` decides the
+    format (.png, .jpg, .bmp, .tif).  ``caption`` is the line at its foot (None: scene, branch and load), ``radius`` the
+    mean radius of the rod (None: :func:`rodfem.output.view.thickness`), ``size`` width and height in pixels (words keep
+    theirs, so that a smaller picture has larger ones), and ``view`` has the axes of the picture as rows (3, 3), as
+    :func:`view_in` gives them (None: those of this state).  Raises :class:`ValueError` where there is no such state or
+    an argument has no meaning, :class:`ImportError` where PyVista or a library that it needs is missing, and
+    :class:`RuntimeError` where the picture comes out blank.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -150,36 +149,29 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
     try:
         with h5py.File(states, "r") as file:
             STATES.check_hdf5(file, ("branches", "parameter", "scene"))
-            branches = file["branches"]
-            if branch not in branches:
-                raise ValueError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
-            if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
-                raise ValueError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
-            load = float(branches[branch]["load"][row])
+            group = _group(file["branches"], branch, row, states)
+            load = float(group["load"][row])
             symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
+            first = file["branches"][file.attrs.get("first", branch)]
+            left = 0 if first == group else int(np.argmin(abs(first["load"][:] - load)))
+            s, centres, turned = curve_at(group, row, count)
+            reference, setting = curve_at(first, left, count)[1], read_setting(group, row)
             caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
-            first = file.attrs.get("first", branch)
-            left = 0 if branch == first else int(np.argmin(abs(branches[first]["load"][:] - load)))
-            s, centres, directors = _curve(branches[branch], row, count)
-            reference = _curve(branches[first], left, count)[1]
-            setting = read_setting(branches[branch], row)
+            return State(s, centres, directors(turned), reference, setting, caption)
     except UNREADABLE as error:
-        if isinstance(error, ValueError) and str(error).startswith((str(states), "row ")):
+        if isinstance(error, InputError):
             raise
         reason = "expected HDF5 with s and branches" if states.exists() else "no such file"
         raise ValueError(f"cannot read {states}, {reason}: try the states.h5 of a scene") from error
-    return State(s, centres, directors, reference, setting, caption)
 
 
-def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
-    """Arclengths (count,), centres (count, 3) and directors (count, 3, 3) of a row of a branch."""
-    s, r, q = (group[key][row] for key in ("s", "r", "q"))
-    s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
-    at = np.linspace(s[0], s[-1], count)
-    if not np.isfinite(r).all() or not np.ptp(r, axis=0).any():
-        raise ValueError("the centreline is a point, or not finite")
-    centres, turned = curve_of(s, r, q, at)
-    return at, centres, directors(turned)
+def _group(branches: Any, branch: str, row: int, states: Path) -> Any:
+    """Group of a branch that has this row."""
+    if branch not in branches:
+        raise InputError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
+    if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
+        raise InputError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
+    return branches[branch]
 
 
 def _import_pyvista() -> Any:
@@ -223,6 +215,61 @@ def _look_at(plotter: Any, points: Floats, look: Look, size: tuple[int, int]) ->
     plotter.renderer.ResetCameraClippingRange()
 
 
+@dataclass(frozen=True)
+class Snapshot:
+    """A picture as PNG; empty on all ranks but the first."""
+
+    png: bytes
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def __repr__(self) -> str:
+        """Size."""
+        return f"<Snapshot: PNG of {len(self.png)} bytes>"
+
+    @checked(path=argument_path("shape.png"))
+    def save(self, path: Path | str) -> Path:
+        """Write it; its folder is made.  Raises :class:`InputError` where it cannot be written."""
+        path = Path(path)
+        picture_at(path, (".png",))
+        write_whole({path: self.png})
+        return path
+
+
+def snapshot(
+    branches: Sequence[Branch],
+    solvers: Sequence[BranchSolver],
+    point: Point,
+    path: Path | str | None,
+    caption: str | None,
+) -> Snapshot:
+    """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one.
+
+    ``solvers`` are those of the meshes, ``point`` is one of the ``branches`` or any other of these meshes; ``path`` is
+    that of the picture (None: none is kept), and ``caption`` its text.
+    """
+    from rodfem.continuation.branch import Branch
+    from rodfem.output.files import save_states
+
+    comm = solvers[0].system.comm
+    with TemporaryDirectory() as folder:
+        states, picture = Path(folder) / "states.h5", Path(folder) / "shape.png"
+        homes = {id(p): (b.name, i) for b in reversed(branches) for i, p in enumerate(b.points)}
+        (name, row), first, png = homes.get(id(point), ("state", 0)), branches[0], b""
+        save_states(replace(first, special=[]), solvers, states, first=True)
+        if name != first.name:
+            save_states(Branch(name, None, 0, [point]), solvers, states, first=False)
+            row = 0
+        if comm.rank == 0:
+            draw_shape(states, name, row, picture, caption=caption)
+            png = picture.read_bytes()
+    found = Snapshot(png)
+    if path is not None and comm.rank == 0:
+        found.save(path)
+    return found
+
+
 def draw_shape_safely(
     states: Path, branch: str, row: int, path: Path, *, limit: float = 120.0, **options: str | float | None
 ) -> str | None:
@@ -234,9 +281,8 @@ def draw_shape_safely(
     """
     command = [sys.executable, "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
     command += [f"--{key}={value}" for key, value in {"output": path, **options}.items() if value is not None]
-    home = str(Path(__file__).resolve().parents[1])
     environment = {key: value for key, value in os.environ.items() if not key.startswith(MPI_VARIABLES)}
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH")]))
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(HOME), os.environ.get("PYTHONPATH")]))
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -249,7 +295,7 @@ def draw_shape_safely(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the shape named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = terse(argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space."))
+    parser = argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space.")
     parser.add_argument("states", type=Path, help="states.h5 of a scene")
     parser.add_argument("--branch", required=True, help="name of the branch")
     parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
@@ -23,8 +22,6 @@ FLATTEST = 7.0
 """Greatest proportion of the sides of a rod's cross-section that is drawn."""
 SIDES = 24
 """Corners of a round cross-section."""
-WIRE = 0.22
-"""Radius of the wire of a spring, in radii of the rod."""
 COILS = {"coil": (6, 1.5, 11.0), "small coil": (4, 0.9, 7.0)}
 """Turns of a spring, their radius, and its length at rest, in radii of the rod."""
 
@@ -77,7 +74,7 @@ def body_of(name: str) -> tuple[Floats, NDArray[np.int64]]:
         return _swept(np.outer((0, 0.76, 0.76, 1), (0, 0, 1)), np.array([1, 1, 2.6, 0]))
     if name == "spiral":
         angle = np.linspace(0, 5 * np.pi, 120)
-        return _swept(_ring(np.linspace(1.6, 3.4, 120), angle, 0 * angle), WIRE)
+        return _swept(_ring(np.linspace(1.6, 3.4, 120), angle, 0 * angle), 0.22)
     if name == "turn":
         angle = np.append(np.linspace(-1.6 * np.pi, -0.585, 40), 0.0) + 0.29
         path, radii = _ring(1.0, angle, 0.5 + 0.6 * angle / np.pi), np.full(42, 0.09)
@@ -86,7 +83,7 @@ def body_of(name: str) -> tuple[Floats, NDArray[np.int64]]:
     turns, wide, length = COILS[name]
     t = np.linspace(0, 1, 24 * turns + 1)
     winding = _ring(wide * np.minimum(1, 8 * np.minimum(t, 1 - t)), 2 * np.pi * turns * t, length * (0.1 + 0.8 * t))
-    points, triangles = _swept(np.vstack([np.zeros(3), winding, (0, 0, length)]), WIRE, sides=10)
+    points, triangles = _swept(np.vstack([np.zeros(3), winding, (0, 0, length)]), 0.22, sides=10)
     return points / (1, 1, length), triangles
 
 
@@ -159,26 +156,6 @@ def across(direction: Floats) -> Floats:
     return np.asarray(out / np.linalg.norm(out))
 
 
-def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Centreline (n, 3) and unit quaternions (n, 4) at arclengths ``at`` (n,) of a state, by splines through its nodes.
-
-    The nodes are at ``s`` (m,), with positions ``r`` (m, 3) and quaternions ``q`` (m, 4) of any length and sign.
-    """
-    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
-    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
-    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
-    return CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
-
-
-def rod(centres: Floats, frames: Floats, profile: Floats, color: str) -> Solid:
-    """Rod with the cross-sections of :func:`profile_of`, (n, k, 2), in the planes of d1 and d2 of ``frames``.
-
-    ``centres`` (n, 3) and ``frames`` (n, 3, 3) are those of the cross-sections, ``profile`` their outlines;
-    ``color`` is its colour.
-    """
-    return Solid(*_loft(centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], profile)), color)
-
-
 def striped(
     pose: tuple[Floats, Floats, Floats],
     section: tuple[Floats, Floats] | None,
@@ -186,15 +163,16 @@ def striped(
     colors: Sequence[str],
     sides: int = 2 * SIDES,
 ) -> list[Solid]:
-    """A rod of a mean ``radius`` with a stripe along d1, in its ``pose``.
+    """A rod of a mean ``radius`` and so many ``sides`` with a stripe along d1, in two ``colors``.
 
-    That has arclengths (n,), centreline (n, 3) and directors (n, 3, 3); ``section`` is that of :func:`profile_of`,
-    ``colors`` are those of the rod, of so many ``sides``, and of the stripe.
+    Its ``pose`` has arclengths (n,), centreline (n, 3) and directors (n, 3, 3), in whose planes of d1 and d2 are the
+    cross-sections of :func:`profile_of`, by the ``section`` that it takes.
     """
     s, centres, frames = pose
     around = (1.0, np.linspace(-np.pi, np.pi, sides + 1)[:-1]), (1.02, np.linspace(-0.3, 0.3, sides // 6 + 1))
     outlines = [size * radius * profile_of(s, section, angles) for size, angles in around]
-    return [rod(centres, frames, outline, color) for outline, color in zip(outlines, colors, strict=True)]
+    rings = [centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], outline) for outline in outlines]
+    return [Solid(*_loft(ring), color) for ring, color in zip(rings, colors, strict=True)]
 
 
 def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats) -> Floats:

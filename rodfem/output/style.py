@@ -1,10 +1,11 @@
-"""Shared by all plots: size, fonts, colours, text, the line at the foot, and how they are written."""
+"""Style of all pictures: size, fonts, colours, lines, text, how they are written, and the programs that draw them."""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil, floor, log10
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import offset_copy
 
+from rodfem.file_format import UNREADABLE
 from rodfem.output.digits import with_unit
 from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE
 from rodfem.tolerances import NEGLIGIBLE
@@ -131,5 +133,18 @@ def mesh_in_words(d: Mapping[str, Any]) -> str:
 
 def at_most(error: float) -> str:
     """Return a bound with two digits, never smaller than it is."""
-    step = 10.0 ** (math.floor(math.log10(error)) - 1) if error > 0 else 1.0
-    return f"{math.ceil(error / step * (1 - NEGLIGIBLE)) * step:.1e}".replace("e-0", "e-")
+    step = 10.0 ** (floor(log10(error)) - 1) if error > 0 else 1.0
+    return f"{ceil(error / step * (1 - NEGLIGIBLE)) * step:.1e}".replace("e-0", "e-")
+
+
+def status_of(draw: Callable[[], Path], what: Path) -> int:
+    """Status of a program that draws: it prints the picture's name, or one sentence and returns 2."""
+    try:
+        print(draw())
+    except (ImportError, RuntimeError, ValueError, OSError) as error:
+        print(str(error).split("\n", 1)[0], file=sys.stderr)
+    except UNREADABLE as error:  # of matplotlib, h5py or numpy
+        print(f"cannot draw {what} ({error!r}): give the file that a run has written", file=sys.stderr)
+    else:
+        return 0
+    return 2

@@ -12,15 +12,25 @@ from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
-from rodfem.output.intervals import Interval, changes_at, coexisting, intervals_in, intervals_of, without_stable
-from rodfem.output.pieces import MEETS, PLANAR, STABLE, UNDECIDED
+from rodfem.output.pieces import (
+    MEETS,
+    PLANAR,
+    STABLE,
+    UNDECIDED,
+    Interval,
+    changes_at,
+    coexisting,
+    intervals_in,
+    intervals_of,
+    without_stable,
+)
 from rodfem.output.words import is_sweep, many
 
 MOST_INTERVALS, MOST_NAMES = 6, 6
-"""Intervals of a branch that are told one by one, and branches that are named in one sentence."""
+"""Intervals of a branch that have a clause each, and branches that are named in one sentence."""
 Branches = Sequence[Mapping[str, Any]]
-DIGITS, FEW, MOST = 10, 6, 15
-"""Significant digits of a load at most, and of one without an error bar; those of a float."""
+DIGITS, FEW = 10, 6
+"""Significant digits of a load at most, and of one without an error bar."""
 EVENTS = {
     FOLD: "turns back in a fold",
     FLUTTER: "flutters: two frequencies coincide and become complex",
@@ -39,16 +49,15 @@ UNRESOLVED = ", as far as this mesh tells: it does not resolve that state"
 def in_sentences(data: Mapping[str, Any]) -> list[str]:
     """Sentences on a diagram, the contents of ``diagram.json``: its branches, ranges of stability, open questions."""
     first, *others = data["branches"]
-    told = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
-    quiet = [branch for branch in others if branch not in told and _kinds(branch)]
-    out = [_of_branch(branch, data) for branch in (first, *told[:MOST_NAMES])]
-    if more := told[MOST_NAMES:]:
+    shown = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
+    quiet = [branch for branch in others if branch not in shown and _kinds(branch)]
+    out = [_of_branch(branch, data) for branch in (first, *shown[:MOST_NAMES])]
+    if more := shown[MOST_NAMES:]:
         out.append(f"{_names(more)} have stable states, too.")
     if quiet:
-        out.append(
-            f"{_names(quiet)} {'is unstable on its' if len(quiet) == 1 else 'are unstable on their'} whole range."
-        )
-    return [*out, *([] if is_sweep(data) else _ranges(data)), *_open(data)]
+        verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
+        out.append(f"{_names(quiet)} {verb} whole range.")
+    return [*out, *_ranges(data), *_open(data)]
 
 
 def _kinds(branch: Mapping[str, Any]) -> set[str]:
@@ -61,7 +70,7 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     intervals, load, name = intervals_of(branch), data["parameter"], _subject(branch, data)
     if not intervals:
         return f"{name} has one state only; {_end(branch)}."
-    start, stop = told_apart(intervals[0].loads[0], intervals[-1].loads[1], width=_width(data))
+    start, stop = distinct_digits(intervals[0].loads[0], intervals[-1].loads[1], width=_width(data))
     if len(intervals) == 1:
         coarse = any(special.get("resolved") is False for special in branch["special"])
         state, doubt = _state(intervals[0], data), UNRESOLVED if coarse else ""
@@ -74,14 +83,14 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
 
 def _changes(intervals: Sequence[Interval], data: Mapping[str, Any], stop: str) -> Iterator[tuple[str, str]]:
     """States of intervals in order, each with what happens at its end; only the first of many."""
-    told = intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
-    for one, after in zip(told, intervals[1:], strict=False):
+    shown = intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
+    for one, after in zip(shown, intervals[1:], strict=False):
         where, what = change_in_words(one, after, data["branches"])
         yield _state(one, data), f"to {where}, where it {what}"
-    if len(intervals) == len(told):
-        yield _state(told[-1], data), f"to {stop}"
+    if len(intervals) == len(shown):
+        yield _state(shown[-1], data), f"to {stop}"
     else:
-        more = many(len(intervals) - 1 - len(told), "time")
+        more = many(len(intervals) - 1 - len(shown), "time")
         yield "its stability", f"changes {more} more before {data['parameter']} = {stop}"
 
 
@@ -133,14 +142,14 @@ def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
     load, stable = data["parameter"], intervals_in(data["branches"], STABLE)
     undecided = [x.covers for x in intervals_in(data["branches"], UNDECIDED)]
     for a, b in without_stable(stable, *sorted(data["range"])):
-        first, last = told_apart(a, b, width=_width(data))
+        first, last = distinct_digits(a, b, width=_width(data))
         doubt = any(low < b and high > a for low, high in undecided)
         but = ", but there are states of undecided stability" if doubt else ""
         yield f"From {load} = {first} to {last} no stable state was found{but}."
     pairs = list(coexisting(stable))
     for one, other, a, b in pairs[:MOST_NAMES]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
-        first, last = told_apart(a, b, width=_width(data))
+        first, last = distinct_digits(a, b, width=_width(data))
         yield f"From {load} = {first} to {last} two stable states coexist, of {names}: hysteresis is possible."
     if more := pairs[MOST_NAMES:]:
         yield f"So do {many(len(more), 'further pair')} of stable states at other loads."
@@ -171,7 +180,7 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
     if found := changes_at(branch, row):
         return known_digits(found[0]), " and ".join(_event(special, branch, branches) for special in found)
     column, segment = branch["columns"]["load"], row if after.rank > one.rank else row - 1
-    a, b = told_apart(column[segment], column[segment + 1])
+    a, b = distinct_digits(column[segment], column[segment + 1])
     unexplained = any(change["row"] == segment for change in branch.get("unexplained") or ())
     what = "changes its index without a special point that says why" if unexplained else _change(one, after)
     return f"some load between {a} and {b}", what
@@ -229,11 +238,11 @@ def _least_zeros(branch: Mapping[str, Any]) -> int:
     return min(branch["columns"]["zero"])
 
 
-def told_apart(*loads: float, width: float = 0.0) -> list[str]:
+def distinct_digits(*loads: float, width: float = 0.0) -> list[str]:
     """Loads with as many digits as a range of that ``width`` needs: by default from the first load to the last."""
     width = width or abs(loads[-1] - loads[0])
     more = ceil(log10(max(map(abs, loads)) / width)) if width and any(loads) else 0
-    return [f"{load:.{min(FEW + max(more, 0), MOST)}g}" for load in loads]
+    return [f"{load:.{min(FEW + max(more, 0), 15)}g}" for load in loads]
 
 
 def known_digits(special: Mapping[str, Any]) -> str:

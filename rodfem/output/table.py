@@ -1,6 +1,6 @@
 """The table of a diagram: each column of a branch, and each entry of a special point, declared once, in ``table.md``.
 
-A row there has the name, type and unit of an entry, what it means, and when it is there.  Files are written and checked
+A row there has the name, type and unit of an entry, what it means, and when it is there.  Files are written
 by it, ``docs/files.md`` has it, and so have the glossary, the page, and the tables of other programs.  A new column is
 one row there, and the line that computes it in :class:`~rodfem.continuation.branch.Point`.
 """
@@ -11,17 +11,16 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
-from math import inf, isfinite, nan
+from math import inf, nan
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
-from rodfem.continuation.kinds import KINDS
 from rodfem.stability.soft_mode import SoftMode
 
 Data = Mapping[str, Any]
-Test = Callable[[Any], bool]
 Source = Callable[[Any], Any]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+?) \| ([^|]*?) ?\| (.+?) \| ([^|]*?) ?\|$", re.MULTILINE)
 PAGE = (files("rodfem.output") / "table.md").read_text(encoding="utf-8")
@@ -31,21 +30,20 @@ def _soft(attribute: str) -> Source:
     return lambda point: [plain(getattr(mode, attribute)) for mode in point.soft]
 
 
-def _of_point(name: str) -> Source:
-    return lambda special: getattr(special.point, name)
-
-
+ATTRIBUTES = {
+    "ordinate_error_estimate": "ordinate_error",
+    "omega2_error_estimate": "omega2_error",
+    "followed": "switched",
+}
+"""Attributes of a special point that have another name than its entries."""
 OF_POINT: dict[str, Source] = {
     **{("soft" if name == "name" else f"soft_{name}"): _soft(name) for name in ("name", "value", "uncertainty")},
     "unstable": lambda point: point.negative if point.omega2 else None,
 }
 OF_SPECIAL: dict[str, Source] = {
-    **{name: _of_point(name) for name in ("load", "ordinate", "energy", "zero")},
+    **{name: attrgetter(f"point.{name}") for name in ("load", "ordinate", "energy", "zero")},
     "kind": lambda special: str(special.kind),
-    "ordinate_error_estimate": lambda special: special.ordinate_error,
-    "omega2_error_estimate": lambda special: special.omega2_error,
     "meets": lambda special: list(special.connects_to) if special.connects_to else None,
-    "followed": lambda special: special.switched,
     "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
 }
 """Where values come from that are no attributes of their name."""
@@ -72,7 +70,7 @@ class Entry:
 
     def value(self, point: Point | SpecialPoint) -> Any:
         """What a file has of a point; numbers that are not finite become null."""
-        return plain(getattr(point, self.name) if self.of is None else self.of(point))
+        return plain(getattr(point, ATTRIBUTES.get(self.name, self.name)) if self.of is None else self.of(point))
 
     def kept(self, column: Sequence[Any]) -> bool:
         """Whether a branch has this column: it is always there, or a row has something in it."""
@@ -139,9 +137,8 @@ def soft_modes(row: Data) -> list[SoftMode]:
 
 def special_values(entry: Data) -> dict[str, Any]:
     """Attributes of a special point of a file, as :class:`~rodfem.continuation.branch.SpecialPoint` takes them."""
-    names = {f"{name}_error_estimate": f"{name}_error" for name in ("ordinate", "omega2")} | {"followed": "switched"}
-    read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")] + [*names]
-    values = {names.get(name, name): _number(entry.get(name)) for name in read}
+    read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")]
+    values = {ATTRIBUTES.get(name, name): _number(entry.get(name)) for name in read}
     values |= {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
     values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
     return values | {"law": _law(entry["law"]) if entry["law"] else None}
@@ -154,51 +151,3 @@ def _law(law: Data) -> NormalForm:
 def _number(value: Any) -> Any:
     """Value of a file, in which null stands for what is not finite."""
     return nan if value is None else value
-
-
-def _is_count(x: Any) -> bool:
-    return isinstance(x, int) and not isinstance(x, bool) and 0 <= x < 2**31
-
-
-TYPES: dict[str, tuple[Test, str]] = {
-    "number": (
-        lambda x: isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) < 1e300 and isfinite(x),
-        "a finite number",
-    ),
-    "integer": (_is_count, "a whole number"),
-    "text": (lambda x: isinstance(x, str), "a text"),
-    "boolean": (lambda x: isinstance(x, bool), "true or false"),
-    "object": (lambda x: isinstance(x, dict), "an object"),
-    "place": (
-        lambda x: isinstance(x, list) and len(x) == 2 and isinstance(x[0], str) and _is_count(x[1]),
-        "a name and a number",
-    ),
-    "kind": (lambda x: isinstance(x, str) and x in KINDS, f"one of {', '.join(KINDS)}"),
-    "name": (
-        lambda x: isinstance(x, str) and x not in ("", ".", "..") and "/" not in x and "\0" not in x,
-        "a name without slashes",
-    ),
-}
-"""Types, each with its test and in words."""
-
-
-def test_of(kind: str) -> tuple[Test, str]:
-    """Test of a type of :class:`Entry`, of one row where it has a dimension ``P``, and the type in words."""
-    kind = kind.replace("text, integer (2)", "place")
-    base, size, null = re.fullmatch(r"(\w+)(?: \(([^)]*)\))?( or null)?", kind).groups()  # type: ignore[union-attr]
-    test, words = TYPES[base]
-    sizes = [x for x in (size or "").split(", ") if x not in ("", "P")]
-    if null and not sizes:
-        return _or_none(test), f"{words} or null"
-    test = _or_none(test) if null else test
-    for number in reversed(sizes):
-        test, words = _all(test, None if number == "k" else int(number)), f"a list of {words.split(' ')[-1]}s"
-    return test, words
-
-
-def _or_none(test: Test) -> Test:
-    return lambda x: x is None or test(x)
-
-
-def _all(test: Test, size: int | None) -> Test:
-    return lambda x: isinstance(x, list) and (size is None or len(x) == size) and all(map(test, x))

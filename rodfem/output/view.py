@@ -17,15 +17,13 @@ from rodfem.problem.setting import HELD, TURNS, Setting
 
 Floats = NDArray[np.float64]
 
-TILT, STEEP, ABOVE, ASIDE = np.radians([20.0, 55.0, 35.0, 40.0])
-"""By which a picture is seen from above; that of a closed rod, to show what is across its plane; and by which a rod
-that bends and moves in different planes is seen from above, and from aside."""
-NEAR, SIDEWAYS, LEVEL = 0.9, 0.3, 0.1
-"""Cosines: from which on a direction is taken for that of the nearest axis of space, or a load for that of the motion;
-below which a chord leaves the axis of the rod's only support sideways; below which an axis of space is across."""
-ARCHED, UNSEEN = 0.05, 1e-3
-"""Mean distance of a rod from the line of its ends from which on it is an arch, and displacement, or distance of the
-ends, that a picture does not show: relative to the rod's size."""
+TILT = np.radians(20.0)
+"""By which a picture is seen from above."""
+NEAR, LEVEL = 0.9, 0.1
+"""Cosines: from which on a direction is that of the nearest axis of space, or a load that of the motion; below which an
+axis of space is across."""
+UNSEEN = 1e-3
+"""Displacement, or distance of the ends, that a picture does not show, relative to the rod's size."""
 POINT = 1e-9
 """A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
 
@@ -43,22 +41,19 @@ def view_of(
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
     ``reference`` and ``moved`` (n, 3) are the centreline of the state that the rod has left, and the displacement from
-    it.  All other arguments are directions (3,): ``axis`` that of the rod (None: from one end of ``reference`` to the
-    other), ``down`` that of a load along the rod, of gravity, which is downwards, ``load`` that of a force across the
-    rod, or of its deflection, which is not along the line of sight, ``side`` what is upwards where a straight rod has
-    not moved.  With ``feet`` the rod is held in two places or more, and may be an arch.
+    it.  Directions (3,) are ``axis``, that of the rod (None: its chord), ``down``, that of gravity, ``load``, that of a
+    force across the rod, or of its deflection, and ``side``, upwards where a straight rod has not moved.  With ``feet``
+    the rod is held in two places or more, and may be an arch.
 
     Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is the
-    principal direction of the displacement across it.  A load that is not nearly along that direction is vertical
-    instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is horizontal,
-    whichever way the rod moves and the load pulls, but for an arch on whose crown the load presses: its crown is above
-    its feet.  A closed rod is shown in the plane nearest to it.
+    principal direction of the displacement across it, or a load that is not nearly along that; then the rod is seen
+    from aside.  A closed rod is shown in the plane nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
     shape, tilt = moved.T @ moved / len(moved), TILT
     if np.linalg.norm(chord) < UNSEEN * size and down is None:
-        (right, up), tilt = _plane(reference + moved), STEEP
+        (right, up), tilt = _plane(reference + moved), np.radians(55.0)  # what is across the plane is seen
     elif down is not None:
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
@@ -88,14 +83,14 @@ def _loaded(right: Floats, up: Floats, load: Floats, arch: Floats | None) -> tup
     up = up - (up @ right) * right
     up = upwards(up / np.linalg.norm(up))
     up = up * _standing(up, arch, load)
-    return np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up), up, ABOVE  # the rod goes away, so upwards
+    turned = np.cos(np.radians(40.0)) * right + np.sin(np.radians(40.0)) * np.cross(right, up)
+    return turned, up, np.radians(35.0)  # the rod goes away, so upwards
 
 
 def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
-    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), held and loaded so.
+    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``.
 
-    ``setting`` holds and loads it, ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to
-    show, by default of dead forces.
+    ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to show, by default of dead forces.
     """
     load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
     along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}
@@ -117,7 +112,7 @@ def axis_of(setting: Setting, reference: Floats) -> Floats:
     chord, holding = reference[-1] - reference[0], [x for x in setting.supports if x.held.any() or x.turning != TURNS]
     if len(holding) == 1 and holding[0].turning == HELD:
         stem = directors(holding[0].frame)[:, 2]
-        if stem @ chord > SIDEWAYS * np.linalg.norm(chord):
+        if stem @ chord > 0.3 * np.linalg.norm(chord):
             return np.asarray(stem)
     return np.asarray(chord)
 
@@ -127,7 +122,7 @@ def _standing(up: Floats, rod: Floats | None, load: Floats) -> float:
     if rod is None:
         return 1.0
     bow, size = (rod - np.linspace(rod[0], rod[-1], len(rod))).mean(axis=0), np.linalg.norm(np.ptp(rod, axis=0))
-    arch = np.linalg.norm(bow) > ARCHED * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
+    arch = np.linalg.norm(bow) > 0.05 * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
     return sign_of(up @ bow) if arch and load @ bow < 0 else 1.0
 
 

@@ -73,13 +73,9 @@ def scale_of(data: Data) -> float:
 
 def special_in_words(branch: Data, special: Data, scale: float = 0.0) -> tuple[str, str, str]:
     """Load, ordinate and index of a special point; a load that is given is exact.  ``scale`` is that of ordinates."""
-    resolved, bars = (
-        special.get("resolved"),
-        (_bar(special, "error_estimate"), _bar(special, "ordinate_error_estimate")),
-    )
-    load, ordinate = (
-        number(special[name], bar, resolved, size) for name, bar, size in zip(READ, bars, (0.0, scale), strict=True)
-    )
+    resolved = special.get("resolved")
+    load = number(special["load"], _bar(special, "error_estimate"), resolved)
+    ordinate = number(special["ordinate"], _bar(special, "ordinate_error_estimate"), resolved, scale)
     if KINDS[special["kind"]].given and not is_solved(branch, special):
         load = f"{special['load']:.10g}"
     return load, ordinate, index_in_words(special, row_of(branch, special["row"]))
@@ -136,12 +132,12 @@ def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, st
     """Load and ordinate of each row of a branch, those with an estimate, as ``0.3216501 (3e-07)``.
 
     Special points have bounds of their own.  Those of other rows are relative, to ``natural`` sizes by the name of the
-    number; without these, as in older files, nothing is known of such rows.
+    number.
     """
     columns = branch["columns"]
     relative = columns.get("estimate") or [None] * len(columns["load"])
-    found = [_reading({name: columns[name][row] for name in READ if name in natural}, error, natural)
-             for row, error in enumerate(relative)]  # fmt: skip
+    rows = ({name: columns[name][row] for name in READ} for row in range(len(relative)))
+    found = [_reading(values, error, natural) for values, error in zip(rows, relative, strict=True)]
     for special in branch["special"]:
         bars = zip(READ, (special.get("error_estimate"), special.get("ordinate_error_estimate")), strict=True)
         here = {name: number(special[name], x, special.get("resolved")) for name, x in bars if x is not None}

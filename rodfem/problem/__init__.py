@@ -1,6 +1,3 @@
 """The statement of a rod: scene, ends, loads, constraints, what is checked of them.  No dolfinx, no PETSc."""
 
 import rodfem.forms  # noqa: F401, before UFL: see rodfem.forms.importing
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.problem")

@@ -1,26 +1,33 @@
-"""Branches of ``diagram.json`` as the page draws them: columns, pieces, special points, frequencies, words."""
+"""Branches of ``diagram.json``, and loci of special points, as the page draws them: numbers, curves and words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from html import escape
 from math import nan
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rodfem.continuation.kinds import KINDS
+from rodfem.errors import InputError
+from rodfem.file_format import LOCUS, read_json
 from rodfem.modes.modes import RIGID
-from rodfem.output.frequency_curves import curves, ranges_of, top
+from rodfem.output.digits import number, with_unit
 from rodfem.output.pieces import endings, pieces_of
-from rodfem.output.plot_frequencies import SPECIAL
-from rodfem.output.smooth import between
+from rodfem.output.plot_diagram import between
+from rodfem.output.plot_frequencies import SPECIAL, curves, ranges_of, top
+from rodfem.output.plot_locus import LINES, in_words, plane_of, stable_region
 from rodfem.output.words import readings_of, words_of
-from rodfem.report.packing import plain
-from rodfem.report.shapes import Shapes
-from rodfem.tolerances import NEGLIGIBLE
+from rodfem.report.markup import html_of, plain
+from rodfem.tolerances import NEGLIGIBLE, same_special
 from rodfem.writhe import writhe
+
+if TYPE_CHECKING:
+    from rodfem.report.rods import Shapes
 
 UNLISTED = ("load", "negative", "zero", "mesh", "unstable", "negative_in_space", "drift", "error")
 """Columns that are no ordinates: the abscissa, counts, and residuals."""
@@ -39,11 +46,11 @@ def branch_data(
 ) -> dict[str, Any]:
     """A ``branch`` in a ``colour``; ``shapes`` are those of its rows, ``natural`` the sizes of load and ordinate.
 
-    Whether the rod is ``planar`` is told of stable rows.
+    Words of stable rows say whether the rod is ``planar``.
     """
     columns = branch["columns"]
     words = words_of(branch, planar=planar)
-    told = list(dict.fromkeys(words))
+    different = list(dict.fromkeys(words))
     ordinates = {name: _clear(columns[name], natural.get(name, 0.0)) for name in _listed(columns)} | _derived(shapes)
     return {
         "name": branch["name"],
@@ -58,8 +65,8 @@ def branch_data(
         "readings": readings_of(branch, natural),
         "pieces": [{"rows": [x.first, x.last], "kind": x.kind, "index": x.label} for x in pieces_of(branch)],
         "special": [_special(x) for x in branch["special"]],
-        "words": [told.index(each) for each in words],
-        "told": [asdict(each) for each in told],
+        "words": [different.index(each) for each in words],
+        "told": [asdict(each) for each in different],
         "spectrum": _spectrum(branch),
         "omega2": _without_noise(columns),
         "frequencies": frequencies_of(branch),
@@ -163,4 +170,79 @@ def _special(special: Mapping[str, Any]) -> dict[str, Any]:
         "law": (special.get("law") or {}).get("kind", ""),
         "note": special.get("note") or "",
         "drawn": bool(kind.marker),
+    }
+
+
+# --- loci
+NEEDED = ("parameters", "columns", "marks", "start", "labels", "kind", "bounds")
+
+
+def loci_of(folder: Path, data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Loci of a folder in the order of their numbers; raises :class:`InputError` for one of another load."""
+    files = sorted(folder.glob("locus-*.json"), key=lambda path: (len(path.name), path.name))
+    read = [read_json(path, LOCUS, NEEDED) for path in files]
+    found = [_locus(path, one, data) for path, one in zip(files, read, strict=True)]
+    return [shown | {"region": _region(one, read)} for shown, one in zip(found, read, strict=True)]
+
+
+def _region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> list[list[float]] | None:
+    """The stable region next to a locus: values of the second parameter, and its two bounds of the load there."""
+    same = [other for other in loci if other["parameters"] == one["parameters"]]
+    region = stable_region(one, same)
+    return region and [column.tolist() for column in region]
+
+
+def _special_points(one: Mapping[str, Any], data: Mapping[str, Any]) -> list[list[int]]:
+    """Branch and row of each special point of the diagram that the locus passes, by their numbers."""
+    return [
+        [number, special["row"]]
+        for number, branch in enumerate(data["branches"])
+        for special in branch["special"]
+        if special["kind"] == one["kind"]
+        and any(_same(special, place, data["natural"]) for place in one.get("crossings", ()))
+    ]
+
+
+def _same(special: Mapping[str, Any], place: Sequence[float], natural: Mapping[str, float]) -> bool:
+    """Whether a special point has the load and the ordinate of a place."""
+    here, one = (special["load"], special["ordinate"]), (natural["load"], natural["ordinate"])
+    return same_special(here, special.get("located_to") or 0.0, (place[0], place[1]), one)
+
+
+def _label(one: Mapping[str, Any]) -> str:
+    """The second parameter for its axis: in words, with its symbol and its unit."""
+    words, unit = (one[name][1].replace("$", "") for name in ("words", "units"))
+    symbol = html_of(one["labels"][1], always=True)
+    return " ".join(filter(None, (escape(words), symbol, escape(with_unit("", unit).strip()))))
+
+
+def _readings(one: Mapping[str, Any], places: Iterable[tuple[float, float]]) -> list[list[str]]:
+    """Both parameters, the load last, of each row with an error as ``0.3216501 (3e-07)``; empty for others."""
+    unresolved, found = {*one.get("unresolved", ())}, list[list[str]]()
+    for row, ((x, y), pair) in enumerate(zip(places, one["columns"]["error"], strict=True)):
+        resolved = row not in unresolved
+        found.append([] if None in pair else [number(x, pair[1], resolved), number(y, pair[0], resolved)])
+    return found
+
+
+def _locus(path: Path, one: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, Any]:
+    load, other = one["parameters"]
+    if load != data["parameter"] or other not in data["constants"] or one["kind"] not in LINES:
+        raise InputError(f"{path} is no locus of the diagram beside it: keep the files of one run together.")
+    x, y = (one["columns"][name] for name in (other, load))
+    return {
+        "file": path.name,
+        "kind": one["kind"],
+        "colour": LINES[one["kind"]][0],
+        "x": x,
+        "load": y,
+        "index": one["columns"]["index"],
+        "readings": _readings(one, zip(x, y, strict=True)),
+        "plane": plane_of(one),
+        "words": in_words(one),
+        "marks": [{"row": mark["row"], "kind": mark["kind"]} for mark in one["marks"]],
+        "parameter": other,
+        "label": _label(one),
+        "special": _special_points(one, data),
+        "here": data["constants"][other],
     }

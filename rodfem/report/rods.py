@@ -1,50 +1,61 @@
-"""Shapes, supports, modes and profiles along the rod of all states, as the page draws them."""
+"""Rods in space as the page draws them: shapes of all states, supports, modes, and profiles along the rod."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
-from rodfem.modes.modes import rows_with_modes
+from rodfem.modes.modes import RIGID, SYMMETRY, load_modes, rows_with_modes
+from rodfem.modes.recorded import Few
 from rodfem.modes.recorded import read as recorded
-from rodfem.output.glyphs import glyphs_of
+from rodfem.output.digits import eigenvalue_in_words
+from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
-from rodfem.output.profiles import POINTS, PROFILES, profiles_of
+from rodfem.output.plot_modes import GROWTH, drawn_size
 from rodfem.output.solids import body_of, profile_of
+from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
+from rodfem.output.view import axes_of, thickness
+from rodfem.problem.quaternions import directors
+from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.branches import branch_data
-from rodfem.report.motions import modes_of, motions_of
-from rodfem.report.packing import packed, plain
-from rodfem.report.shapes import BUDGET, Shapes, Stage, shapes_of, stage_of, stations
+from rodfem.report.markup import packed, plain
+from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
 
 Floats = NDArray[np.float64]
 
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
-OVER = 1.02
-"""Distance of the stripe from the axis, relative to that of the surface."""
-UNIFORM = 1e-6
-"""Difference of outlines, in radii of the rod, up to which they are one."""
+SMALL = 1e-3
+"""Share of the greatest eigenvalue below which differences of eigenvalues are relative to this share."""
+BUDGET = 400_000
+"""Stations of all states together above which each has fewer: about 20 MB of the page."""
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
     """Branches with their shapes, and what they share; ``groups`` are those of ``states.h5`` in the ``folder``.
 
-    Raises :class:`InputError` where they are not of the diagram ``data``.
+    ``data`` are those of the diagram.
     """
-    shapes = _shapes(data, groups, folder)
-    states = sum(len(each.r) for each in shapes.values())
+    lengths = {branch["name"]: len(branch["columns"]["load"]) for branch in data["branches"]}
+    states = sum(lengths.values())
+    count = stations(max(groups[name]["s"].shape[1] for name in lengths), states)
+    shapes = {name: shapes_of(groups[name], count) for name in lengths}
     stage, shelf, branches = stage_of(data, shapes, groups), dict[tuple[str, str], int](), []
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
         here, group = shapes[branch["name"]], groups[branch["name"]]
-        shown = branch_data(branch, here, colour, data.get("natural") or {}, planar=bool(data.get("planar")))
+        shown = branch_data(branch, here, colour, data["natural"], planar=bool(data.get("planar")))
         shown |= _drawn(here, group, stage, shelf) | profiles_data(group, states)
         shown |= _moving(branch, here, group, folder / "modes.h5", stage)
         traced = is_traced(branch, data["branches"])
@@ -68,13 +79,11 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
     """Profiles of a branch, whose group of ``states.h5`` is given; ``states`` is the number of those of all branches.
 
-    Where the file has them: ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors
+    They are ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors
     at M points, nan beyond the last one of a coarser mesh; ``element`` (P,), how many of them an element has, which
     determine its polynomials, and 0 where some are left out; ``jumps`` (P,) of each of the four between elements.
     """
-    found = [one for one in (profiles_of(group, row) for row in range(len(group["load"]))) if one is not None]
-    if not found:
-        return {"profile": None, "element": None, "jumps": None}
+    found = [profiles_of(group, row) for row in range(len(group["load"]))]
     most, loaded = group[POINTS][0].size, _loaded(group)
     kept = np.unique(np.linspace(0, most - 1, min(most, max(2, BUDGET // states))).round().astype(int))
     out = np.full((len(found), most, 1 + 3 * len(PROFILES)), np.nan)
@@ -93,16 +102,6 @@ def _loaded(group: Any) -> list[float]:
     return [s for s in found if np.isfinite(s)]
 
 
-def _shapes(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Shapes]:
-    lengths = {branch["name"]: len(branch["columns"]["load"]) for branch in data["branches"]}
-    count = stations(max(groups[name]["s"].shape[1] for name in lengths), sum(lengths.values()))
-    shapes = {name: shapes_of(groups[name], count) for name in lengths}
-    for name, length in lengths.items():
-        if len(shapes[name].r) != length:
-            raise InputError(f"{folder / 'states.h5'} has other rows of {name!r} than diagram.json: run it again.")
-    return shapes
-
-
 def _drawn(shapes: Shapes, group: Any, stage: Stage, shelf: dict[tuple[str, str], int]) -> dict[str, Any]:
     """Shapes of all states, and the bodies of their supports and loads: numbers on the ``shelf``, and maps."""
     found = [glyphs_of(read_setting(group, row), shapes.s, shapes[row], stage.look) for row in range(len(shapes.r))]
@@ -118,7 +117,7 @@ def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, 
     return {
         "s": packed(shapes.s),
         "outline": packed(_outline(shapes, stage, OUTLINE)),
-        "stripe": packed(OVER * _outline(shapes, stage, STRIPE)),
+        "stripe": packed(1.02 * _outline(shapes, stage, STRIPE)),
         "radius": stage.look.radius,
         "size": float(shapes.s[-1] - shapes.s[0]),
         "axes": stage.look.axes.tolist(),
@@ -131,7 +130,7 @@ def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, 
 def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
     """Outline of the cross-sections (1, k, 2), or (S, k, 2) at the stations where they differ."""
     whole = stage.look.radius * profile_of(shapes.s, stage.setting.section, angles)
-    return whole[:1] if np.ptp(whole, axis=0).max() < UNIFORM * stage.look.radius else whole
+    return whole[:1] if np.ptp(whole, axis=0).max() < SAME_SPECIAL * stage.look.radius else whole
 
 
 def _solids(shelf: dict[tuple[str, str], int]) -> list[dict[str, Any]]:
@@ -146,3 +145,158 @@ def _solids(shelf: dict[tuple[str, str], int]) -> list[dict[str, Any]]:
         }
         for points, triangles, body, color in made
     ]
+
+
+# --- shapes
+
+
+def stations(nodes: int, states: int) -> int:
+    """Number of stations for states with so many nodes, odd, so that the middle of the rod is one."""
+    return max(49, min(2 * nodes - 1, 241, BUDGET // max(states, 1))) | 1
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """P states at S stations: arclengths ``s`` (S,), centreline ``r`` (P, S, 3), unit quaternions ``q`` (P, S, 4)."""
+
+    s: Floats
+    r: Floats
+    q: Floats
+
+    def __getitem__(self, row: int) -> tuple[Floats, Floats]:
+        """Centreline (S, 3) and directors (S, 3, 3), columns of each matrix, of a state."""
+        return self.r[row], directors(self.q[row])
+
+
+def shapes_of(group: Any, count: int) -> Shapes:
+    """Read the states below the group of a branch at ``count`` stations, by splines through the nodes.
+
+    The centre of a rod that nothing holds, which may be anywhere, is the origin.  Raises :class:`InputError` where a
+    state is not finite, or no curve.
+    """
+    try:
+        rows = [curve_at(group, row, count) for row in range(len(group["s"]))]
+    except ValueError as trouble:  # of the splines
+        sentence = f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again."
+        raise InputError(sentence) from trouble
+    at, positions, quaternions = (np.array(part) for part in zip(*rows, strict=True))
+    if SUPPORTS in group and not any(group.get(name) for name in (SUPPORTS, FOUNDATION, TIES)):
+        positions = positions - positions.mean(axis=1, keepdims=True)
+    return Shapes(at[0], positions, quaternions)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The picture of the typical state.
+
+    ``branch`` and ``row`` are those of the state, ``look`` size and directions of the picture, ``load`` the unit vector
+    along the dead load (3,), or None, and ``setting`` what holds and loads the rod.
+    """
+
+    branch: str
+    row: int
+    look: Look
+    load: Floats | None
+    setting: Setting
+
+
+def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any) -> Stage:
+    """Stage for a diagram; ``groups`` are those of the branches in ``states.h5``, ``shapes`` their states."""
+    branch, row, _ = typical_state(data)
+    first = data["branches"][0]
+    load = next(b["columns"]["load"][row] for b in data["branches"] if b["name"] == branch)
+    left = 0 if branch == first["name"] else int(np.argmin(abs(np.array(first["columns"]["load"]) - load)))
+    reference, (r, frames) = shapes[first["name"]].r[left], shapes[branch][row]
+    setting = read_setting(groups[branch], row)
+    down = setting.force if setting.down is None else setting.down
+    axes = axes_of(setting, reference, r - reference, frames[0])
+    return Stage(branch, row, Look(thickness(r), axes), None if down is None else down / np.linalg.norm(down), setting)
+
+
+# --- modes
+
+
+class Shown(NamedTuple):
+    """A mode: eigenvalue ``value``, bound of its ``error`` (nan: not estimated), name of its ``motion``.
+
+    ``u`` and ``w`` (m, 3) are displacement and rotation at the nodes ``s`` (m,); ``zero`` says that the count at the
+    state has its eigenvalue among those that vanish.
+    """
+
+    value: complex
+    error: float
+    motion: str
+    s: Floats
+    u: NDArray[Any]
+    w: NDArray[Any]
+    zero: bool = False
+
+
+def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[Shown]:
+    """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical.
+
+    ``path`` is the file with error bars, None where it has not this state, and ``place`` the branch and row in it;
+    ``typical`` are modes that the run has recorded there, at nodes ``s``, and ``zeros`` is the number of eigenvalues
+    that vanish, symmetries included.
+    """
+    shown: list[Shown] = []
+    if path is not None:
+        modes = load_modes(path, *place)
+        each = zip(modes.value, modes.error, modes.motion, modes.displacement, modes.rotation, strict=True)
+        shown += [Shown(complex(mu), float(error), motion, modes.s, u, w) for mu, error, motion, u, w in each]
+    shown += [] if typical is None else _others(typical, s, [mode.value for mode in shown])
+    shown.sort(key=lambda mode: (mode.motion in (SYMMETRY, RIGID), mode.value.real))
+    others = [mode for mode in shown if mode.motion != SYMMETRY]
+    vanish = sorted(others, key=lambda mode: abs(mode.value))[: max(zeros - (len(shown) - len(others)), 0)]
+    return [mode._replace(zero=any(mode is other for other in vanish)) for mode in shown]
+
+
+def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[Shown]:
+    """Modes that a run has recorded, but those with eigenvalues that are ``known``; these have symmetries, too."""
+    least = SMALL * abs(typical.value).max(initial=0.0)
+    each = zip(typical.value, typical.motion, typical.displacement, typical.rotation, strict=True)
+    return [
+        Shown(complex(mu), np.nan, motion, s, u, w)
+        for mu, motion, u, w in each
+        if not (known and motion == SYMMETRY)
+        and not any(abs(x - mu) <= SAME_EIGENVALUE * max(abs(mu), least) for x in known)
+    ]
+
+
+def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Setting, look: Look) -> list[dict[str, Any]]:
+    """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one.
+
+    ``shapes`` are those of the branch, ``setting`` is what holds and loads the state, ``look`` that of the picture, and
+    ``modes`` are those of :func:`modes_of`.
+    """
+    r, frames = shapes[row]
+    span = float(np.linalg.norm(np.ptp(r, axis=0)))
+
+    def moved(u: Floats, w: Floats) -> Any:
+        turned = Rotation.from_rotvec(w).as_matrix() @ frames
+        return packed([x.map for x in glyphs_of(setting, shapes.s, (r + u, turned), look, r)])
+
+    out = []
+    for mode in modes:
+        u, w = (CubicSpline(mode.s, part)(shapes.s) for part in (mode.u, mode.w))
+        size = drawn_size(u, w, span)
+        parts = [(size * part(u), size * part(w)) for part in ([np.real, np.imag] if mode.value.imag else [np.real])]
+        drawn = [packed(np.concatenate(part, axis=1)) for part in parts]
+        out.append(_about(mode) | {"parts": drawn, "maps": [moved(*part) for part in parts]})
+    return out
+
+
+def _about(mode: Shown) -> dict[str, Any]:
+    """Eigenvalue, in words with its error, and what the motion does: ``zero``, ``grows`` or neither."""
+    exact, known = mode.motion in (SYMMETRY, RIGID), bool(np.isfinite(mode.error))
+    zero = exact or mode.zero or bool(abs(mode.value) <= np.nan_to_num(mode.error, posinf=0.0))
+    mu = 0j if zero and (exact or not known) else mode.value
+    root = np.sqrt(-mu)
+    words = "0 (exact)" if exact else eigenvalue_in_words(mu, mode.error) or "0" * zero
+    return {
+        "value": [mu.real, mu.imag],
+        "words": words,
+        "motion": mode.motion,
+        "root": [float(root.real), float(root.imag)],
+        "kind": "zero" if zero else "grows" if root.real > GROWTH * abs(root) else "swings",
+    }

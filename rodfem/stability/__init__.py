@@ -1,6 +1,3 @@
 """Is an equilibrium stable?  Inertia, eigensolvers, the paper's reduction, and one interface to all."""
 
 from rodfem import libraries  # noqa: F401, before all that computes
-from rodfem.lazy import attributes
-
-__getattr__ = attributes("rodfem.stability")

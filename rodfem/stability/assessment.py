@@ -14,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.faults import as_failure
+from rodfem.ranks import as_failure
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.dependence import rank_of
 from rodfem.stability.methods import Found, Method, Workspace

@@ -21,7 +21,7 @@ from hard.folders import surroundings
 from rodfem import Discretization, Plan, run, trace
 from rodfem.app.screen import coloured
 from rodfem.app.terminal import Report, is_screen
-from rodfem.launcher import RANK
+from rodfem.ranks import RANK
 
 pytestmark = pytest.mark.alone
 HOME = Path(__file__).parents[2]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pydoc
 import re
 import subprocess
 import sys
@@ -157,8 +156,8 @@ def test_branch_points_below_the_depth_are_counted(folder: Path, capfd: pytest.C
 
 
 @pytest.mark.long
-def test_modules_are_attributes() -> None:
-    """In an interpreter that has loaded nothing else, as ``import rodfem; help(rodfem.modes.modes)``."""
+def test_help_has_all_that_pages_name() -> None:
+    """In an interpreter that has loaded nothing else, as ``help("rodfem.modes.modes")``."""
     if not FIRST:
         return
     pages = ["README.md", "docs/running.md", "docs/rods.md", "rodfem/__init__.py"]
@@ -168,17 +167,15 @@ def test_modules_are_attributes() -> None:
     paths = [path.removeprefix("rodfem/") for path in paths if "tests" not in path]
     named |= {"rodfem." + path.replace("/", ".") for path in paths}
     assert {"rodfem.modes.modes", "rodfem.problem.constraint", "rodfem.fem.link.link", "rodfem.forms.loads"} <= named
-    lines = ["import pydoc, rodfem"] + [f"pydoc.render_doc({name})" for name in sorted(named)]
+    lines = ["import pydoc, rodfem"] + [f"pydoc.render_doc({name!r})" for name in sorted(named)]
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
 
 
 def test_what_is_no_module_is_named() -> None:
-    for owner, words in ((rodfem, "it has Attachment, "), (rodfem.stability, "'rodfem.stability' has no")):
-        with pytest.raises(AttributeError, match=words):
-            _ = owner.nothing
-    assert "Modes of one state" in pydoc.render_doc(rodfem.modes.modes)
+    with pytest.raises(AttributeError, match="it has Attachment, "):
+        _ = rodfem.nothing
 
 
 @pytest.mark.long

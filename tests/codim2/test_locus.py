@@ -37,11 +37,10 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.plot_locus import _about, draw_locus
-from rodfem.output.stable_region import stable_region
+from rodfem.output.plot_locus import _about, draw_locus, stable_region
 from rodfem.problem.ends import clamped, free, pinned
 from rodfem.problem.scene import Ordinate, Parameter, Scene
-from rodfem.report.loci import loci_of
+from rodfem.report.branches import loci_of
 
 pytestmark = pytest.mark.alone
 

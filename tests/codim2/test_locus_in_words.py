@@ -15,8 +15,8 @@ from rodfem.codim2.locus import COARSE, Locus
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.files import save_json
-from rodfem.output.stable_region import in_words, stable_region
-from rodfem.report.loci import _readings
+from rodfem.output.plot_locus import in_words, stable_region
+from rodfem.report.branches import _readings
 
 pytestmark = pytest.mark.alone
 

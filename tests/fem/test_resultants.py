@@ -13,7 +13,7 @@ import rodfem
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.profiles import Profiles
+from rodfem.output.states import Profiles
 from rodfem.problem.quaternions import directors
 from rodfem.problem.scene import Parameter, Scene
 

@@ -18,7 +18,7 @@ from rodfem.codim2.locus import Locus
 from rodfem.continuation.kinds import CROSSES
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.stable_region import stable_region
+from rodfem.output.plot_locus import stable_region
 
 MESH = Discretization("auto", 4, 6)
 UNIFORM = Discretization("auto", 4, 3)

@@ -23,10 +23,9 @@ import rodfem
 from rodfem.app.run import Terminal, run
 from rodfem.diagram.diagram import Diagram
 from rodfem.errors import InputError
-from rodfem.output.contents import check_run
 from rodfem.output.files import load_json
-from rodfem.output.folder import LOCK, locked
-from rodfem.whole_files import DRAFTS
+from rodfem.output.states import check_run
+from rodfem.whole_files import DRAFTS, LOCK, locked
 
 COMM = MPI.COMM_WORLD
 MESH, PLAN = rodfem.Discretization("reduced", 4, 6), rodfem.Plan((0.0, 0.2), error_bars=False, depth=1)

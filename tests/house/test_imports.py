@@ -31,8 +31,7 @@ MATRICES = {
 """Linear algebra, which knows nothing of rods."""
 COMMAND_LINE = ("rodfem.app.cli", "rodfem.app.main", "rodfem.app.console", "rodfem.app.script")
 """Beginnings of the names of modules that know options."""
-BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances"}
-BELOW_MATRICES |= {"rodfem.beside", "rodfem.code_cache"}
+BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances", "rodfem.code_cache"}
 """Other modules that they may import."""
 FORMS = "rodfem.forms"
 """The folder ``forms`` beside the package, as which it is installed."""
@@ -191,5 +190,5 @@ def test_arrows_are_what_the_interpreter_follows() -> None:
     while new:
         reached |= new
         new = set().union(*(arrows()[module] for module in new)) - reached
-    packages = {"rodfem", "rodfem.lazy", *(name for name in modules() if (HOME / name.replace(".", "/")).is_dir())}
+    packages = {"rodfem", *(name for name in modules() if (HOME / name.replace(".", "/")).is_dir())}
     assert loaded - packages == reached - packages

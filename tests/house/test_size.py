@@ -14,13 +14,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 36589,
-    "files of Python": 232,
+    "lines of Python": 36518,
+    "files of Python": 233,
     "lines of C": 957,
-    "module constants with a number": 474,
-    "functions of a complexity above 10": 56,
-    "functions of six parameters or more": 40,
-    "places that warn": 33,
+    "module constants with a number": 447,
+    "functions of a complexity above 10": 65,
+    "functions of six parameters or more": 48,
+    "places that warn": 36,
     "files that import internals of UFL and FFCx": 11,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)

@@ -17,14 +17,14 @@ from modes.test_modes import shape
 import rodfem
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError
-from rodfem.faults import in_words
 from rodfem.fem.fields import Discretization
 from rodfem.modes.eigenmotions import Eigenmotions
 from rodfem.modes.modes import SYMMETRY
 from rodfem.modes.recorded import Typical, read
 from rodfem.modes.typical import EVENLY, FEWEST, typical_rows
 from rodfem.problem.scene import Inertia, Scene
-from rodfem.report.payload import payload_of
+from rodfem.ranks import in_words
+from rodfem.report.page import payload_of
 
 pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 6)

@@ -9,14 +9,12 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-import reference_values
 from hemitropic_cases import DEFAULT, run_demo
 from mpi4py import MPI
 from numpy.polynomial import legendre
 from scipy.spatial.transform import Rotation
 
 from rodfem.app.terminal import Report
-from rodfem.output.plot_diagram import draw_diagram
 
 pytestmark = pytest.mark.short
 
@@ -162,19 +160,6 @@ def test_shapes_are_those_of_a_clamped_unshearable_rod(results: dict[str, Path],
                     np.testing.assert_allclose(slope.T, v[row, e] * d3, rtol=0, atol=2e-3)
 
 
-def test_both_formulations_save_the_same_shapes(results: dict[str, Path]) -> None:
-    """At the loads asked for, up to a rotation about the axis."""
-    shapes = []
-    for folder in results.values():
-        (first,) = [b for b in diagram(folder)["branches"] if b["name"] == "branch 1"]
-        rows = [s["row"] for s in first["special"] if s["kind"] == "user"]
-        with h5py.File(folder / "states.h5", "r") as file:
-            r = file["branches/branch 1/r"][:][rows]
-        shapes.append(np.stack([np.hypot(r[..., 0], r[..., 1]), r[..., 2]]))
-    np.testing.assert_allclose(shapes[0], shapes[1], rtol=0, atol=1e-6)
-    assert shapes[0][0][0].max() == pytest.approx(reference_values.FIRST[0.2][0], abs=1e-8)
-
-
 @pytest.mark.versions
 def test_interrupted_run_keeps_finished_branches(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun = []
@@ -198,11 +183,3 @@ def test_interrupted_run_keeps_finished_branches(folder: Path, monkeypatch: pyte
             len(b["columns"]["load"]) for b in branches
         ]
     assert not list(folder.glob("*.part"))
-
-
-def test_picture(results: dict[str, Path]) -> None:
-    if MPI.COMM_WORLD.rank == 0:
-        path = draw_diagram(diagram(results["reduced"]), results["reduced"] / "pictures" / "diagram.png")
-        head = path.read_bytes()[:24]
-        assert head[:8] == b"\x89PNG\r\n\x1a\n"
-        assert (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) == (1500, 1000)

@@ -15,7 +15,6 @@ import pytest
 
 import rodfem
 from rodfem import Discretization, Plan
-from rodfem.app import console
 from rodfem.errors import InputError
 from rodfem.output import plot_diagram, plot_modes, render
 
@@ -62,45 +61,15 @@ def changed(*path: str | int, to: Any = ...) -> Callable[[dict[str, Any]], None]
     return change
 
 
-TEXTS = ["", " ", "[]", '[{"branches": []}]', "3", "null", '"a"', "{}", "\0" * 99, "[" * 100_000, '{"branches": [']
+TEXTS = ["", "[]", "3", "{}", "\0" * 99, "[" * 100_000, '{"branches": [']
 TEXTS += ['{"format": {"name": "rodfem diagram", "version": 1}, "branches": NaN}']
-B, C, S = ("branches", 0), ("branches", 0, "columns"), ("branches", 0, "special", 0)
 ENTRIES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (changed("format", "version", to=99), "reads versions up to 1"),
-    (changed("format", "version", to="1"), "version '1'"),
-    (changed("format", "version", to=True), "version True"),
     (changed("format", "name", to="rodfem locus"), "has the format 'rodfem locus'"),
-    (changed("format", to=[1]), "has the format"),
-    *((changed(name), f"has no {name}") for name in ("scene", "parameter", "range", "meshes", "constants", "branches")),
-    (changed("range", to=[0, 1, 2]), "two finite numbers"),
-    (changed("range", to=[0, 10**400]), "two finite numbers"),
-    (changed("constants", to={"A": "3"}), "numbers by name"),
-    (changed("branches", to=3), "a list of objects"),
-    (changed("branches", to=[3]), "a list of objects"),
-    (changed("branches", to=[]), "in the place of a list of objects, one or more"),
-    (changed("meshes", to=[]), "in the place of a list of objects, one or more"),
-    (changed("meshes", 0, "elements", to=-7), "a whole number"),
-    (changed("meshes", 0, "elements", to=10**9), "too large"),
-    (changed("meshes", 0, "vertices", to=["a"]), "a list of numbers"),
-    (changed(*B, "name", to="../../etc"), "a name without slashes"),
-    (changed(*B, "parent", to=["a"]), "a name and a number"),
-    (changed(*B, "columns", to=[]), "lists by name"),
-    (changed(*B, "columns"), "has no columns"),
-    (changed(*C, "load", to=[]), "one length"),
-    (changed(*C, "load", to=3), "lists by name"),
-    (changed(*C, "load", 0, to=None), "a finite number"),
-    (changed(*C, "load", 0, to="a"), "a finite number"),
-    (changed(*C, "load", 1, to=0.0123), "another load in row 1"),
-    (changed(*C, "mesh", 0, to=5), "row of mesh 5, of 1"),
-    (changed(*C, "negative", 0, to=0.5), "a whole number"),
-    (changed(*C, "energy"), "has no energy"),
-    (changed(*C, "load"), "has no load"),
-    (changed(*S, "ordinate"), "special point 0, has no ordinate"),
-    (changed(*S, "row", to=99999), "in row 99999"),
-    (changed(*S, "row", to=-7), "a whole number"),
-    (changed(*S, "kind", to="foo"), "one of branch point"),
-    (changed(*S, "law", to={"kind": 3}), "a text"),
-    (changed(*B, "unexplained", to=[{"row": 9999}]), "in row 9999"),
+    *((changed(name), f"has no {name}") for name in ("scene", "range", "meshes")),
+    (changed("branches", 0, "columns", "load", 1, to=0.0123), "another load in row 1"),
+    (changed("branches", 0, "columns", "energy"), "has no energy"),
+    (changed("branches", 0, "special", 0, "ordinate"), "has no ordinate"),
 ]
 
 
@@ -131,16 +100,6 @@ def test_entries(change: Callable[[dict[str, Any]], None], words: str, good: Pat
     assert "\n" not in sentence
 
 
-@pytest.mark.parametrize("entry", [(*C, "ordinate"), (*S, "load"), (*S, "zero"), (*S, "negative_before")])
-def test_a_table_of_what_is_not_there(entry: tuple[str | int, ...], good: Path, bad: Path) -> None:
-    """``rodfem info`` ended with KeyError: 'load'."""
-    data = json.loads((good / "diagram.json").read_text())
-    changed(*entry)(data)
-    (bad / "diagram.json").write_text(json.dumps(data))
-    with pytest.raises(InputError, match=f"has no {entry[-1]}: run the scene again"):
-        console.info([str(bad)])
-
-
 def put(name: str, value: Any) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         if name in file:
@@ -157,22 +116,15 @@ def attribute(name: str, value: Any) -> Callable[[h5py.File], None]:
 HERE = "branches/straight"
 STATES: list[tuple[bytes | Callable[[h5py.File], None], str]] = [
     (b"", "states.h5"),
-    (b"text", "states.h5"),
     (b"\x89HDF\r\n\x1a\n" + b"\0" * 4000, "states.h5"),
     (attribute("format", "rodfem modes"), "has the format 'rodfem modes'"),
     (attribute("format_version", 99), "reads versions up to 1"),
-    (attribute("format_version", "x"), "version 'x'"),
-    (put("branches", 3.0), "states.h5"),
     (put(f"{HERE}/q", 3.0), "states.h5"),
-    (put(f"{HERE}/q", "abc"), "states.h5"),
     (put(f"{HERE}/s", np.full((50, 49), np.nan)), "states.h5"),
 ]
 LOADED: list[tuple[bytes | Callable[[h5py.File], None], str]] = [
     (attribute("formulation", "foo"), "of the foo formulation"),
-    (put(f"{HERE}/elements", np.zeros(500)), "no elements"),
-    (put(f"{HERE}/q", np.zeros((500, 49, 4))), "no rotation somewhere"),
     (put(f"{HERE}/q", np.ones((500, 7, 4))), "is no state of the scene"),
-    (put(f"{HERE}/n1", np.ones(500) * 1j), "not real and finite"),
 ]
 
 
@@ -184,7 +136,7 @@ def spoil(path: Path, change: bytes | Callable[[h5py.File], None]) -> None:
         change(file)
 
 
-@pytest.mark.few(9)
+@pytest.mark.few(5)
 @pytest.mark.parametrize(("change", "words"), STATES)
 def test_states(change: Any, words: str, bad: Path, capfd: Any) -> None:
     path = bad / "states.h5"
@@ -198,22 +150,18 @@ def test_states(change: Any, words: str, bad: Path, capfd: Any) -> None:
         assert "\n" not in sentence
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize(("change", "words"), LOADED)
 def test_states_of_no_rod(change: Any, words: str, bad: Path, capfd: Any) -> None:
     spoil(bad / "states.h5", change)
     assert words in refused(lambda: rodfem.load(bad, SCENE), capfd)
 
 
-@pytest.mark.few(17)
-@pytest.mark.parametrize("name", ["load", "s", "r", "q", "value", "motion", "displacement"])
-@pytest.mark.parametrize("value", [3.5, "abc", np.zeros((1, 1)), h5py.SoftLink("/branches")], ids=range(4))
+@pytest.mark.parametrize("name", ["q", "motion"])
+@pytest.mark.parametrize("value", [3.5, h5py.SoftLink("/branches")], ids=range(2))
 def test_modes(name: str, value: Any, bad: Path, capfd: Any) -> None:
     path = bad / "modes.h5"
     with h5py.File(path) as file:
         (row,) = file["branches/straight"]
-    if name == "load" and value == 3.5:
-        value = np.nan
     spoil(path, put(f"branches/straight/{row}/{name}", value))
     for read in (
         lambda: rodfem.load_modes(path, "straight", int(row)),

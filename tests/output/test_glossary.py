@@ -10,10 +10,9 @@ import pytest
 from rodfem.app import console
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
-from rodfem.output.frequency_curves import COLORS
 from rodfem.output.glossary import ENTRIES, NAMES, explanation
 from rodfem.output.plot_diagram import MARKERS
-from rodfem.output.plot_frequencies import PARTS
+from rodfem.output.plot_frequencies import COLORS, PARTS
 from rodfem.output.plot_locus import POINTS
 from rodfem.output.style import LINES as STYLES
 from rodfem.output.table import COLUMNS, PAGE, SPECIAL
@@ -36,13 +35,6 @@ def test_every_word_has_an_entry() -> None:
     columns = re.findall(r"^\| `(\w+)` \|.*", (HOME / "docs" / "files.md").read_text().split("### `branches[].col")[1])
     for word in words | headings | set(columns):
         assert explanation(word), word
-
-
-def test_entries_of_a_special_point_in_files() -> None:
-    text = (HOME / "docs" / "files.md").read_text()
-    part = text[text.index("### `branches[].special[]`") : text.index("## `states.h5`")]
-    for name in re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE):
-        assert name == "kind" or explanation(name)
 
 
 def test_the_page_of_files_has_the_table() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,25 +11,34 @@ from demo_cases import scene
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from scipy.special import ellipe, ellipk
 
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
-from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
 from rodfem.file_format import LOCUS
-from rodfem.output import plot_diagram
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
-from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, dense, draw_branches, draw_diagram, figure_of
+from rodfem.output.plot_diagram import (
+    SINGULAR,
+    UNEXPLAINED,
+    between,
+    dense,
+    draw_branches,
+    draw_diagram,
+    drawn,
+    figure_of,
+)
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.style import PALETTE
-from rodfem.problem.scene import Ordinate
 
 pytestmark = pytest.mark.alone
 
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
-    columns = {"load": [float(i) for i in range(len(negative))], "ordinate": ordinate, "negative": negative}
+    rows = range(len(negative))
+    columns = {"load": list(map(float, rows)), "ordinate": ordinate, "negative": negative, "arclength": rows}
+    columns["slope"] = [None] * len(rows)
     return {"name": name, "parent": None, "columns": columns | more.pop("columns", {}), "special": [], **more}
 
 
@@ -98,12 +106,6 @@ def test_what_is_unexplained_is_marked(folder: Path) -> None:
     assert abs(y - 150) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
 
 
-def test_a_singular_first_state_is_marked() -> None:
-    plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
-    assert SINGULAR not in legend(plain | {"singular_start": 0})
-    assert SINGULAR in legend(plain | {"singular_start": 1})
-
-
 def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) -> None:
     def point(row: int, **more: Any) -> dict[str, Any]:
         found = {"kind": "imperfect bifurcation", "row": row, "load": float(row), "ordinate": 0.0}
@@ -136,12 +138,6 @@ def test_indices_stand_beside_the_curves_and_names_in_the_legend() -> None:
         for line in far:
             places = np.column_stack([line["columns"][x] for x in ("load", "ordinate")])
             assert not box.count_contains(dense(figure.axes[0], places))
-
-
-def test_branches_of_one_hue_have_other_marks() -> None:
-    axes = Figure().subplots()
-    handles = draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
-    assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
 
 
 def test_an_end_before_the_end_of_the_range_is_marked() -> None:
@@ -212,28 +208,55 @@ def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
     assert unstable and min(unstable) > 0.1  # nowhere where a circle is stable
 
 
-def test_ordinates_along_the_rod_are_checked() -> None:
-    ring = scene("ring", twisting=1.5, span=(1.0, 1.2))
-    for of, sentence in (
-        (lambda x, c: x.d1, r"ordinate along the rod has the shape \(3,\): return a scalar"),
-        (lambda x, c: x.k[2] * c.nothing, "asks for a constant 'nothing'"),
-        (lambda x: x.k[2], r"ordinate along the rod is no function of 2 argument\(s\)"),
-    ):
-        with pytest.raises(SceneError, match=sentence):
-            replace(ring, ordinate=Ordinate("twist", s=None, of=of))
+# --- curves between rows
 
 
-@pytest.mark.versions
-def test_pixels_are_those_of_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loads of any size: lines are sampled at the scale at which they are drawn."""
-    seen: list[int] = []
+def elastica(k: np.ndarray) -> dict[str, Any]:
+    """A clamped column, P = K(k)^2, whose tip moves by 2 k / K(k), with k for its arclength, as a branch of a file."""
+    K = ellipk(k**2)
+    derivative = np.divide(ellipe(k**2) / (1 - k**2) - K, k, out=np.zeros_like(k), where=k > 0)
+    columns = {"arclength": k, "load": K**2, "slope": 2 * K * derivative, "ordinate": 2 * k / K}
+    negative = {"negative": [0] * len(k)}
+    return {"name": "b", "parent": ["straight", 0], "special": [], "columns": {**columns, **negative}}
 
-    def counted(axes: Any, curve: np.ndarray) -> Any:
-        found = dense(axes, curve)
-        seen.append(len(found))
-        return found
 
-    monkeypatch.setattr(plot_diagram, "dense", counted)
-    large = {"columns": {"load": [0.0, 1e5, 2e5, 3e5]}}
-    figure_of(diagram(branch("straight", [0.0] * 4, [0, 0, 1, 1], **large), branch("other", [0, 1, 2, 3], [1] * 4)))
-    assert seen and max(seen) < 2000
+def test_long_steps_are_no_chords() -> None:
+    branch = elastica(np.array([0.0, 0.3, 0.45, 0.6, 0.7]))
+    ((_, curve),) = drawn(branch)
+    load, height = curve[:10].T
+    exact = ellipk((height * np.sqrt(load) / 2) ** 2) ** 2
+    chord = np.interp(height, branch["columns"]["ordinate"], branch["columns"]["load"])
+    assert abs(load - exact).max() < 2e-3 < 6e-3 < abs(chord - exact).max()
+    assert all(row in curve for row in np.column_stack([branch["columns"][x] for x in ("load", "ordinate")]))
+
+
+def test_rows_close_to_each_other_and_corners_stay_as_they_are() -> None:
+    assert not between(elastica(np.linspace(0.0, 0.7, 200)), "ordinate")
+    assert between(elastica(np.linspace(0.0, 0.7, 5)), "ordinate")
+    zigzag = abs(np.linspace(-0.2, 0.2, 9))
+    corner = elastica(np.linspace(0.0, 0.7, 9))
+    corner["columns"]["ordinate"] = zigzag
+    values = np.concatenate([found[:, 1] for found in between(corner, "ordinate").values()])
+    assert values.min() >= -1e-12 and values.max() <= 0.2 + 1e-12
+
+
+def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
+    """A parabola of few rows, none at its top, is that parabola."""
+    branch = elastica(np.linspace(0.0, 0.7, 7))
+    s = branch["columns"]["arclength"]
+    branch["columns"]["ordinate"] = s * (0.55 - s)
+    found = between(branch, "ordinate")
+    places = np.concatenate([s[row] + np.arange(1, 8) / 8 * (s[row + 1] - s[row]) for row in found])
+    np.testing.assert_allclose(np.concatenate([x[:, 1] for x in found.values()]), places * (0.55 - places), atol=1e-12)
+
+
+def test_branches_of_one_hue_have_other_marks() -> None:
+    axes = Figure().subplots()
+    handles = draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
+    assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
+
+
+def test_a_singular_first_state_is_marked() -> None:
+    plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
+    assert SINGULAR not in legend(plain | {"singular_start": 0})
+    assert SINGULAR in legend(plain | {"singular_start": 1})

@@ -37,7 +37,6 @@ from rodfem.problem.ends import (
     sliding,
 )
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
-from rodfem.problem.setting import read
 from rodfem.problem.supports import foundation_of, supports_of, ties_of, write, write_section
 
 pytestmark = [pytest.mark.alone, pytest.mark.versions]
@@ -119,20 +118,6 @@ def test_each_end_is_named_by_its_properties(kind: str) -> None:
     np.testing.assert_allclose(right.rotation_stiffness, sprung * 3.0 * np.eye(3), atol=1e-3)
 
 
-def test_what_is_no_spring_and_what_is_attached() -> None:
-    """A semi-tangential moment has a potential, but holds nothing; an attachment is an end without an end."""
-    moment = End(energy=lambda x, c: loads.semi_tangential(x.d1, x.d2, c.P))
-    assert supports_of(column(clamped(), moment), STRAIGHT | {"load": 4.0})["right end"].kind == "free"
-    foot = End(position=lambda c: (0.0, 0.0, 0.0), energy=lambda x, c: loads.rotational_spring(x.q, 3.0))
-    left = supports_of(column(foot, free(push)), STRAIGHT | {"load": 4.0})["left end"]
-    assert left.kind == "pin" and left.rotation_stiffness.any() and not left.translation_stiffness.any()
-    spring = Attachment(0.5, force=push, mass=lambda c: 2.0, energy=lambda x, c: loads.spring(x.r, (7.0, 0.0, 0.0)))
-    there = supports_of(column(attachments=(spring,)), STRAIGHT | {"load": 4.0})["attachment 1"]
-    assert (there.kind, there.s, there.mass, there.force[2]) == ("spring", 0.5, 2.0, -4.0)
-    assert there.translation_stiffness[0, 0] == pytest.approx(7.0)
-    assert supports_of(classics.ring(), STRAIGHT | {"load": 0.0}) == {}
-
-
 def test_potentials_that_are_no_springs_are_loads() -> None:
     """Minus their derivative: of crossed dead forces M/2 (d1 x e2 - d2 x e1), where the arms have turned."""
     a, b, c, d = q = np.array([0.8, 0.2, -0.4, 0.4])
@@ -209,21 +194,6 @@ def test_what_slides_goes_along_with_a_motion_and_its_rails_stay(folder: Path) -
     np.testing.assert_allclose([z for _, z in shift], [0.0, 0.1, 0.0, 0.0, 0.1], atol=1e-12)
 
 
-def test_record_of_every_row_can_be_read_back(folder: Path) -> None:
-    scene = column(clamped(), ENDS["clamp"], distributed=lambda c: (0.0, c.P * c.s, 0.0))
-    with h5py.File(folder / "states.h5", "w") as file:
-        write_section(file, scene)
-        write(file.create_group("b"), scene, [STRAIGHT | {"load": load} for load in (1.0, 3.0)])
-        for row, load in enumerate((1.0, 3.0)):
-            setting = read(file["b"], row)
-            assert [x.kind for x in setting.supports] == ["clamp", "clamp"]
-            np.testing.assert_allclose(setting.supports[1].frame, [cos(load / 2), 0, 0, sin(load / 2)], atol=1e-15)
-            assert setting.distributed is not None and setting.section is not None
-            s, force, _ = setting.distributed
-            np.testing.assert_allclose(force[:, 1], load * s)
-            np.testing.assert_allclose(setting.section[1], [np.diag([2.0, 1.0])], atol=1e-8)
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("kind", ENDS)
 def test_only_what_holds_an_end_is_drawn(folder: Path, kind: str) -> None:
@@ -246,16 +216,6 @@ def test_picture_shows_a_clamp_where_there_is_one(folder: Path) -> None:
     assert np.count_nonzero(grey[:, :800]) > 2000 and np.count_nonzero(grey[:, 800:]) < 20
 
 
-def test_a_load_arrow_has_the_direction_of_the_load(folder: Path) -> None:
-    """A follower force turns with the end: the arrow's head is where the director points."""
-    half = sqrt(0.5)
-    turned = {"q": np.tile([half, 0, half, 0], (31, 1)), "r": np.outer(S, E1)}  # d3 = e1
-    state = _read(saved(folder / "states.h5", column(clamped(), free(follower=push)), **turned), "straight", 0)
-    (arrow,) = [x for x in state.solids(Look(0.01, state.view())) if x.color == LOAD]
-    head, tail = (arrow.points[arrow.points[:, 0].argsort()[[0, -1]]]) @ E1
-    assert 1.0 < head < tail  # it pushes against the tip, from outside
-
-
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_cross_sections_have_the_proportion_of_the_stiffnesses(angle: float) -> None:
     """Bending stiffness of the outline, ``int (x_2^2, -x_1 x_2; -x_1 x_2, x_1^2) dA`` by triangles from its centre."""
@@ -269,17 +229,6 @@ def test_cross_sections_have_the_proportion_of_the_stiffnesses(angle: float) -> 
     both = [np.einsum("i,ij,ik->jk", area, x, x) for x in (outline, after)]
     second = (sum(moments) + sum(both)) / 12
     np.testing.assert_allclose(second / np.trace(second), J / np.trace(J), atol=1e-6)
-
-
-def test_cross_sections_stay_visible() -> None:
-    """Tapered as the stiffness is, ``B = a^4``; never flatter than a bound, and round without a record."""
-    s, angles = np.array([0.0, 1.0]), np.linspace(0, 2 * pi, 401)
-    flat = [np.array([np.diag([1.0, thin])] * 2) for thin in (1e-9, 0.0)]
-    both = (np.array([16 * np.eye(2), np.eye(2)]), *flat)
-    size = [[np.ptp(x, axis=0) for x in profile_of(s, (s, J), angles)] for J in both]
-    np.testing.assert_allclose(size[0], [[2, 2], [1, 1]], rtol=1e-6)
-    np.testing.assert_allclose([a / b for a, b in (*size[1], *size[2])], FLATTEST, rtol=1e-6)
-    np.testing.assert_allclose(np.ptp(profile_of(s, None, angles), axis=1), 2.0)
 
 
 def test_view_shows_the_plane_of_the_motion_and_tilts_nothing() -> None:
@@ -350,3 +299,38 @@ def test_typical_state_is_well_inside_what_it_is_said_to_be() -> None:
     assert typical_state({"branches": [planar]})[2] == "3, stable in the plane, unstable in space, index 1"
     with pytest.raises(InputError, match="no states"):
         typical_state({"branches": [branch("straight", [])]})
+
+
+def test_what_is_no_spring_and_what_is_attached() -> None:
+    """A semi-tangential moment has a potential, but holds nothing; an attachment is an end without an end."""
+    moment = End(energy=lambda x, c: loads.semi_tangential(x.d1, x.d2, c.P))
+    assert supports_of(column(clamped(), moment), STRAIGHT | {"load": 4.0})["right end"].kind == "free"
+    foot = End(position=lambda c: (0.0, 0.0, 0.0), energy=lambda x, c: loads.rotational_spring(x.q, 3.0))
+    left = supports_of(column(foot, free(push)), STRAIGHT | {"load": 4.0})["left end"]
+    assert left.kind == "pin" and left.rotation_stiffness.any() and not left.translation_stiffness.any()
+    spring = Attachment(0.5, force=push, mass=lambda c: 2.0, energy=lambda x, c: loads.spring(x.r, (7.0, 0.0, 0.0)))
+    there = supports_of(column(attachments=(spring,)), STRAIGHT | {"load": 4.0})["attachment 1"]
+    assert (there.kind, there.s, there.mass, there.force[2]) == ("spring", 0.5, 2.0, -4.0)
+    assert there.translation_stiffness[0, 0] == pytest.approx(7.0)
+    assert supports_of(classics.ring(), STRAIGHT | {"load": 0.0}) == {}
+
+
+def test_a_load_arrow_has_the_direction_of_the_load(folder: Path) -> None:
+    """A follower force turns with the end: the arrow's head is where the director points."""
+    half = sqrt(0.5)
+    turned = {"q": np.tile([half, 0, half, 0], (31, 1)), "r": np.outer(S, E1)}  # d3 = e1
+    state = _read(saved(folder / "states.h5", column(clamped(), free(follower=push)), **turned), "straight", 0)
+    (arrow,) = [x for x in state.solids(Look(0.01, state.view())) if x.color == LOAD]
+    head, tail = (arrow.points[arrow.points[:, 0].argsort()[[0, -1]]]) @ E1
+    assert 1.0 < head < tail  # it pushes against the tip, from outside
+
+
+def test_cross_sections_stay_visible() -> None:
+    """Tapered as the stiffness is, ``B = a^4``; never flatter than a bound, and round without a record."""
+    s, angles = np.array([0.0, 1.0]), np.linspace(0, 2 * pi, 401)
+    flat = [np.array([np.diag([1.0, thin])] * 2) for thin in (1e-9, 0.0)]
+    both = (np.array([16 * np.eye(2), np.eye(2)]), *flat)
+    size = [[np.ptp(x, axis=0) for x in profile_of(s, (s, J), angles)] for J in both]
+    np.testing.assert_allclose(size[0], [[2, 2], [1, 1]], rtol=1e-6)
+    np.testing.assert_allclose([a / b for a, b in (*size[1], *size[2])], FLATTEST, rtol=1e-6)
+    np.testing.assert_allclose(np.ptp(profile_of(s, None, angles), axis=1), 2.0)

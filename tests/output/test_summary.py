@@ -8,12 +8,11 @@ from math import pi, sqrt
 from typing import Any
 
 import classics
-import demo_cases
 import golden_cases
 import pytest
 
 from rodfem import Discretization, Plan, trace
-from rodfem.output.summary import in_sentences, known_digits, told_apart
+from rodfem.output.summary import distinct_digits, in_sentences
 
 pytestmark = pytest.mark.alone
 
@@ -43,11 +42,6 @@ def known(name: str) -> str:
 # --- what is known ----------------------------------------------------------------------------------------------------
 
 
-def test_loads_are_rounded_by_less_than_their_error() -> None:
-    for load, error, words in ((3.384, 0.17, "3.4"), (1.449, 0.0145, "1.45"), (9.8696044, 2e-11, "9.8696044")):
-        assert known_digits(special("branch point", 1, load, 0, 1, error_estimate=error)) == words
-
-
 @pytest.mark.parametrize(
     ("loads", "words"),
     [
@@ -58,7 +52,7 @@ def test_loads_are_rounded_by_less_than_their_error() -> None:
     ],
 )
 def test_ends_of_a_narrow_range_are_told_apart(loads: tuple[float, float], words: list[str]) -> None:
-    assert told_apart(*loads) == words
+    assert distinct_digits(*loads) == words
 
 
 @pytest.mark.long
@@ -122,23 +116,6 @@ def test_a_change_that_no_special_point_explains() -> None:
     assert "loses its stability, and no special point says why" in said(columns, planar=rod.planar)
 
 
-def test_divergence_is_named() -> None:
-    found = special("divergence", 1, 2.0, 0, 1)
-    words = said(branch("straight", [0.0, 2.0, 4.0], [0, 0, 1], columns={"omega2": []}, special=[found]))
-    assert "stable, by the frequencies found, from P = 0 to 2, where it diverges: a frequency passes through" in words
-    assert "then unstable (1 eigenvalue) to 4" in words
-
-
-def test_states_that_have_one_energy_at_one_load_alone_coexist() -> None:
-    """As a ring twisted by none and by two turns does, where its natural state is twisted by one."""
-    loads, turns = [0.0, 0.5, 1.0, 1.5, 2.0], (0.0, 2.0)
-    ring, twisted = (
-        branch(f"twist {turn:g}", loads, [0] * 5, energy=[(turn - load) ** 2 for load in loads]) for turn in turns
-    )
-    coexist = "From P = 0 to 2 two stable states coexist, of twist 0 and twist 2"
-    assert coexist in said(ring, twisted, span=(0.0, 2.0)) and "coexist" not in said(ring, ring, span=(0.0, 2.0))
-
-
 def test_how_a_branch_ends() -> None:
     words = said(branch("straight", [0.0, 4.0], [0, 0], ended="meets another branch at P = 4"))
     assert words.endswith("from P = 0 to 4; it ends where it meets another branch at P = 4.")
@@ -153,11 +130,6 @@ def test_a_load_asked_for_that_is_critical() -> None:
     words = trace(scene, Discretization("reduced", 4, 6), Plan(at=(pi**2 / 4,), depth=1)).in_words()
     assert "buckles supercritically; then unstable (index 1) to 4" in words
     assert "Branch 1, which leaves straight at 2.4674011, is stable on its whole range" in words
-
-
-def test_a_diagram_says_it_itself() -> None:
-    diagram = trace(demo_cases.scene("cord", span=(60.0, 55.0)), Discretization("reduced", 6, 3), Plan(depth=0))
-    assert diagram.in_words() == "The first branch, straight, is stable on its whole range, from lam = 60 to 55."
 
 
 # --- by hand ----------------------------------------------------------------------------------------------------------
@@ -217,16 +189,6 @@ def test_what_is_open_is_said() -> None:
     assert "The mesh does not resolve 1 special point: use more elements." in said(rod)
 
 
-def test_many_branches_and_many_intervals_are_counted() -> None:
-    unstable = [branch(f"branch {i}", [0.0, 4.0], [1, 1]) for i in range(9)]
-    straight = branch("straight", [0.0, 4.0], [0, 0])
-    assert "9 other branches are unstable on their whole range." in said(straight, *unstable)
-    assert "Branch 0 and branch 1 are unstable on their" in said(straight, *unstable[:2])
-    turns = [special("fold", i, float(i), i % 2 == 0, i % 2, multiplicity=1) for i in range(1, 12)]
-    winding = branch("straight", [float(i) for i in range(13)], [i % 2 for i in range(13)], special=turns)
-    assert "then its stability changes" in said(winding, span=(0.0, 12.0))
-
-
 def test_mirror_images_are_no_hysteresis() -> None:
     one, image = (branch(name, [0.0, 2.0, 4.0], [0, 0, 0]) for name in ("straight", "branch 1"))
     assert "coexist" not in said(one, image)
@@ -247,3 +209,23 @@ def test_undecided_stability_is_no_stability() -> None:
     side = branch("branch 1", loads, [0] * 4, columns={"undecided": [1] * 4}, parent=["straight", 0])
     first = branch("straight", loads, [0] * 4) | {"special": [special("branch point", 1, 1.0, 0, 0)]}
     assert "of undecided stability" in said(first, side) and "unstable on its whole range" not in said(first, side)
+
+
+def test_states_that_have_one_energy_at_one_load_alone_coexist() -> None:
+    """As a ring twisted by none and by two turns does, where its natural state is twisted by one."""
+    loads, turns = [0.0, 0.5, 1.0, 1.5, 2.0], (0.0, 2.0)
+    ring, twisted = (
+        branch(f"twist {turn:g}", loads, [0] * 5, energy=[(turn - load) ** 2 for load in loads]) for turn in turns
+    )
+    coexist = "From P = 0 to 2 two stable states coexist, of twist 0 and twist 2"
+    assert coexist in said(ring, twisted, span=(0.0, 2.0)) and "coexist" not in said(ring, ring, span=(0.0, 2.0))
+
+
+def test_many_branches_and_many_intervals_are_counted() -> None:
+    unstable = [branch(f"branch {i}", [0.0, 4.0], [1, 1]) for i in range(9)]
+    straight = branch("straight", [0.0, 4.0], [0, 0])
+    assert "9 other branches are unstable on their whole range." in said(straight, *unstable)
+    assert "Branch 0 and branch 1 are unstable on their" in said(straight, *unstable[:2])
+    turns = [special("fold", i, float(i), i % 2 == 0, i % 2, multiplicity=1) for i in range(1, 12)]
+    winding = branch("straight", [float(i) for i in range(13)], [i % 2 for i in range(13)], special=turns)
+    assert "then its stability changes" in said(winding, span=(0.0, 12.0))

@@ -2,7 +2,6 @@
 
 It needs Debian's ``chromium`` and ``chromium-driver``, and ``pip install "rodfem[browser]"``; without them it is
 skipped, unless ``RODFEM_BROWSER=required`` says, as in ``.ci/run``, that it must run.
-``python -m pytest -s tests/report/test_browser.py`` prints the frame times.
 """
 
 from __future__ import annotations
@@ -24,16 +23,12 @@ import pytest
 from output.test_formats import MESH, RUNS
 from PIL import Image
 from problem.test_docs import scenes
-from rescaled import DNA, rescaled
 from scipy.ndimage import uniform_filter
 
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
-from rodfem.output.stable_region import COUNT
 from rodfem.output.view import POINT
-from rodfem.report.packing import packed
-from rodfem.report.page import page_of
-from rodfem.report.payload import payload_of
+from rodfem.report.page import page_of, payload_of
 
 REQUIRED = os.environ.get("RODFEM_BROWSER") == "required"
 if not REQUIRED:
@@ -54,10 +49,6 @@ SIZES = [(1280, 720), (1920, 1080)]
 PROJECTOR = (1024, 768)
 PATIENCE = 90.0
 """Seconds that a page may take on a busy machine."""
-POINTS, FRAMES = 5000, 40
-"""States of the long branch, and how many of them the arrow key runs through."""
-FLUENT = 50.0
-"""Milliseconds of a processor in each frame up to which the page's own work leaves it fluent, drawing apart."""
 GOLDEN = Path(__file__).with_name("golden.png")
 """The page of a run as it should look, reduced."""
 BLOCK, FORGIVEN, MOST = 8, 16.0, 12
@@ -107,9 +98,6 @@ def computed(folder: Path) -> None:
     run(scenes()["euler"], MESH, plan, folder / "pinned", figures=False, quiet=True)
     beck = demo_cases.scene("follower", span=(19.0, 21.0))
     run(beck, MESH, Plan(error_bars=False, locus=("J1", 0.0, 0.004)), folder / "beck", figures=False, quiet=True)
-    molecule = rescaled(scenes()["euler"], *DNA[:2], load=DNA[1])
-    plan = Plan((0.0, 12.0 * DNA[1]), depth=1, error_bars=False)
-    run(molecule, MESH, plan, folder / "molecule", figures=False, quiet=True)
 
 
 @cache
@@ -171,35 +159,10 @@ def click(browser: Any, x: float, y: float) -> None:
         browser.execute_cdp_cmd("Input.dispatchMouseEvent", given)
 
 
-def test_the_page_is_drawn_without_a_frame(opened: Callable[..., Any], browser: Any) -> None:
-    """As for a screenshot in virtual time, or a page that is loaded in the background: no callback of a frame comes."""
-    source = {"source": "window.requestAnimationFrame = () => 0"}
-    made = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", source)
-    try:
-        page = opened("pinned")
-        size = SIZES[0][0] - 90, SIZES[0][1] - 60
-        for width, height in (SIZES[0], size):  # a canvas of another size is empty until it is drawn again
-            metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-            page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-            page.execute_async_script("setTimeout(arguments[0], 300)")
-            seen = np.asarray(Image.open(io.BytesIO(page.get_screenshot_as_png())).convert("RGB"), dtype=float)
-            for part, least in (("stage", 2000), ("diagram", 1000), ("states", 200)):
-                box = page.find_element(By.ID, part).rect
-                left, top, right, bottom = (
-                    round(x)
-                    for x in (box["x"] + 5, box["y"] + 5, box["x"] + box["width"] - 5, box["y"] + box["height"] - 5)
-                )
-                inside = seen[top:bottom, left:right]
-                assert np.count_nonzero(np.ptp(inside, axis=2) + abs(inside - 250).max(axis=2) > 60) > least, part
-    finally:
-        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", made)
-
-
 @pytest.mark.parametrize(
     ("name", "size"),
     [
         ("pinned", PROJECTOR),
-        *(pytest.param("pinned", size, marks=pytest.mark.long) for size in SIZES),
         ("locus", SIZES[0]),
         ("follower", SIZES[1]),
     ],
@@ -240,29 +203,6 @@ def test_labels_cover_neither_marks_nor_each_other(opened: Callable[..., Any], n
     assert not ((centres > labels[:, None, :2]) & (centres < labels[:, None, 2:])).all(axis=2).any()
     apart = (labels[:, None, :2] >= labels[:, 2:]).any(axis=2) | (labels[:, None, 2:] <= labels[:, :2]).any(axis=2)
     assert (apart | np.eye(len(labels), dtype=bool)).all()
-
-
-@pytest.mark.parametrize("name", ["pinned", "locus"])
-def test_the_ring_of_a_state_covers_no_label_beside_it(opened: Callable[..., Any], name: str) -> None:
-    """On a projector, where labels are nearest to their curves: at each of the rows that a label stands at."""
-    page = opened(name, PROJECTOR)
-    script = """const done = arguments[0], plot = document.getElementById("diagram");
-        const box = (x) => { const r = x.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; };
-        const names = ["report/store", "report/data"];
-        Promise.all(names.map((name) => import(name))).then(([{ select, tell }, { data }]) => {
-          done(plot.layout.annotations.map(({ x, y }, i) => {
-            const here = (b, row) => b.load[row] === x && b.ordinates.ordinate[row] === y;
-            const rows = data.branches.map((b) => b.load.findIndex((_, row) => here(b, row)));
-            const number = rows.findIndex((row) => row >= 0);
-            select(number, rows[number]);
-            tell();
-            return [plot.querySelector(".cursor.point"), plot.querySelectorAll(".annotation-text-g")[i]].map(box);
-          }));
-        })"""
-    boxes = np.array(page.execute_async_script(script))
-    assert len(boxes) > 2
-    for ring, label in boxes:
-        assert (ring[:2] >= label[2:]).any() or (label[:2] >= ring[2:]).any()
 
 
 def test_keys_move_along_and_between_branches(opened: Callable[..., Any]) -> None:
@@ -337,9 +277,8 @@ def test_the_locus_of_a_flutter_load_leads_to_the_mode_that_flutters(opened: Cal
     ((_, row),) = locus["special"]
     click(page, *page.execute_script(IN_PLANE, locus["x"][len(locus["x"]) // 4], locus["load"][len(locus["x"]) // 4]))
     until(page, lambda: shown(page)[1] == row and "flutter" in page.find_element(By.ID, "sentence").text.lower())
-    assert float(re.findall(r"[\d.]+", page.find_element(By.ID, "state-load").text)[0]) == pytest.approx(
-        20.05, abs=5e-3
-    )
+    load = float(re.findall(r"[\d.]+", page.find_element(By.ID, "state-load").text)[0])
+    assert load == pytest.approx(20.05, abs=5e-3)
     buttons = page.find_elements(By.CSS_SELECTOR, "#modes button")
     values = [float(re.findall(r"[\d.]+", button.text)[0]) for button in buttons]
     assert min(values) ** 0.5 == pytest.approx(11.02, abs=5e-3) and len({round(value, 1) for value in values}) == len(
@@ -378,13 +317,6 @@ def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[...
     assert "~: error not estimated" in page.find_element(By.ID, "errors").text
 
 
-def test_numbers_have_their_units(opened: Callable[..., Any]) -> None:
-    page = opened("pinned", change=lambda payload: payload | {"units": {"load": "N", "ordinate": "m"}})
-    load, numbers, slider = (page.find_element(By.ID, part).text for part in ("state-load", "numbers", "load-value"))
-    assert re.fullmatch(r"P = [^ ]+( \([\de-]+\))? N", load) and re.fullmatch(r"P = [\d.]+ N", slider)
-    assert re.fullmatch(r"displacement of the middle = [^ ]+( \([\de-]+\))? m; energy = ~[\d.]+", numbers)
-
-
 def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., Any]) -> None:
     """Of a pinned column under the load P: the force has the size P, and the moment vanishes at the ends."""
     page = opened("pinned")
@@ -407,21 +339,6 @@ def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., 
     slope = np.diff(size) / np.maximum(np.diff(x), POINT)
     inside = (np.diff(x) > 0)[1:] & (np.diff(x) > 0)[:-1]
     assert len(size) > 100 and abs(np.diff(slope)[inside]).max() < 0.05 * abs(slope).max()
-
-
-def test_curves_along_a_molecule_fill_their_plots(opened: Callable[..., Any]) -> None:
-    """Of 1e-8 m under 1e-11 N: moments of 1e-20 N m are no line at zero, nor are forces."""
-    page = opened("molecule")
-    last = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load.length - 1)")
-    page.execute_script(f"import('report/store').then((store) => store.select(1, {last}))")
-    until(page, lambda: shown(page) == ("branch 1", last))
-    for tab in page.find_elements(By.CSS_SELECTOR, "#profile-tabs button"):
-        tab.click()
-        script = """const plot = document.getElementById('profile');
-            return [plot._fullLayout.yaxis.range, ...plot.data.map((trace) => Array.from(trace.y))]"""
-        (low, high), *curves = page.execute_script(script)
-        if tab.text != "strain":
-            assert high - low < 3 * np.ptp(curves)
 
 
 def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> None:
@@ -462,7 +379,7 @@ def test_the_plane_of_loci_shows_states(opened: Callable[..., Any]) -> None:
     last = len(locus["x"]) - 1
     click(page, *page.execute_script(IN_PLANE, locus["x"][last // 4], locus["load"][last // 4]))
     until(page, lambda: shown(page) == (names[branch], row))
-    other, edge, end = (column[COUNT // 2] for column in locus["region"])
+    other, edge, end = (column[len(column) // 2] for column in locus["region"])
     click(page, *page.execute_script(IN_PLANE, other, 0.3 * edge + 0.7 * end))
     until(page, lambda: shown(page) != (names[branch], row))
     load = page.execute_script("return import('report/store').then((store) => store.state.load)")
@@ -486,62 +403,6 @@ def test_frequencies_come_first_for_a_follower_load(opened: Callable[..., Any]) 
     until(page, lambda: shown(page)[1] == row)
     page.find_elements(By.CSS_SELECTOR, "#ordinate option")[1].click()
     until(page, lambda: "range of flutter" not in page.find_element(By.ID, "legend").text)
-
-
-def long(payload: dict[str, Any]) -> dict[str, Any]:
-    """The same with a first branch of very many states."""
-    branch = dict(payload["branches"][0])
-    wave = np.linspace(0.0, 40.0, POINTS)
-    stations = payload["s"]["shape"][0]
-    shape, s = np.zeros((POINTS, stations, 7)), np.linspace(0.0, 1.0, stations)
-    shape[..., 0], shape[..., 2], shape[..., 3] = 0.2 * np.sin(wave[:, None]) * np.sin(np.pi * s), s, 1.0
-    numbers, maps = branch["bodies"][0], np.tile(np.eye(4)[:, :3].ravel(), (POINTS * len(branch["bodies"][0]), 1))
-    branch |= {
-        "load": (wave / 40.0).tolist(),
-        "negative": [0] * POINTS,
-        "ordinates": {name: np.sin(wave).tolist() for name in branch["ordinates"]},
-        "pieces": [{"rows": [0, POINTS - 1], "kind": "stable", "index": "0"}],
-        "words": [0] * POINTS,
-        "told": branch["told"][:1],
-        "shape": packed(shape),
-        "profile": packed(np.zeros((POINTS, 40, 13)) + np.linspace(0.0, 1.0, 40)[:, None]),
-        "element": [0] * POINTS,
-        "jumps": {symbol: [POINT] * POINTS for symbol in "vknm"},
-        "bodies": [numbers] * POINTS,
-        "maps": packed(maps),
-        **dict.fromkeys(("spectrum", "omega2", "frequencies")),
-        **{"special": [], "unexplained": [], "modes": {}, "readings": [], "endings": [], "image": "", "between": {}},
-    }
-    return payload | {"branches": [branch], "start": [0, 0], "loci": []}
-
-
-def seconds(page: Any) -> float:
-    """Processor time of the page's main thread."""
-    metrics = page.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
-    return float(next(metric["value"] for metric in metrics if metric["name"] == "TaskDuration"))
-
-
-@pytest.mark.long
-def test_a_long_branch_stays_fluent(opened: Callable[..., Any]) -> None:
-    page = opened("pinned", change=long)
-    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#states canvas"))
-    script = """const done = arguments[1], times = [];
-        const step = (time) => {
-          times.push(time);
-          if (times.length > arguments[0]) return done(times);
-          document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
-          requestAnimationFrame(step);
-        };
-        requestAnimationFrame(step)"""
-    page.set_script_timeout(PATIENCE)
-    page.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
-    before = seconds(page)
-    times = np.diff(page.execute_async_script(script, FRAMES))
-    work = 1000.0 * (seconds(page) - before) / FRAMES
-    text = ", ".join(f"{share} %: {np.percentile(times, share):.1f} ms" for share in (50, 90, 100))
-    print(f"\n{POINTS} points, frame times: {text}; {work:.1f} ms of work of the page in each")
-    assert shown(page)[1] >= FRAMES - 2
-    assert work < FLUENT, text
 
 
 def small(png: bytes) -> np.ndarray:

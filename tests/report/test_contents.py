@@ -15,15 +15,12 @@ from scipy.integrate import quad
 from rodfem.app.console import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
-from rodfem.output.digits import eigenvalue_in_words, number
-from rodfem.output.frequency_curves import curves
-from rodfem.output.pieces import endings
-from rodfem.output.solids import between, body_of
+from rodfem.output.digits import number
+from rodfem.output.plot_frequencies import curves
 from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise
-from rodfem.report.labels import html_of, plain_of
-from rodfem.report.packing import packed, plain, script_json
-from rodfem.report.shapes import shapes_of, stations
+from rodfem.report.markup import html_of, packed, plain, plain_of, script_json
+from rodfem.report.rods import shapes_of
 from rodfem.writhe import writhe
 
 pytestmark = pytest.mark.alone
@@ -55,10 +52,6 @@ def branch(negative: list[int], *specials: dict[str, Any], **columns: Any) -> di
 def test_labels(label: str, always: bool, html: str) -> None:
     assert html_of(label, always) == html
     assert "<sub>" not in plain_of(label, always)
-
-
-def test_plain_labels_are_what_was_written() -> None:
-    assert plain_of("a & <b> \"c\" 'd' &lt;") == "a & <b> \"c\" 'd' &lt;"
 
 
 def test_words_of_a_branch() -> None:
@@ -126,13 +119,6 @@ def test_words_warn() -> None:
 )
 def test_first_loss_of_stability(data: dict[str, Any], text: str) -> None:
     assert first_loss({"branches": [data], "parameter": "P"}) == text
-
-
-def test_first_loss_of_stability_of_a_planar_rod() -> None:
-    """By frequencies, too, of which none is known in space."""
-    for columns in ({"negative_in_space": [0, 0]}, {"omega2": []}):
-        data = {"branches": [branch([0, 0], **columns)], "parameter": "P", "planar": "e2"}
-        assert first_loss(data) == "none in the plane: first is stable from 0 to 1"
 
 
 def gauss_integral(curve: np.ndarray, tangent: np.ndarray) -> float:
@@ -224,22 +210,6 @@ def test_rows_of_coarser_meshes_end_in_nan() -> None:
         shapes_of(group_of(s=s, r=r, q=q), 49)
 
 
-def test_stations_stay_within_their_budget() -> None:
-    assert (
-        stations(55, 100) == 109 and stations(5, 10) == 49 and stations(1000, 10) == 241 and stations(200, 5000) == 81
-    )
-
-
-def test_a_spring_that_is_stretched_is_the_same_body() -> None:
-    """Placed by affine maps, from its one end to the other."""
-    for length in (1.0, 1.6):
-        spring = between("coil", np.zeros(3), np.array([0, 0, length]), 0.1, "#333333")
-        assert spring.points[:, 2].min() == pytest.approx(0.0, abs=0.03) and np.ptp(spring.points[:, 2]) > 0.98 * length
-        assert np.hypot(*spring.points.T[:2]).max() == pytest.approx(0.1 * 1.72, rel=0.01)
-        corners = np.column_stack([body_of("coil")[0], np.ones(len(spring.points))]) @ spring.map
-        np.testing.assert_allclose(corners, spring.points, atol=1e-15)
-
-
 def test_packed_arrays_and_texts() -> None:
     array = np.array([[1.5, np.nan], [-2.0, 3e-8]])
     data = packed(array)
@@ -257,19 +227,6 @@ def test_undecided_stability_is_not_called_stable() -> None:
     assert "too near zero for its sign" in words[1].sentence and "too near zero" in words[2].sentence
 
 
-def test_ends_before_the_range_have_reasons() -> None:
-    end = {"kind": "end", "row": 0, "note": "begins here: stretch reaches zero"}
-    one = branch([0, 0, 0]) | {"ended": "no convergence: steps of 1e-6", "special": [end]}
-    assert list(endings(one)) == [(0, "stretch reaches zero"), (2, "no convergence")]
-    for whole in ("end of range", "closed loop", "meets another branch at P = 3", "meets circle"):
-        assert not list(endings(branch([0, 0]) | {"ended": whole}))
-
-
-def test_round_off_without_an_error_bar_is_zero() -> None:
-    assert number(1.8e-17, np.inf, scale=0.4) == "0 (no estimate)" != number(1.8e-17, np.inf)
-    assert number(0.25, np.inf, scale=0.4) == "0.25 (no estimate)"
-
-
 def test_readings_are_those_of_the_file() -> None:
     """Bounds of special points are absolute, those of other rows relative, in parts of the natural size at least."""
     known = [special(1, ordinate=0.25, ordinate_error_estimate=None), special(3, "user", ordinate=2.0)]
@@ -277,11 +234,8 @@ def test_readings_are_those_of_the_file() -> None:
     first, second, third, fourth = readings_of(one | {"ended": ""}, {"load": 10.0, "ordinate": 1.0})
     assert first == {"load": "0.00 (1e-02)", "ordinate": "0.500 (1e-03)"}
     assert second == {"load": "1.000000 (1e-06)"} and third == {} and fourth == {"load": "3 (given)"}
-    squeezed = branch([0, 0], special(1, "end")) | {"ended": "stretch reaches zero"}
-    assert readings_of(squeezed, {})[1] == {"load": "1.000000 (1e-06)"}
-    assert readings_of(one, {})[0] == {}
 
 
-def test_eigenvalues_have_one_bound() -> None:
-    assert eigenvalue_in_words(complex(1.23456, -0.5), 1e-3) == "1.235 - 0.500 i (2e-03)"
-    assert eigenvalue_in_words(complex(1.23456), 1e-3) == "1.235 (2e-03)" and eigenvalue_in_words(1j, np.inf) == ""
+def test_round_off_without_an_error_bar_is_zero() -> None:
+    assert number(1.8e-17, np.inf, scale=0.4) == "0 (no estimate)" != number(1.8e-17, np.inf)
+    assert number(0.25, np.inf, scale=0.4) == "0.25 (no estimate)"

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.output.pieces import STABLE
-from rodfem.output.smooth import drawn
+from rodfem.output.plot_diagram import drawn
 from rodfem.output.style import DPI, HALO, LINES, PALETTE, STYLE, save
 
 if TYPE_CHECKING:
