@@ -25,7 +25,7 @@ from rodfem.diagram.first_state import ahead, first_state, name_of_first
 from rodfem.diagram.images import other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fem.link import link
+from rodfem.fem.shape import link
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import APART, SAME_SPECIAL, SAME_STATE

@@ -8,8 +8,8 @@ from typing import Any
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
+from rodfem.problem.arguments import real, reals, whole, yes_or_no
 from rodfem.problem.events import Event
-from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
@@ -98,7 +98,7 @@ class Plan:
             registry.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, ACCURACY)
-        flag("error_bars", self.error_bars)
+        yes_or_no("error_bars", self.error_bars)
         if not isinstance(self.events, (tuple, list)) or not all(isinstance(event, Event) for event in self.events):
             raise InputError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
         if self.locus is not None:

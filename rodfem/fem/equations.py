@@ -28,7 +28,7 @@ from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import FEW, Discretization, Fields
 from rodfem.fem.known import Known
-from rodfem.fem.parameters import Line, load_line
+from rodfem.fem.state import Line, load_line
 from rodfem.forms import inertia, lagrangian
 from rodfem.forms.kinematics import curvature, strain
 from rodfem.forms.rotation import rotation

@@ -11,8 +11,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.shape import Shape
+from rodfem.fem.state import LOAD
 from rodfem.fem.system import System
-from rodfem.fem.values import LOAD
 from rodfem.problem.local_state import inside
 
 AMPLITUDE = 0.1

@@ -25,9 +25,8 @@ import numpy as np
 
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Fields
-from rodfem.fem.state import Evaluation
+from rodfem.fem.state import LOAD, Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
-from rodfem.fem.values import LOAD
 from rodfem.problem.contribution import Block, Motion
 from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene

@@ -33,7 +33,7 @@ from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
-    from rodfem.fem.parameters import Line
+    from rodfem.fem.state import Line
 
 POINTS = 3
 """Points of the rule of a piece of a table beyond half the degree of the polynomials: exact for cubics times these."""

@@ -1,4 +1,4 @@
-"""The shape of a state: centreline, rotations, and all fields in natural order along the rod."""
+"""The shape of a state: centreline, rotations, all fields in natural order along the rod; resultants; link."""
 
 from __future__ import annotations
 
@@ -6,15 +6,20 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
+import ufl
 from mpi4py import MPI
 from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
+from rodfem.errors import InputError
+from rodfem.fem.state import LOAD, NodalValues
 from rodfem.fem.system import System
-from rodfem.fem.values import LOAD, NodalValues
 from rodfem.forms.kinematics import UNDEFORMED
-from rodfem.problem.quaternions import directors
+from rodfem.problem.constraint import Constraint
+from rodfem.problem.quaternions import CONJUGATE, directors, product
+from rodfem.problem.roles import derived
+from rodfem.writhe import writhe
 
 INWARDS = 1e-9
 """Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
@@ -262,3 +267,92 @@ class Shape:
 def unique(values: np.ndarray) -> np.ndarray:
     """Values at the nodes of a continuous field, (elements, nodes, ...) -> (m, ...)."""
     return np.concatenate([values[:, :-1].reshape(-1, values.shape[-1]), values[-1:, -1]])
+
+
+NAMES = ("strain", "curvature", "force", "moment")
+"""Of the fields, as files have them."""
+
+
+class Resultants:
+    r"""Evaluates strains, contact force and moment of the states of one system; collective over its ranks.
+
+    Both follow from the density ``L(r, r', R, k, ...)`` of the Lagrangian of the rod and its constraints, without
+    loads::
+
+        n = dL/dr',        m_i = dL/dk_i.
+
+    Of a rod without constraints along it ``n`` is the multiplier of ``r' = R v``, and ``m_i = dW/dk_i``: see
+    :mod:`rodfem.forms.lagrangian`.  A constraint along the rod, or of an integral over it, adds its reactions: ``n``
+    and ``m`` are those of the balances of force and moment, not of the stored energy alone.  Like the strains ``v`` and
+    ``k`` they are given along the directors (Antman, Nonlinear Problems of Elasticity, 2005, chapter 8).
+    """
+
+    def __init__(self, shape: Shape) -> None:
+        """Derive and compile them for the system of a ``shape``."""
+        self.shape, count = shape, shape.system.fields.discretization.degree
+        self.places = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
+        e = shape.system.equations
+        self._evaluate = derived(e, "resultants", lambda: e.evaluated(ufl.as_vector(self._components()), self.places))
+
+    def at(self, x: PETSc.Vec) -> dict[str, np.ndarray]:
+        """Components along the directors by their :data:`NAMES` at the state ``x``, (elements, points, 3) each.
+
+        ``strain`` has ``v``, nondimensional, ``curvature`` ``k``, one over length, ``force`` ``n`` and ``moment``
+        ``m``.  ``points`` (elements, points) has the arclengths: as many in each element as the degree of the rotation,
+        at equal distances, ends included where there is more than one.  The derivative of the rotation jumps from
+        element to element, by as much as it is accurate.
+        """
+        values = self.shape.system.at(x).evaluate(self._evaluate)
+        whole = self.shape.from_left(values.reshape(len(values), -1, len(NAMES), 3))
+        points = self.shape.from_left(self.shape.start[:, None] + self.shape.size[:, None] * self.places)
+        return {"points": points} | {name: whole[:, :, i] for i, name in enumerate(NAMES)}
+
+    def _components(self) -> list[Any]:
+        """Strain, curvature, force and moment as expressions of the state, one after the other."""
+        e, fields, scene = self.shape.system.equations, self.shape.system.fields, self.shape.system.scene
+        f, c, along = e.unknowns, e.constants, e.along(ufl.variable)
+        density = scene.energy(along.v, along.k, c)
+        for part in scene.parts:
+            if isinstance(part.of, Constraint) and part.s is None:
+                site, _ = e.site(part, f, (f, f), along)
+                density += sum(part.of.lagrangian(site))
+        force = ufl.as_vector(fields.formulation.contact_force(e, f, c))
+        if "dr" in vars(along):
+            force += ufl.diff(density, along.dr)
+        force, moment = ufl.dot(ufl.transpose(along.R), force), ufl.diff(density, along.k)
+        return [vector[i] for vector in (along.v, along.k, force, moment) for i in range(3)]
+
+
+def twist(s: np.ndarray, q: np.ndarray) -> float:
+    """Twist ``1/(2 pi) int k3 ds`` of directors given by quaternions ``q`` (m, 4) at ascending ``s`` (m,)."""
+    from scipy.integrate import trapezoid
+    from scipy.interpolate import CubicSpline
+
+    unit = q / np.linalg.norm(q, axis=1, keepdims=True)
+    spline = CubicSpline(s, unit)
+    fine = np.linspace(s[0], s[-1], 8 * len(s) + 1)
+    p, d = spline(fine), spline(fine, 1)
+    k3 = 2 * product(p * CONJUGATE, d)[:, 3] / np.sum(p * p, axis=1)
+    return float(trapezoid(k3, fine)) / (2 * np.pi)
+
+
+def link(sample: dict[str, Any]) -> tuple[int, float, float]:
+    """Linking number, twist and writhe of a state of a closed rod, given by :meth:`~rodfem.fem.shape.Shape.sample`.
+
+    The linking number of the edge traced by a director with the centreline is ``Lk = Tw + Wr`` (Calugareanu 1959, White
+    1969), with the twist ``Tw = 1/(2 pi) int k3 ds`` and the writhe ``Wr`` of the centreline.  It is an integer, and
+    does not change while the rod is deformed without passing through itself: it belongs to the scene's start.
+
+    Raises :class:`InputError` if the sum of the last two is not near an integer: the rod is not closed, or touches
+    itself.
+    """
+    from scipy.interpolate import CubicSpline
+
+    s, closed = np.asarray(sample["s"]), np.array(sample["r"])
+    closed[-1] = closed[0]
+    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=1e-5)
+    Tw = twist(s, np.asarray(sample["q"]))
+    Lk = round(Tw + Wr)
+    if abs(Tw + Wr - Lk) > 0.05:
+        raise InputError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")
+    return Lk, Tw, Wr

@@ -33,7 +33,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.fem.values import LOAD, NodalValues
+from rodfem.fem.state import LOAD, NodalValues
 from rodfem.forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.linalg.matrices import times
 from rodfem.problem.contribution import Motion
@@ -41,8 +41,7 @@ from rodfem.problem.scene import Scene
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
-    from rodfem.fem.parameters import Line
-    from rodfem.fem.state import State
+    from rodfem.fem.state import Line, State
     from rodfem.fem.system import System
 
 SYMMETRIC_STATE = 1e-4

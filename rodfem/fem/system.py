@@ -27,10 +27,8 @@ from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import FEW, Discretization
 from rodfem.fem.invariance import find_motion_along, find_symmetries
-from rodfem.fem.parameters import Line
-from rodfem.fem.state import State
+from rodfem.fem.state import LOAD, Line, NodalValues, State
 from rodfem.fem.symmetries import DriftForces, Generators, Symmetry, capable, may_slide, no_phase, phase_at
-from rodfem.fem.values import LOAD, NodalValues
 from rodfem.fem.verification import Verification
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Sizes

@@ -165,7 +165,7 @@ def states_of(
     """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
-    every further field and scalar with P rows, strains, forces and moments (:mod:`rodfem.fem.resultants`), and under
+    every further field and scalar with P rows, strains, forces and moments (:mod:`rodfem.fem.shape`), and under
     ``special/<i>`` the null vectors of its special points: displacement ``r``, ``rotation`` in the space frame, and the
     change of ``q``.  The ``modes`` of each branch, if given, are in the group of :mod:`rodfem.modes.recorded`.  Below
     the branch are the groups of :func:`rodfem.problem.supports.write`, for pictures; the file has the

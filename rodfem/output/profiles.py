@@ -1,7 +1,7 @@
 """Strains, contact forces and moments along saved states: polynomials of each element, which jump between elements.
 
 ``states.h5`` has them at equal places of each element, ends included where there is more than one: see
-:mod:`rodfem.fem.resultants`.  Where nothing acts at the end of an element the jump there is the error of the mesh.
+:mod:`rodfem.fem.shape`.  Where nothing acts at the end of an element the jump there is the error of the mesh.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Contributions of a part of a scene to its problem: scalar unknowns, terms of the Lagrangian, virtual work.
+"""Contributions of a part of a scene to its problem: scalar unknowns, loads, terms of the Lagrangian, virtual work.
 
 An end, an attachment, a constraint, and the scene itself with what acts along the rod, are each a
 :class:`Contribution`.  Unknowns, equations, words and checks of a discretised scene are those of its contributions.
@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Any
 
-from rodfem.problem.roles import functions_of
+from rodfem.forms import inertia, loads
+from rodfem.problem.arguments import finite
+from rodfem.problem.roles import Role, functions_of, role_field
 
 if TYPE_CHECKING:
-    from rodfem.problem.local_state import Constants, Place
+    from rodfem.problem.local_state import Constants, Given, OfPlace, Place
 
 Direction = tuple[float, ...]
 UNIT: tuple[Direction, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -128,8 +130,59 @@ class Site:
     whole: Any = None
 
 
+Term = Callable[[Site, Any], Any]
+
+
+@dataclass(frozen=True)
+class Load:
+    """A kind of load.
+
+    Attributes
+    ----------
+    potential
+        Its potential, None where it has none in space.
+    in_plane
+        Its potential where the rod is planar, None where that is the same.
+    work
+        Its virtual work where it has no potential.
+    moment
+        Whether it is a moment, about the normal of a planar rod; a force is in its plane.
+    """
+
+    potential: Term | None = None
+    in_plane: Term | None = None
+    work: Term = lambda at, value: 0
+    moment: bool = False
+
+    def potential_in(self, *, planar: bool) -> Term | None:
+        """Potential of a planar rod, or of one in space, None where there is none."""
+        return (planar and self.in_plane) or self.potential
+
+
+def _felt(at: Site, force: Any) -> Any:
+    """Potential of a dead force in the free directions; None where it is the contact force of the reduced rod."""
+    return -sum(force[i] * at.x.r[i] for i in at.free) if "r" in vars(at.x) and at.free else None
+
+
+def _about_normal(at: Site, moment: Any) -> Any:
+    """Minus moment times angle: in a plane all moments are about its normal."""
+    return -moment[at.normal] * at.turned
+
+
+POTENTIAL = Load(lambda at, value: value)
+DEAD = Load(lambda at, force: loads.dead(at.x.r, force))
+DEAD_AT_END = Load(_felt)
+FOLLOWER = Load(work=lambda at, force: loads.follower_work(at.x.R, force, at.first.r))
+MOMENT = Load(
+    in_plane=_about_normal, work=lambda at, moment: loads.moment_work(at.x.q, moment, at.first.q), moment=True
+)
+FOLLOWER_MOMENT = Load(
+    in_plane=_about_normal, work=lambda at, moment: loads.follower_moment_work(at.x.q, moment, at.first.q), moment=True
+)
+
+
 class Contribution:
-    """Part of a scene; one without unknowns contributes its loads (:mod:`rodfem.problem.load`), and nothing else."""
+    """Part of a scene; one without unknowns contributes its loads, and nothing else."""
 
     nodal = False
     """Whether its terms along the rod are collocated at nodes."""
@@ -163,3 +216,30 @@ class Contribution:
     def kinetic(self, at: Site) -> Iterator[Any]:
         """Terms of the kinetic metric."""
         return iter(())
+
+
+@dataclass(frozen=True)
+class Attachment(Contribution):
+    """Something attached at arclength ``s``.
+
+    A dead ``force(c)``, a ``follower(c)`` force by its components along the directors, a potential ``energy(x, c)`` (a
+    spring), a ``mass(c)``, a ``rotary_inertia(c)`` (3,) about the directors; or constants.
+    """
+
+    s: float
+    force: Given = role_field(Role("force of an attachment", "f(c)", 3, load=DEAD))
+    follower: Given = role_field(lambda x: Role(f"follower force at s = {x.s:g}", "f(c)", 3, load=FOLLOWER))
+    energy: OfPlace | None = role_field(Role("energy of an attachment", "f(x, c)", 0, load=POTENTIAL))
+    mass: Given = role_field(Role("mass of an attachment", "f(c)", 0))
+    rotary_inertia: Given = role_field(Role("rotary inertia of an attachment", "f(c)", 3))
+
+    def __post_init__(self) -> None:
+        """Check the place; raises :class:`InputError`."""
+        finite("s", self.s, 0.5)
+
+    def kinetic(self, at: Site) -> Iterator[Any]:
+        """Mass, where there is a centreline, and rotary inertia."""
+        if self.mass is not None and at.first.r is not None:
+            yield inertia.translational(at.first.r, at.second.r, self.mass(at.c))
+        if self.rotary_inertia is not None:
+            yield inertia.rotary(at.x.q, at.first.q, at.second.q, tuple(self.rotary_inertia(at.c)))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from math import sqrt
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import ufl
 
@@ -63,6 +63,8 @@ def watched(c: Constants) -> tuple[Constants, set[str]]:
 Place = SimpleNamespace
 Vector = Sequence[Any]
 OfConstants = Callable[[Constants], Vector]
+Given: TypeAlias = Any
+"""A function of the constants ``c``, or a constant in the place of one; None if there is none."""
 OfPlace = Callable[[Place, Constants], Any]
 Quaternion = tuple[float, float, float, float]
 
@@ -173,24 +175,22 @@ def some_places(
 
 
 def _places(length: float, state: int, s: float, wrap: Callable[[Any], Any] = lambda x: x) -> tuple[Place, Place]:
-    units = (1.0, length, 1.0, 1.0 / length)
-    numbers = ([float(unit * x) for x in values] for unit, values in zip(units, STATES[state], strict=True))
-    q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
-    R = rotation(q)
-    return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+    return places_at(length, s, STATES[state], wrap)
 
 
 _known_places = lru_cache(maxsize=64)(_places)
 """The same, made once: each check of a scene asks for these places."""
 
 
-def trials(scene: Scene, function: OfConstants) -> Iterator[Constants]:
-    """Constants at which a function of them is tried: at the loads, and at the arclengths, if it asks for them."""
-    c, asked = watched(scene.constants())
-    function(c)
-    places = scene.samples() if "s" in asked else [None]
-    for load in scene.loads() if scene.load in asked else [None]:
-        yield from (scene.constants(load, s) for s in places)
+def places_at(
+    length: float, s: float, state: Sequence[Any], wrap: Callable[[Any], Any] = lambda x: x
+) -> tuple[Place, Place]:
+    """Return a point and a place along the rod of a ``length``, in a ``state`` given as :data:`STATES` are."""
+    units = (1.0, length, 1.0, 1.0 / length)
+    numbers = ([float(unit * x) for x in values] for unit, values in zip(units, state, strict=True))
+    q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
+    R = rotation(q)
+    return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
 
 
 def asked_for(scene: Scene, c: Constants | None = None) -> set[str]:

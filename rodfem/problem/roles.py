@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rodfem.errors import SceneError
 
 if TYPE_CHECKING:
-    from rodfem.problem.load import Load
+    from rodfem.problem.contribution import Load
 
 T = TypeVar("T")
 Conversion = Callable[[Any], Any]
@@ -124,10 +124,13 @@ class Placeless:
 Visit = Callable[[str, Any, Role], Any]
 
 
-def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[..., Any]:
-    """Return ``function`` such that all it raises is a :class:`SceneError` that names it."""
+def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
+    """Return ``function`` such that all it raises is a :class:`SceneError` that names it; or one for a constant."""
     if hasattr(function, "guards"):
         return function
+    if not callable(function):
+        constant = function
+        function = lambda c: constant  # noqa: E731
 
     @wraps(function)
     def call(*arguments: Any) -> Any:

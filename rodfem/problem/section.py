@@ -18,8 +18,7 @@ from typing import Any
 from rodfem.errors import InputError
 from rodfem.forms.energy import bending_and_twist, shear_and_stretch
 from rodfem.forms.kinematics import RODS
-from rodfem.problem.arguments import checked
-from rodfem.problem.kinds import finite, reals
+from rodfem.problem.arguments import checked, finite, reals
 from rodfem.problem.scene import Inertia
 
 ODD = 1.0045237627951384

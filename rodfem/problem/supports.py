@@ -20,11 +20,9 @@ from typing import Any
 import numpy as np
 import ufl
 from numpy.typing import NDArray
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.apply_derivatives import apply_derivatives
-from ufl.utils.stacks import StackDict
 
 from rodfem.errors import SceneError
+from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY, product, rotation
 from rodfem.problem import quaternions
@@ -185,8 +183,8 @@ def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: F
     R = ufl.as_matrix([[d[i] for d in turned] for i in range(3)])
     rotated = product(ufl.as_vector([1.0, x[3] / 2, x[4] / 2, x[5] / 2]), ufl.as_vector(q.tolist()))
     value = ufl.as_ufl(function(place(rotated, R, s, ufl.as_vector([x[0], x[1], x[2]]), length=length), c))
-    slope = apply_derivatives(apply_algebra_lowering(ufl.diff(value, x)))
-    return np.array([float(slope.evaluate((), {}, (i,), StackDict())) for i in range(6)]).reshape(2, 3)
+    slope = differentiated(ufl.diff(value, x))
+    return np.array([float(evaluated(slope, (i,))) for i in range(6)]).reshape(2, 3)
 
 
 def section_of(scene: Scene) -> tuple[Floats, Floats]:

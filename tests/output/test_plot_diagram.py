@@ -17,7 +17,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
-from rodfem.fem.link import link
+from rodfem.fem.shape import link
 from rodfem.file_format import LOCUS
 from rodfem.output import plot_diagram
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
