@@ -14,9 +14,6 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
-from ufl.algorithms.analysis import extract_coefficients, extract_type
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from rodfem.fem.equations import Equations
 from rodfem.fem.system import System

@@ -17,13 +17,16 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from ufl.algorithms.analysis import extract_type
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.map_integrands import map_integrand_dags
-from ufl.constantvalue import FloatValue
-from ufl.corealg.multifunction import MultiFunction
-from ufl.corealg.traversal import traverse_unique_terminals
 
+from rodfem.expressions import (
+    Expr,
+    FloatValue,
+    MultiFunction,
+    apply_algebra_lowering,
+    extract_type,
+    map_integrand_dags,
+    parts,
+)
 from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import FEW, Discretization, Fields
@@ -49,7 +52,7 @@ def with_constants(form: Any, mesh: Any) -> Any:
 
     What is none, as a sum without terms, is returned as it is.
     """
-    if not isinstance(form, (ufl.Form, ufl.core.expr.Expr)):
+    if not isinstance(form, (ufl.Form, Expr)):
         return form
     if not any(number not in KEPT for number in _numbers(form)):
         return form
@@ -61,7 +64,7 @@ def with_constants(form: Any, mesh: Any) -> Any:
 def _numbers(form: Any) -> Iterator[float]:
     """Numbers in a form, or in an expression: to look for them takes a third of the time of a map."""
     for whole in [x.integrand() for x in form.integrals()] if isinstance(form, ufl.Form) else [form]:
-        yield from (float(x) for x in traverse_unique_terminals(whole) if isinstance(x, FloatValue))
+        yield from (float(x) for x in parts(whole) if isinstance(x, FloatValue))
 
 
 class _Constants(MultiFunction):

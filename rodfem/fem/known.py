@@ -22,12 +22,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 from numpy.polynomial import legendre
-from ufl.algorithms.map_integrands import map_integrand_dags
-from ufl.classes import PositiveRestricted
-from ufl.corealg.multifunction import MultiFunction
-from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem import compat
+from rodfem.expressions import Expr, MultiFunction, PositiveRestricted, map_integrand_dags, parts
 from rodfem.problem.table import Entry, Table
 from rodfem.tolerances import TINY
 
@@ -132,7 +129,7 @@ class Known:
 
     def put(self, form: Any) -> Any:
         """Return a form, or an expression, with the function in the place of the entries of tables."""
-        if self.function is None or not isinstance(form, (ufl.Form, ufl.core.expr.Expr)):
+        if self.function is None or not isinstance(form, (ufl.Form, Expr)):
             return form
         return map_integrand_dags(_Put(self), form, compress=False)
 
@@ -147,7 +144,7 @@ class Known:
         values = self._values[place : place + size]
         if name == "s":
             return values[entry.number]
-        if any(isinstance(node, PositiveRestricted) for node in unique_pre_traversal(at)):
+        if any(isinstance(node, PositiveRestricted) for node in parts(at)):
             values = [value("+") for value in values]
         t, (a, b, c, d) = at - values[0], values[1 + entry.number :: m]
         return a + t * (b + t * (c + t * d))
