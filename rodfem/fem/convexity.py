@@ -15,6 +15,7 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem.expressions import Variable, differentiated, extract_coefficients, extract_type
 from rodfem.fem.equations import Equations
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature, strain
@@ -38,8 +39,8 @@ def second_derivative(e: Equations) -> tuple[Any, bool, Any]:
     W = scene.energy(v, ufl.as_vector([x[len(free) + i] for i in range(3)]), e.constants)
     hessian, every = ufl.diff(ufl.diff(W, x), x), range(len(free) + 3)
     vector = ufl.as_vector([hessian[i, j] for i in every for j in every])
-    expanded = apply_derivatives(apply_algebra_lowering(vector))
-    variables = extract_type(expanded, ufl.classes.Variable)
+    expanded = differentiated(vector)
+    variables = extract_type(expanded, Variable)
     return vector, any(node.ufl_operands[1] == x.label() for node in variables), expanded
 
 

@@ -26,7 +26,7 @@ from rodfem import code_cache, compat
 from rodfem.beside import Job
 from rodfem.errors import SceneError, SetupError
 from rodfem.expressions import differentiated
-from rodfem.linalg import compiler
+from rodfem.linalg.compiled import missing_compiler, require_compiler
 
 _COMPILE = jit._compile_objects
 """What FFCx calls for objects that its cache lacks."""
@@ -70,7 +70,7 @@ def _loaded(name: str, file: Path) -> Any:
 
 def _compile(*arguments: Any, **options: Any) -> Any:
     """Compile as FFCx does, in a folder of its own; raises :class:`SetupError` if there is no compiler."""
-    compiler.require()
+    require_compiler()
     given = _SIGNATURE.bind(*arguments, **options)
     folder = Path(given.arguments["cache_dir"])
     with TemporaryDirectory(dir=folder) as room:
@@ -108,7 +108,7 @@ def _from_cache(comm: MPI.Comm) -> Iterator[None]:
     except (AttributeError, RuntimeError) as trouble:
         together = comm.size > 1 and isinstance(trouble, RuntimeError) and TOGETHER.match(str(trouble))
         why = comm.bcast(str(trouble)) if together else str(trouble)
-        if together and (missing := comm.bcast(compiler.missing())):
+        if together and (missing := comm.bcast(missing_compiler())):
             raise SetupError(missing) from trouble
         if "LiteralFloat" not in why:  # FFCx takes a product of nothing but numbers for one with arguments
             raise

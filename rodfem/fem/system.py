@@ -26,14 +26,12 @@ from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_
 from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import FEW, Discretization
-from rodfem.fem.invariance import find_motion_along, find_symmetries
+from rodfem.fem.invariance import Verification, find_motion_along, find_symmetries
 from rodfem.fem.state import LOAD, Line, NodalValues, State
 from rodfem.fem.symmetries import DriftForces, Generators, Symmetry, capable, may_slide, no_phase, phase_at
-from rodfem.fem.verification import Verification
-from rodfem.linalg.chain import Chain
+from rodfem.linalg.chain import Chain, factors_of
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
-from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene

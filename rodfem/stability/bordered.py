@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.linalg.selection import factors_of
+from rodfem.linalg.chain import factors_of
 from rodfem.stability.inertia import inertia_factors
 
 

@@ -25,11 +25,10 @@ from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
-from rodfem.linalg.chain import Chain
+from rodfem.linalg.chain import Chain, factors_of
 from rodfem.linalg.factorization import Factors, Sizes
 from rodfem.linalg.matrices import local_rows, places_in, rounding, shared
 from rodfem.linalg.orthogonal import generic
-from rodfem.linalg.selection import factors_of
 from rodfem.tolerances import TINY
 
 EPS = float(np.finfo(float).eps)

@@ -22,7 +22,7 @@ import rodfem
 from rodfem import Discretization, Plan, libraries
 from rodfem.app.console import main
 from rodfem.errors import SetupError
-from rodfem.linalg import compiler
+from rodfem.linalg import compiled
 
 COMM = MPI.COMM_WORLD
 HOME = Path(__file__).parents[2]
@@ -125,14 +125,14 @@ def test_without_a_compiler(given: str, folder: Path) -> None:
 
 @pytest.mark.alone
 def test_another_compiler_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = compiler.missing.__wrapped__
+    found = compiled.missing_compiler.__wrapped__
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(os, "environ", dict(os.environ))
-    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
-    monkeypatch.setattr(compiler, "find_spec", lambda name: name == "ziglang")
+    monkeypatch.setattr(compiled.shutil, "which", lambda name: None)
+    monkeypatch.setattr(compiled.importlib.util, "find_spec", lambda name: name == "ziglang")
     assert found() == ""
     assert os.environ["CC"] == f"{sys.executable} -m ziglang cc" and os.environ["LDSHARED"].endswith(" cc -shared")
     monkeypatch.setattr(os, "environ", {"CC": sys.executable})
-    monkeypatch.setattr(compiler.shutil, "which", lambda name: name)
-    monkeypatch.setattr(compiler.sysconfig, "get_path", lambda name: "/nowhere")
+    monkeypatch.setattr(compiled.shutil, "which", lambda name: name)
+    monkeypatch.setattr(compiled.sysconfig, "get_path", lambda name: "/nowhere")
     assert re.search(r"no header files .*'apt install python3-dev'", found())

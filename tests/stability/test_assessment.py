@@ -22,7 +22,7 @@ from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import INVERSES, Reduction
-from rodfem.linalg.selection import factors_of
+from rodfem.linalg.chain import factors_of
 from rodfem.problem.scene import Inertia
 from rodfem.stability.assessment import Assessor, assess
 from rodfem.stability.blocks import Blocks, Pencil
