@@ -93,12 +93,8 @@ class Assembler:
 
     It is assembled on the cells of this rank.
 
-    Attributes
-    ----------
-    constants
-        Values of the constants of the form, as :meth:`pack_constants` found them.
-    pointer, function
-        The form for other compiled code, and the address of what assembles it.
+    ``constants`` are those of the form, as :meth:`pack_constants` found them; ``pointer`` and ``function`` are the
+    form, and the address of what assembles it, for other compiled code.
     """
 
     def __init__(self, form: Any, cells: Cells, known: Known, load: int, *, inside: bool = False) -> None:

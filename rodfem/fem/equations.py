@@ -102,35 +102,12 @@ class Equations:
     those that its functions have in them.  Every parameter is ``p = base + direction * load`` with the scalar unknown
     ``load``: any of them can be varied.
 
-    Attributes
-    ----------
-    residual, jacobian
-        First and second derivative of the Lagrangian in all fields and scalars.
-    metric
-        ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square rotation).
-    kinetic
-        Kinetic metric of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``.
-    massless, even
-        Whether that is without any term, and without the arclength in it.
-    energy
-        Stored energy ``int W ds``.
-    potential
-        The Lagrangian without the constraints at nodes: at an equilibrium, where constraints are fulfilled, the total
-        potential energy.  None where a load has no potential.
-    loads
-        What acts on the rod in the potential, without the rod: loads, springs and foundations, and constraints that are
-        no ones at nodes.  None where there is nothing, or no potential.
-    ordinate
-        Ordinate of the scene where that is an integral over the rod, else None.
-    line
-        Parameters that the scalar unknown ``load`` stands for unless an evaluation says otherwise: the scene's load.
-    register
-        What the forms read now, of whichever scene: the ``line`` taken last, and since then the ``values`` that were
-        put where dolfinx reads them (:mod:`rodfem.fem.state`).
-    cells, local_places
-        Cells of this rank, and the places of a vector of all their degrees of freedom.
-    uniform
-        Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
+    ``metric`` is ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square
+    rotation), ``kinetic`` that of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``; it may be
+    ``massless``, or ``even``: without the arclength.  ``potential`` is the Lagrangian without the constraints at nodes,
+    at an equilibrium the total potential energy, None if a load has none; ``loads`` is that without the rod.  In
+    ``uniform`` equations there is no arclength, and nothing acts at points inside the rod.  ``register`` says what the
+    forms read now, of whichever scene: the ``line`` taken last, and the ``values`` that were put there since then.
     """
 
     def __init__(self, fields: Fields) -> None:

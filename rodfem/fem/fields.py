@@ -162,22 +162,10 @@ def check_number(scene: Scene, discretization: Discretization, number: int) -> N
 class Fields:
     """Mesh, mixed space, the unknown ``u`` of all forms as a dolfinx Function, and the numbering of free unknowns.
 
-    Attributes
-    ----------
-    dofs
-        For each field the local degrees of freedom, (cells incl. ghosts, nodes per cell, components).
-    number
-        Global number of each local degree of freedom, -1 where clamped; (local size,) int32.
-    unknown_scalars, forces
-        Scalar unknowns without load and drifts; components of a constant contact force among them.
-    scalars
-        Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
-    copies
-        Local degrees of freedom of the scalars but for drifts, one in each cell, (cells, scalars).
-    clamped, clamps
-        Clamped local degrees of freedom; their values, zero for all others, (local size,).
-    asked
-        The discretisation as it was asked for.
+    ``dofs`` are the local degrees of freedom of each field, (cells incl. ghosts, nodes per cell, components),
+    ``copies`` those of the scalars but for drifts, one in each cell, (cells, scalars).  ``number`` (local size,) is the
+    global number of each, -1 where clamped, and ``clamps`` the value there, zero for all others; ``scalars`` has the
+    numbers of the scalars, ``n1``.. for a constant contact force, ``load``, and ``drift0``.. one for each symmetry.
     """
 
     def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD) -> None:

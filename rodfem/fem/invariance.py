@@ -357,14 +357,8 @@ def _toward_clamps(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndar
 class Verification:
     """Verifies the symmetries of one :class:`~rodfem.fem.system.System` at states where ``S`` is assembled.
 
-    Attributes
-    ----------
-    dropped
-        Places of the symmetries that were found to be none.
-    notices
-        A sentence on each of them that nobody has read yet.
-    norm
-        That of ``S`` at the first state, to which residuals are relative; zero before.
+    ``dropped`` are the places of those that were found to be none, ``notices`` a sentence on each that nobody has read
+    yet.  ``norm`` is that of ``S`` at the first state, to which residuals are relative.
     """
 
     def __init__(self, system: System) -> None:

@@ -41,20 +41,12 @@ UNSEEN = 1e-11
 
 
 class Known:
-    """Tables of a scene as a dolfinx Function.
+    """Tables of a scene as a dolfinx Function, None if it has no table.
 
-    Attributes
-    ----------
-    function
-        All values, None where the scene has no table.
-    tables, paths
-        Tables along the rod; and paths, each with the name of its constant.
-    along
-        Values of the tables in each local cell, (cells, values), in the order in which a cell has them.
-    rows
-        For each path where its pieces begin, and their coefficients, (pieces, size).
-    lines
-        For each path its constant at zero load, and the slope in the load, (paths, 2).
+    ``along`` are values of the ``tables`` along the rod in each local cell, (cells, values), in the order in which a
+    cell has them.  Of each of the ``paths``, with the name of its constant, ``rows`` say where its pieces begin, and
+    have their coefficients, (pieces, size), and ``lines`` (paths, 2) its constant at zero load, and the slope in the
+    load.
     """
 
     name = "known"

@@ -50,12 +50,8 @@ REMEDY = "no error is estimated; use breaks=(...) where a function jumps or has 
 class Pieces:
     """Forms of some ``equations`` on their own cells, each cut into equal pieces: values are (pieces, cells, n).
 
-    Attributes
-    ----------
-    dofs, rows
-        Local degrees of freedom of each cell, (cells, n), and which of these n each field has.
-    points, number
-        Points of the rule of an element, and number of pieces that make a rule of :data:`POINTS`.
+    ``dofs`` (cells, n) are local degrees of freedom, and ``rows`` says which of these n each field has.  The rule of an
+    element has as many ``points``, and a ``number`` of pieces makes a rule of :data:`POINTS`.
     """
 
     def __init__(self, equations: Equations) -> None:

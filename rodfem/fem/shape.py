@@ -21,6 +21,8 @@ from rodfem.problem.quaternions import CONJUGATE, directors, product
 from rodfem.problem.roles import derived
 from rodfem.writhe import writhe
 
+WRITHE_TO = 1e-5
+"""Change with which a writhe is accepted."""
 INWARDS = 1e-9
 """Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
 
@@ -68,14 +70,8 @@ class Gauss:
 class Shape:
     """Evaluates shapes of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks.
 
-    Attributes
-    ----------
-    cells
-        Slice of the owned cells among the local ones.
-    s
-        Arclengths of their nodes from left to right, (cells, nodes).
-    order
-        Order of the nodes of an element from left to right, (nodes,).
+    ``cells`` are the owned ones among the local ones, ``s`` the arclengths of their nodes from left to right, (cells,
+    nodes), and ``order`` the order of the nodes of an element from left to right.
     """
 
     def __init__(self, system: System) -> None:
@@ -350,7 +346,7 @@ def link(sample: dict[str, Any]) -> tuple[int, float, float]:
 
     s, closed = np.asarray(sample["s"]), np.array(sample["r"])
     closed[-1] = closed[0]
-    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=1e-5)
+    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=WRITHE_TO)
     Tw = twist(s, np.asarray(sample["q"]))
     Lk = round(Tw + Wr)
     if abs(Tw + Wr - Lk) > 0.05:

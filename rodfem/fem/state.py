@@ -62,12 +62,8 @@ def load_line(scene: Scene) -> Line:
 class NodalValues:
     """Values of fields and scalars, of a state or of a change of one; they never change.
 
-    Attributes
-    ----------
-    local
-        Value of each local degree of freedom, clamped ones and ghosts included, (local size,); read only.
-    line
-        Parameters that the scalar ``load`` stands for.
+    ``local`` has each local degree of freedom, clamped ones and ghosts included; ``line`` are the parameters that the
+    load stands for.
     """
 
     def __init__(self, fields: Fields, local: np.ndarray, line: Line) -> None:
@@ -107,16 +103,10 @@ class NodalValues:
 class Energies(NamedTuple):
     """Energies of a state; those of the loads are nan where a load has no potential.
 
-    Attributes
-    ----------
-    energy
-        Stored energy ``int W ds`` of the rod.
-    potential
-        Total potential energy ``V``, of the rod, loads, springs and foundations: what is stationary at an equilibrium.
-    conjugate
-        ``-dV/dload`` at fixed state: what the load does work on, as the displacement of its point or the angle of its
-        end.  The distinguished ordinate of Maddocks, Arch. Ration. Mech. Anal. 99 (1987): along a branch
-        ``dV = -conjugate dload``.
+    ``energy`` is the stored one, ``int W ds``, and ``potential`` the total ``V``, of the rod, loads, springs and
+    foundations: what is stationary at an equilibrium.  ``conjugate`` is ``-dV/dload`` at fixed state: what the load
+    does work on, as the displacement of its point or the angle of its end.  The distinguished ordinate of Maddocks,
+    Arch. Ration. Mech. Anal. 99 (1987): along a branch ``dV = -conjugate dload``.
     """
 
     energy: float
@@ -190,12 +180,7 @@ class Evaluation(NodalValues):
 class State(Evaluation):
     """State of a :class:`~rodfem.fem.system.System`, whose borders and matrices it uses; collective over its ranks.
 
-    Attributes
-    ----------
-    drifts
-        Drift scalars, the same on all ranks.
-    phases
-        Its phase conditions, by the symmetries that are left out, as :meth:`System.set_phase` has found them.
+    ``drifts`` are its drift scalars, and ``phases`` its phase conditions by the symmetries that are left out.
     """
 
     def __init__(self, system: System, local: np.ndarray, drifts: np.ndarray, line: Line) -> None:

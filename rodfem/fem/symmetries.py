@@ -310,13 +310,6 @@ class Generators:
             self._line, self._fixed = line, found[0]
         return None if self._varies else self._fixed
 
-    def in_unknowns(self) -> sp.csr_matrix:
-        """``A`` of all generators, one below the other, for vectors of the system on one rank."""
-        fields, n = self.system.fields, self.system.fields.unknowns
-        columns = fields.number[self._columns]
-        place = sp.csr_matrix((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))
-        return (self._forth @ place).tocsr()
-
     def _constant_at(self, line: Line, load: float) -> np.ndarray:
         fields = self.system.fields
         at_load = NodalValues(fields, fields.filled({LOAD: load}), line)
@@ -350,22 +343,9 @@ class Generators:
 class Phase:
     """Phase conditions of one reference state, by the number of their drift scalars.
 
-    Attributes
-    ----------
-    rows
-        ``M g`` of each active condition by its drift scalar, this rank's rows.
-    forces
-        What one of each drift scalar of an active condition adds to the equations, this rank's rows.
-    offsets
-        ``g . M x0`` for each drift scalar.
-    broken
-        Weights of the generators in each ``g``.
-    kept
-        Weights of those combinations that the reference has itself, a row each.
-    reference
-        ``x0``, None where no condition is active.
-    vector
-        Makes a vector of own rows.
+    ``rows`` are ``M g`` of each active condition, and ``forces`` what one of its drift scalar adds to the equations,
+    this rank's rows; ``offsets`` are ``g . M x0``.  ``broken`` has the weights of the generators in each ``g``,
+    ``kept`` those of combinations that the ``reference`` has itself.  ``vector`` makes a vector of own rows.
     """
 
     rows: dict[int, np.ndarray]

@@ -46,29 +46,11 @@ RECENT = 4
 class System:
     """Residual, Jacobian and metric of a scene at a discretisation, and their borders.
 
-    Attributes
-    ----------
-    metric
-        Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
-    lu
-        LU factors of the last Jacobian that a :class:`~rodfem.fem.state.State` factored.
-    symmetries
-        Those found in the equations of the scene; the motion of a closed rod along itself comes last.
-    line
-        Parameters that the load of a state stands for where nothing else is said: the scene's load, unless a locus in
-        two parameters is followed.
-    generators
-        Changes of a state by the symmetries.
-    drift_forces
-        What is added to the forces of drift scalars of a rod that nothing holds, under loads without a potential.
-    verification
-        What verifies the symmetries at the states where the second variation is assembled.
-    compiled
-        Newton's method in compiled code with LU factors, None where PETSc makes them.
-    damping
-        Multiple of the metric added to every Jacobian.  Not zero where a state belongs to a family of equilibria at one
-        and the same load that no symmetry explains: the Jacobian is singular there, and Newton's method must not move
-        along the family.
+    ``symmetries`` are those found in the equations of the scene; the motion of a closed rod along itself comes last.
+    ``line`` has the parameters that the load of a state stands for if nothing else is said: the scene's load, unless a
+    locus in two parameters is followed.  ``damping`` is a multiple of the metric added to every Jacobian.  It is not
+    zero if a state belongs to a family of equilibria at one and the same load that no symmetry explains: the Jacobian
+    is singular there, and Newton's method must not move along the family.
     """
 
     def __init__(

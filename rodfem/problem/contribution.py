@@ -37,22 +37,10 @@ class Motion(Enum):
 
 @dataclass(frozen=True)
 class Group:
-    """Scalar unknowns that belong together, multipliers unless they are positions.
+    """Scalar unknowns that belong together, multipliers unless they are positions; that of component 0 is ``name1``.
 
-    Attributes
-    ----------
-    name
-        Beginning of their names: that of component 0 is ``name1``.
-    words
-        What they are, for the terminal.
-    equation
-        What the equation of a multiplier states, with ``{}`` for its number; empty for positions, which are none.
-    motion
-        What rigid motions do to them.
-    known
-        ``known(c)``, values (3,) of the components of a vector that are no unknowns, None elsewhere.
-    moment
-        Whether a multiplier is a moment, not a force.
+    ``equation`` is what the equation of a multiplier states, with ``{}`` for its number; positions have none.
+    ``motion`` is what rigid motions do to them.  ``known(c)`` (3,) has the components of a vector that are no unknowns.
     """
 
     name: str
@@ -101,22 +89,10 @@ class Block:
 class Site:
     """Expressions of the state where a contribution is, of which it makes its terms.
 
-    Attributes
-    ----------
-    x, c
-        Place and constants, as functions ``f(x, c)`` receive them.
-    y
-        Values of the contribution's own unknowns, in their order.
-    turned
-        Field of the rotation: quaternion (4,), or the angle of a planar rod.
-    normal
-        Component across the plane of a planar rod, None in space.
-    free
-        Components of the position that move.
-    first, second
-        Variations with ``r`` (3,), None without a centreline, and ``q`` (4,).
-    whole
-        Of a closed planar rod the angle by which it turns in all, else None.
+    Functions ``f(x, c)`` receive the place ``x`` and the constants ``c``; ``y`` are the contribution's own unknowns.
+    ``turned`` is the field of the rotation, quaternion (4,) or angle, ``normal`` the component across the plane of a
+    planar rod, ``free`` are components of the position that move.  ``first`` and ``second`` are variations with ``r``
+    (3,), if there is a centreline, and ``q`` (4,).  ``whole`` is the angle by which a closed planar rod turns in all.
     """
 
     x: Place
@@ -135,18 +111,9 @@ Term = Callable[[Site, Any], Any]
 
 @dataclass(frozen=True)
 class Load:
-    """A kind of load.
+    """A kind of load: its potential in space, that ``in_plane`` if it is another, or else its virtual ``work``.
 
-    Attributes
-    ----------
-    potential
-        Its potential, None where it has none in space.
-    in_plane
-        Its potential where the rod is planar, None where that is the same.
-    work
-        Its virtual work where it has no potential.
-    moment
-        Whether it is a moment, about the normal of a planar rod; a force is in its plane.
+    A ``moment`` of a planar rod is about the normal, a force in the plane.
     """
 
     potential: Term | None = None

@@ -25,6 +25,7 @@ from rodfem.problem.constraint import Constraint, Integral, at, everywhere, inte
 from rodfem.problem.contribution import Attachment
 from rodfem.problem.end import End, Ring, SlidingHinge
 from rodfem.problem.local_state import Constants, Given, OfPlace, Place, Quaternion
+from rodfem.tolerances import NEGLIGIBLE
 
 __all__ = [
     "Attachment",
@@ -105,7 +106,7 @@ def sliding_hinge(
         raise SceneError(f"The direction in which a hinge slides is {what}: give one, as in along=(0.6, 0.0, 0.8).")
     direction = direction / largest
     direction /= np.linalg.norm(direction)
-    unit = tuple(np.where(abs(direction) > 1e-14, direction, 0.0).tolist())
+    unit = tuple(np.where(abs(direction) > NEGLIGIBLE, direction, 0.0).tolist())
     push = force if force is None else lambda c: tuple(t * value_of(force, c) for t in unit)
     return SlidingHinge(position, rotation, push, hinge=axis, along=unit)
 

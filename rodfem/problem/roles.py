@@ -49,26 +49,11 @@ class UnnamedError(SceneError):
 class Role:
     """Purpose of a function of a scene.
 
-    Attributes
-    ----------
-    words
-        Its name in a sentence, with ``{}`` for where it is: ``force on the {} end``.
-    call
-        How it is called: ``f(c)`` of the constants, ``f(x, c)`` of a place, or another.
-    size
-        Number of components that it returns, 0 for a scalar, None where that is checked elsewhere.
-    along
-        Whether its place is the whole rod; of a function of the constants, whether it is one of the arclength.
-    or_value
-        Whether a constant value may stand in its place.
-    load
-        Kind of load that it is, None where it is none.
-    hint, returns
-        How it is to be written, for where it fails; what converts the value that it returns.
-    gaps
-        Whether a component may be None.
-    placed
-        Whether the constants that it is given have the arclength; those of an end, or of all of the rod, have none.
+    ``words`` have ``{}`` for where it is: ``force on the {} end``; ``call`` is ``f(c)`` of the constants, ``f(x, c)``
+    of a place, or another.  It returns ``size`` components, 0 for a scalar, None if that is checked elsewhere; one may
+    be None if there are ``gaps``.  Its place is the whole rod if it is ``along``; unless ``placed`` its constants lack
+    the arclength.  ``or_value`` lets a constant stay as it is, ``load`` is the kind of load, ``hint`` how it is
+    written, and ``returns`` converts its value.
     """
 
     words: str

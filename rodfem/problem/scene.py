@@ -41,8 +41,8 @@ GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*"
 """Names that branches are given as they are found."""
 FEW = 64
 """Knots of tables below which elements meet at each: where there are more, an element has several."""
-FARTHEST = 1e9
-"""Arclength, over the rod's length, beyond which round-off of arclengths is seen."""
+SHORTEST, FARTHEST = 1e-15, 1e9
+"""Length above which dolfinx makes a mesh, and arclength over the length beyond which its round-off is seen."""
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Given, OfPlace, Vector
@@ -315,8 +315,7 @@ class Scene(Contribution):
             raise SceneError(
                 f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first."
             )
-        # of less than the round-off of one dolfinx makes no mesh
-        if not max(1e-15, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
+        if not max(SHORTEST, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
             raise SceneError(
                 f"A rod from {a:g} to {b:g} is too short or too long for floats, or short beside its arclengths' "
                 "round-off: choose other units, or let the arclength begin at zero."

@@ -26,17 +26,7 @@ ORDINARY = 1e3
 
 
 class Units(NamedTuple):
-    """Natural sizes.
-
-    Attributes
-    ----------
-    length, force, moment, energy
-        Of the rod: its length and stiffness.
-    load, ordinate
-        Of the numbers that are recorded.
-    omega2
-        Of eigenvalues of the motion.
-    """
+    """Natural sizes of the rod, of the numbers that are recorded, and of eigenvalues of the motion."""
 
     length: float
     force: float
