@@ -282,8 +282,8 @@ FAULTS = {
     ),
     "constants-are-compared": Fault(
         "rodfem/problem/trials.py",
-        "if _is_a_persons(3):",
-        "if _is_a_persons(3) and False:",
+        "abs(symbolic - number) <= least:",
+        "abs(symbolic - number) <= 1e9:",
         "tests/problem/test_symbols.py",
     ),
     "pairs-that-have-just-met-enter": Fault(

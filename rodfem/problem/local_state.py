@@ -43,10 +43,6 @@ class Constants(SimpleNamespace):
             f"{', '.join([*known, 'c.s (the arclength)'])}."
         )
 
-    def __getitem__(self, name: object) -> Any:
-        """Say how a constant is written."""
-        raise UnnamedError(f"asks for c[{name!r}]: constants are attributes, write c.{str(name).strip()}.")
-
 
 def watched(c: Constants) -> tuple[Constants, set[str]]:
     """Return the same constants, and the set of names that they will have been asked for."""

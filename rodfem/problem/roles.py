@@ -10,10 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from difflib import get_close_matches
 from functools import wraps
 from logging import getLogger
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rodfem.errors import SceneError
@@ -101,10 +99,6 @@ class Placeless:
             raise UnnamedError("asks for the arclength c.s, but does not vary along the rod: write the number.")
         return getattr(self._constants, name)
 
-    def __getitem__(self, name: object) -> Any:
-        """Say how a constant is written."""
-        return self._constants[name]
-
 
 Visit = Callable[[str, Any, Role], Any]
 
@@ -130,7 +124,7 @@ def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
         except (Exception, SystemExit) as trouble:  # whatever a person's function may raise
             first = str(trouble).split("\n", 1)[0].rstrip(".")
             wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
-            hint = _spelled(trouble) or (role.meanings if wrong and role.meanings else role.hint)
+            hint = role.meanings if wrong and role.meanings else role.hint
             raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {hint}.") from trouble
         finally:
             LOG_OF_UFL.disabled = silent
@@ -148,15 +142,6 @@ def derived(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
     if key not in known:
         known[key] = make()
     return known[key]
-
-
-def _spelled(trouble: BaseException) -> str:
-    """Names like one that a module was asked for in vain: that of the arctangent differs between versions of UFL."""
-    module = getattr(trouble, "obj", None)
-    if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):
-        return ""
-    near = get_close_matches(trouble.name or "", dir(module), n=3)
-    return f"choose {' or '.join(f'{module.__name__}.{name}' for name in near)}" if near else ""
 
 
 def functions_of(owner: Any, *, nested: bool = True) -> list[tuple[str, Callable[..., Any], Role]]:

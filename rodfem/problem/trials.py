@@ -3,13 +3,12 @@
 What a function returns has the declared size, and is finite and real.  In the equations each constant is an expression
 that stands for any number of its range.  A function that branches by the value of a constant (``c.on == 1``, ``in``,
 ``if c.on``, a key of a dictionary) takes one branch for numbers and may take another there, where ``==`` compares how
-two expressions are written, and all are true.  A comparison is refused as it is made; what else may differ, in the
-numbers that the expression and the function have at the same constants and state.
+two expressions are written, and all are true.  So the function and its expression are compared at the same constants
+and states.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Container, Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -39,10 +38,7 @@ Pair = tuple[float, float, Constants]
 
 
 class Symbol(Variable):  # type: ignore[misc]
-    """An expression that stands for no number until it has a ``value``: ``math.cos`` refuses it.
-
-    A person's function cannot compare it by ``==``, nor take it for true or false; UFL does so with all expressions.
-    """
+    """An expression that stands for no number until it has a ``value``: ``math.cos`` refuses it."""
 
     __slots__ = ("name", "value")
 
@@ -54,7 +50,7 @@ class Symbol(Variable):  # type: ignore[misc]
         return symbol
 
     def evaluate(self, *_: Any, **__: Any) -> float:
-        """Return the value; raises :class:`TypeError` where there is none."""
+        """Return the value; raises :class:`TypeError` if there is none."""
         if self.value is None:
             raise TypeError("a constant is an expression of UFL")
         return float(self.value)
@@ -63,74 +59,22 @@ class Symbol(Variable):  # type: ignore[misc]
         """Name, as a dictionary has it in its words on a key that it lacks."""
         return self.name
 
-    __hash__ = Variable.__hash__
-
-    def __eq__(self, other: object) -> bool:
-        """Whether both are the same expression; raises :class:`UnnamedError` in a person's function."""
-        self._refuse("compares {} by ==, != or in", "ufl.eq({}, 1)")
-        return bool(super().__eq__(other))
-
-    def __ne__(self, other: object) -> bool:
-        """Whether both are not the same expression; raises :class:`UnnamedError` in a person's function."""
-        self._refuse("compares {} by ==, != or in", "ufl.eq({}, 1)")
-        return not super().__eq__(other)
-
-    def __bool__(self) -> bool:
-        """Be true, as all expressions are; raises :class:`UnnamedError` in a person's function."""
-        self._refuse("takes {} for true or false", "ufl.ne({}, 0)")
-        return True
-
-    def _refuse(self, does: str, condition: str) -> None:
-        if _is_a_persons(3):
-            raise UnnamedError(
-                f"{does.format(self.name)}, which has no value yet where the equations are made: write "
-                f"ufl.conditional({condition.format(self.name)}, ..., ...) instead of if."
-            )
-
-
-def _is_a_persons(depth: int) -> bool:
-    """Whether the caller at a ``depth`` of the stack is a person's function, or what it calls, but UFL and rodfem."""
-    frame: Any = sys._getframe(depth)
-    if _package(frame) == "rodfem":
-        return False
-    while frame is not None and _package(frame) != "rodfem":
-        if _package(frame) == "ufl":
-            return False
-        frame = frame.f_back
-    return True
-
-
-def _package(frame: Any) -> str:
-    return str(frame.f_globals.get("__name__", "")).partition(".")[0]
-
 
 @contextmanager
-def _conditions_are_not_asked() -> Iterator[None]:
-    """Have a person's function refused inside the block that takes ``ufl.eq`` for true or false.
+def _no_truth() -> Iterator[None]:
+    """Have ``ufl.eq`` refused for true or false, which UFL answers by how its sides are written."""
 
-    UFL answers by how the two sides are written; it refuses other conditions itself.
-    """
+    def refuse(condition: Any) -> bool:
+        raise UnnamedError(
+            "takes ufl.eq or ufl.ne for true or false: write ufl.conditional(ufl.eq(a, b), ..., ...)."
+        )
 
-    def refuse(usual: Callable[[Any], bool]) -> Callable[[Any], bool]:
-        def asked(condition: Any) -> bool:
-            if _is_a_persons(2):
-                raise UnnamedError(
-                    "takes ufl.eq or ufl.ne for true or false, which has no value yet where the equations are made: "
-                    "write ufl.conditional(ufl.eq(..., ...), ..., ...) instead of if."
-                )
-            return usual(condition)
-
-        return asked
-
-    kinds = EQ, NE
-    before = [kind.__bool__ for kind in kinds]
-    for kind in kinds:
-        kind.__bool__ = refuse(kind.__bool__)
+    usual = EQ.__bool__, NE.__bool__
+    EQ.__bool__ = NE.__bool__ = refuse
     try:
         yield
     finally:
-        for kind, usual in zip(kinds, before, strict=True):
-            kind.__bool__ = usual
+        EQ.__bool__, NE.__bool__ = usual
 
 
 def symbols(scene: Scene, names: Container[str] | None = None) -> Constants:
@@ -156,15 +100,13 @@ def check_function(what: str, function: Any, role: Role) -> None:
 def check_functions(scene: Scene) -> None:
     """Raise :class:`SceneError` for a function of a scene that is wrong with numbers, or another as an expression."""
     for trial in _trials(scene):
-        with _conditions_are_not_asked():
-            trial.compare()
+        trial.compare()
 
 
 def expressions_of(scene: Scene) -> Iterator[Any]:
     """What functions of a scene return for symbols of its constants."""
     for trial in sorted(_trials(scene), key=lambda trial: trial.of_place):
-        with _conditions_are_not_asked():
-            yield from (e for e in trial.expressions(0)[1] if e is not None)
+        yield from (e for e in trial.expressions(0)[1] if e is not None)
 
 
 def _trials(scene: Scene) -> Iterator[Trial]:
@@ -275,7 +217,8 @@ class Trial:
         c = symbols(self.scene, None if self.s is None else self.scene.parameters)
         if self.s is not None:
             c.s = self.s
-        found = self._called(c, state, _named(OF_PLACES.get(self.role.call, ())))
+        with _no_truth():
+            found = self._called(c, state, _named(OF_PLACES.get(self.role.call, ())))
         if self.of_place:
             self._check(found)
         for part in (part for e in found if e is not None for part in parts(e)):

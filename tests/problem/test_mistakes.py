@@ -182,7 +182,6 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ({"energy": lambda v, k, c: 1.0}, "stored energy is flat"),
     ({"energy": lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) ** 2}, "stored energy is flat"),
     ({"ends": (clamped(), elastic(lambda c: NAN, force=lambda c: (0, 0, -c.P)))}, "nan in it"),
-    ({"potential": lambda x, c: ufl.atan3(x.d1[0], x.d1[1])}, r"no attribute 'atan3'.: choose ufl.atan"),
     # a value, a cross-section or a text where a function or a number belongs
     ({"ends": (clamped((0, 1)), TIP)}, "position of the left end has 2 components: give 3"),
     ({"ends": (clamped(3.0), TIP)}, "position of the left end is 3.0: give a function"),

@@ -190,7 +190,10 @@ OFF_PLANE: list[tuple[dict, str]] = [
             {"energy": lambda v, k, c: (1 - c.S) * k[0] ** 2},
             r"^The stored energy asks for a constant 'S': .*, or choose one of c\.B, c\.F, c\.s \(the arclength\)",
         ),
-        ({"energy": lambda v, k, c: c["B"] * k[0] ** 2}, r"stored energy asks for c\['B'\]: .* write c\.B\."),
+        (
+            {"energy": lambda v, k, c: c["B"] * k[0] ** 2},
+            r"energy fails with TypeError.*subscriptable.*, as c\.P",
+        ),
         ({"energy": lambda v, k, c: c.s.x * k[0] ** 2}, r"'x'\\?\".*: v\[0\].* c\.s, numbers or expressions of UFL"),
         ({"energy": lambda v, k, c, s: (1 - s) * k[0] ** 2}, r"give W\(v, k, c\), where .* the arclength, c\.s"),
         ({"potential": lambda x, c: c.G * x.r[0]}, "asks for a constant 'G'"),
