@@ -24,7 +24,6 @@ from rodfem import (
     Ordinate,
     Parameter,
     Plan,
-    Ring,
     Scene,
     StepControl,
     at,
@@ -98,7 +97,6 @@ def stiff(b: Any, k: Any) -> Any:
 
 SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     # names, numbers, pairs
-    ({"name": "\ud800"}, "cannot be that of a folder"),
     ({"title": 3}, "title is 3"),
     *(
         ({"interval": x}, r"interval(\[\d\])? is")
@@ -116,17 +114,14 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ),
     ({"rod": ["unshearable"]}, "kind of rod"),
     ({"load": ["P"]}, "is not a parameter"),
-    ({"load": None}, "is not a parameter"),
     *((numbers(**{name: 1.0}), "cannot have the name") for name in ("lambda", "__class__", "a/b")),
     *((numbers(B=x), "B is") for x in (True, 10**400, 1j, "1")),
     (lambda: numbers(B=Parameter(1.0, label=3)), "label is 3"),  # type: ignore[arg-type]
     (lambda: numbers(B=Parameter(1.0, "", (0,))), "admissible is"),  # type: ignore[arg-type]
-    (numbers(B=HUGE) | {"energy": lambda v, k, c: stiff(c.B, k)}, "stiffness of 1e.308"),
     (numbers(B=TINY) | {"energy": lambda v, k, c: stiff(c.B, k)}, "stiffness of"),
     ({"ends": iter(())}, "not two of the kind End"),
     ({"breaks": ("0.5",)}, "One of the breaks is"),
     (lambda: {"attachments": (Attachment(True, mass=lambda c: 1.0),)}, "s is True"),
-    ({"inertia": Inertia}, "inertia is"),
     # what functions of the constants return
     *(
         ({"ends": left((x, 0, 0))}, "component 1 of the position")
@@ -134,7 +129,6 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ),
     *(({"ends": left(x)}, "position of the left end") for x in ("abc", {0: 0, 1: 0, 2: 0}, {1, 2, 3}, 3)),
     *(({"ends": left(rotation=x)}, "rotation of the left end") for x in ("1000", (1j, 0, 0, 0), (INF, 0, 0, 0))),
-    ({"ends": left(rotation=(1e200, 0, 0, 0))}, "rotation of the left end"),
     ({"ends": left(rotation=lambda c: (1j, 0, 0, 0))}, "component 1 of the rotation"),
     *(({"ends": right(force=lambda c, x=x: (0, 0, x))}, "component 3 of the force") for x in (NAN, INF, 1j, None, "1")),
     ({"ends": right(force=lambda c: (0, 0, 1 / (c.P - 3)))}, "force on the right end fails with ZeroDivision"),
@@ -153,7 +147,6 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
         )
         for x in ("abc", (INF, 0, 0), (1j, 0, 0))
     ),
-    ({"distributed": lambda c: (0, 0, 1 / (c.s - 1e-6))}, "distributed force fails"),
     ({"inertia": Inertia(rho_A=lambda c: c.s - 0.2)}, "is negative"),
     ({"inertia": Inertia(rho_A=lambda c: TINY)}, "no floats"),
     # what functions of a place return
@@ -161,10 +154,8 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ({"potential": lambda x, c: x.r[0] > 0}, "is true or false"),
     ({"constraints": (at(0.5, lambda x, c: NAN * x.r[0]),)}, "has nan in it"),
     (lambda: {"constraints": (everywhere(lambda x, c: x.k[0], strain="no"),)}, "strain is 'no'"),  # type: ignore[arg-type]
-    (lambda: {"ends": Ring("no")}, "odd is 'no'"),  # type: ignore[arg-type]
     # energies
     ({"energy": lambda v, k, c: ufl.sqrt(ufl.dot(k, k))}, "not finite"),
-    ({"energy": dict}, "no function of 3 argument"),
     ({"energy": lambda v, k, c: bending_and_twist(k, (1, 1))}, "three stiffnesses, not 2"),
     ({"energy": lambda v, k, c: bending_and_twist(k, (1, 1e-13, 1))}, "convex, but for round-off"),
     ({"potential": lambda x, c: loads.spring(x.r, (1, 2))}, "one number or three, not 2"),
@@ -173,15 +164,11 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     (lambda: tip(lambda r, q: r[0], name=3), "name is 3"),
     (lambda: tip(lambda r, q: r[0], label=None), "label is None"),
     (lambda: tip(lambda r, q: r[0], s=True), "s is True"),
-    (tip(lambda x, c: NAN * x.k[0], s=None), "has nan in it"),
     *(({"start": lambda s, x=x: x}, "start fails with") for x in ("a", [[1, 0], [1]], np.full((5, 4), 1j))),
     (lambda: {"ends": (clamped(), elastic(lambda c: 1.0, anchor=(0, 0)))}, "anchor is"),  # type: ignore[arg-type]
     (lambda: {"ends": (clamped(), elastic(None, lambda c: 1.0, directors=(0, 0, 0, 0)))}, "zero quaternion"),
-    ({"ends": (clamped(), elastic(lambda c: (1, 2, 3, 4)))}, "one number or three, not 4"),
     ({"ends": (clamped(), elastic(lambda c: (1.0, -2.0, 0.0), force=lambda c: (0, 0, -c.P)))}, "of -2 pushes away"),
     ({"energy": lambda v, k, c: 1.0}, "stored energy is flat"),
-    ({"energy": lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) ** 2}, "stored energy is flat"),
-    ({"ends": (clamped(), elastic(lambda c: NAN, force=lambda c: (0, 0, -c.P)))}, "nan in it"),
     # a value, a cross-section or a text where a function or a number belongs
     ({"ends": (clamped((0, 1)), TIP)}, "position of the left end has 2 components: give 3"),
     ({"ends": (clamped(3.0), TIP)}, "position of the left end is 3.0: give a function"),
@@ -209,10 +196,8 @@ def control(**named: Any) -> Plan:
 
 PLANS: list[tuple[Callable[[], Any], str]] = [
     (lambda: Plan((0, TINY)), "as narrow as round-off"),
-    (lambda: Plan((0, 1e300)), "beyond the range of floats"),
     (lambda: Plan(error_bars="no"), "error_bars is 'no'"),  # type: ignore[arg-type]
     (lambda: Plan(spectrum=10**10), "no more than 147 eigenvalues"),
-    (lambda: Plan(modes=10**10, at=(1.0,)), "no more than 147 eigenvalues"),
     *((lambda x=x: Plan(events=x), "events is") for x in (None, Event("a", lambda s: 1.0), {1})),
     (lambda: event(lambda s: 1.0, 3), "name is 3"),
     (lambda: event(lambda s: 1.0, ""), "event has no name"),
@@ -220,21 +205,16 @@ PLANS: list[tuple[Callable[[], Any], str]] = [
     *((lambda x=x: event(lambda s: x), "event 'ends meet' fails") for x in (None, "1", True, 1j, np.zeros(3))),
     (lambda: control(first=INF), "first = inf lead"),
     (lambda: control(first=1e-7), "first step of 1e-07 is out of bounds"),
-    (lambda: control(aim=INF), "aim = inf lead"),
     *((lambda x=x: Plan(steps=IndexStepControl(resolved=x)), "resolved is") for x in (NAN, INF, -1.0, "a")),
     (lambda: Discretization(elements=10**9), "too large"),
     (lambda: Discretization(8, 6), "formulation 8: choose .*, and give numbers by name, as in elements=8, degree=6"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=2, vertices=(0.0, 1e-300, 1.0)), "must ascend"),
-    (lambda: Discretization(elements=2, vertices={0.0, 0.5, 1.0}), "vertices is"),  # type: ignore[arg-type]
-    (lambda: Discretization(["reduced"]), "Unknown formulation"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=2, vertices=(0.0, 0.5, 2.0)), "must begin and end at 0 and 1"),
 ]
 
 
 @pytest.mark.parametrize(("make", "words"), PLANS)
-def test_plans(make: Callable[[], Any], words: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    if "half-waves" in words:
-        monkeypatch.undo()
+def test_plans(make: Callable[[], Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         found = make()
         rodfem.trace(scene(), *((None, found) if isinstance(found, Plan) else (found,)))
