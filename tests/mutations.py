@@ -429,7 +429,7 @@ FAULTS = {
     ),
     "parabolas-through-steps-are-believed": Fault(
         "rodfem/fem/convexity.py",
-        " & (off <= EXPLAINED * (np.maximum(a, c) - b))",
+        " & (off <= 0.1 * (np.maximum(a, c) - b))",
         "",
         "tests/continuation/test_convexity.py",
     ),

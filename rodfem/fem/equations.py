@@ -41,8 +41,6 @@ from rodfem.problem.roles import derived
 from rodfem.problem.scene import Part, Scene
 from rodfem.tolerances import same_place
 
-RECENT = 8
-"""Number of meshes of scenes with the same functions whose forms are kept."""
 KEPT = {sign * value for sign in (-1.0, 1.0) for value in (0.25, 0.5, 1.0, 2.0, 3.0, 4.0)}
 """Numbers that belong to formulas, as the half of an energy."""
 
@@ -145,7 +143,7 @@ class Equations:
             fields = known.fields.bound(scene)
             assert fields is not None
             if fields.unknowns <= FEW:
-                recent[:] = [known, *recent[: RECENT - 1]]
+                recent[:] = [known, *recent[:7]]
         out = copy(known)
         out.fields, out.line = fields, load_line(scene)
         return out

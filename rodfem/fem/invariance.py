@@ -61,12 +61,6 @@ SLIDING = 1e-8
 """The same for the motion of a closed rod along itself: the error of a fine mesh."""
 SIMPLE = 1e-9
 """Weights of a symmetry below this, relative to its greatest, are round-off of the elimination."""
-STATES = 3
-"""Number of states at which equations are asked: each gives as many conditions as there are unknowns."""
-SLIDES = 8
-"""Number of states at which that is asked."""
-WILD = 1e4
-"""States whose forces exceed the least by this factor are left out: their round-off hides that of all others."""
 RESIDUAL = 1e-8
 """Residual ``S g`` of a symmetry, relative to ``|S| |g|``."""
 ZERO = 1e-10
@@ -76,8 +70,6 @@ ROUND_OFF = 10.0
 """Times the effect of independent relative errors eps of all entries of ``S`` on the quotient: its round-off."""
 DECAY = 0.6
 """Ratio of one Fourier coefficient of a generic state to the next."""
-SMOOTH = 0.35
-"""The same of a state that a fine mesh resolves to round-off, nearly."""
 
 
 def find_symmetries(equations: Equations) -> list[Symmetry]:
@@ -86,7 +78,7 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved, dofs_held = np.zeros((len(parts),) * 2), _held(fields)
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
-    for seed in range(STATES):
+    for seed in range(3):
         state = generic_state(equations, seed)
         changes = np.array([s.change(state) for s in single])
         row, size = _change_of_equations(state, single, changes)
@@ -105,7 +97,8 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
             "of the scene, or its derivative, overflows or is not defined there; write it such that it does not (that "
             "of tanh(x) overflows beyond x = 350; x/sqrt(1 + x^2) does not)."
         )
-    asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
+    # the round-off of wild states hides that of all others
+    asked_at = np.flatnonzero(greatest <= 1e4 * greatest.min())
     conditions, magnitudes = np.vstack([rows[i] for i in asked_at]), np.max([sizes[i] for i in asked_at], axis=0)
     moving = _moving(_kept(free, conditions, magnitudes, NEARLY), moved)
     keeping = moving @ _keeping_loads(equations, [Symmetry(w, parts) for w in moving.T])
@@ -140,7 +133,7 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     """
     if not found or equations.loads is None:
         return np.eye(len(found))
-    states = [generic_state(equations, seed, no_multipliers=True) for seed in range(len(found) + STATES)]
+    states = [generic_state(equations, seed, no_multipliers=True) for seed in range(len(found) + 3)]
     changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
     lengths = abs(changes / equations.fields.sizes).max(axis=(0, 2))
     lengths = np.where(lengths > 0, lengths, 1.0)
@@ -179,8 +172,9 @@ def find_motion_along(equations: Equations) -> Symmetry | None:
         return None
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     rows, held = [], []
-    for seed in range(len(parts) + SLIDES):
-        state = generic_state(equations, seed, SMOOTH)
+    for seed in range(len(parts) + 8):
+        # a fine mesh resolves it to round-off, nearly
+        state = generic_state(equations, seed, 0.35)
         changes = np.array([*(s.change(state) for s in single), derivative(state)])
         residual = state.covector()
         row, terms = changes @ residual, abs(changes) @ abs(residual)

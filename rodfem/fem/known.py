@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
     from rodfem.fem.state import Line
 
-POINTS = 3
-"""Points of the rule of a piece of a table beyond half the degree of the polynomials: exact for cubics times these."""
 PLACES, BEYOND = 50, 0.1
 """Places of an element at which a polynomial stays in the range of a table, and how far beyond a bound it may be."""
 UNSEEN = 1e-11
@@ -165,7 +163,8 @@ def _bounded(table: Table, a: float, b: float, p: int) -> np.ndarray:
 def _moments(table: Table, a: float, b: float, p: int) -> tuple[np.ndarray, float]:
     """Legendre coefficients (p + 1, m) of a table on an element, and the integral of the square of what they miss."""
     ends = _knots(table, a, b)
-    x, w = legendre.leggauss(p // 2 + POINTS)
+    # exact for cubics times the polynomials
+    x, w = legendre.leggauss(p // 2 + 3)
     half = np.diff(ends)[:, None] / 2
     s, weights = (ends[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
     basis, values = legendre.legvander((2 * s - a - b) / (b - a), p), table.at(s)

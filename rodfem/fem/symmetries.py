@@ -56,8 +56,6 @@ NAMED = 1e-3
 """Weight of a part, relative to the greatest, above which it is named."""
 ALONG = 1e-5
 """As :data:`SYMMETRIC_STATE`, of the part of a ring's motion along itself that exact symmetries leave over."""
-MESH = 10.0
-"""Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
 SHARE = 0.3
 """Largest weight of a rigid motion of metric norm one in a drift's force, beside the symmetry of the same norm."""
 
@@ -321,16 +319,10 @@ class Generators:
             return np.zeros((0, len(self._rows)))
         return times(self._forth, state.local[self._columns]).reshape(self.count, -1) + self._constant(state)
 
-    def linear(self, d: PETSc.Vec) -> np.ndarray:
-        """``A d`` of all generators for a change of state, (count, own rows)."""
-        return times(self._forth, self._gathered(d)).reshape(self.count, -1)
-
     def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
         """``A^t y`` of all generators, (count, own rows)."""
-        return times(self._back, self._gathered(covector)).reshape(self.count, -1)
-
-    def _gathered(self, vector: PETSc.Vec) -> np.ndarray:
-        return self.system.gathered(vector)[: len(self._columns)]
+        own = self.system.gathered(covector)[: len(self._columns)]
+        return times(self._back, own).reshape(self.count, -1)
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
         """Vector of the system with these own rows, without component along drifts."""
@@ -468,7 +460,7 @@ def _orthogonal(
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
         sizes.append(system.norm(system.generators.vector(rest @ state.generators)))
         combinations = np.vstack([combinations, rest])
-        least.append(max(MESH * mismatch(state), ALONG))
+        least.append(max(10.0 * mismatch(state), ALONG))
     return combinations, sizes, least
 
 

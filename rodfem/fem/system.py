@@ -37,11 +37,6 @@ from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
 
-FINE = 128
-"""Number of elements of a mesh on which a rod may move along itself as well as in truth."""
-RECENT = 4
-"""Number of states of up to FEW unknowns that are kept, of more one: a row is left for its neighbours and met again."""
-
 
 class System:
     """Residual, Jacobian and metric of a scene at a discretisation, and their borders.
@@ -79,7 +74,8 @@ class System:
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
         self._recent: list[tuple[bytes, State]] = []
-        self._kept = RECENT if self.fields.unknowns <= FEW else 1
+        # a row is left for its neighbours and met again
+        self._kept = 4 if self.fields.unknowns <= FEW else 1
         self._ordinary = scene.units.ordinary
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
         self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
@@ -125,7 +121,8 @@ class System:
         if not may_slide(scene):
             return found
         if not equations.uniform:
-            fine = replace(d, elements=FINE + len(scene.joints), degree=max(d.degree, 6))
+            # a rod moves along itself there as well as in truth
+            fine = replace(d, elements=128 + len(scene.joints), degree=max(d.degree, 6))
             equations = Equations.of(scene, fine, MPI.COMM_SELF)
         along = find_motion_along(equations)
         return found if along is None else [*found, along]

@@ -26,15 +26,14 @@ LONG = 20_000
 The elimination tree that QAMD makes of a chain is as deep as the chain is long: MUMPS in parallel gains nothing on it,
 and at 1e5 elements its parallel analysis overflows its stack.
 """
-DENSE_ROWS = {"mat_mumps_icntl_7": 6}
-"""MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
-BALANCED = {"mat_mumps_icntl_7": 4}
-"""MUMPS's ordering that makes balanced trees (PORD), slowly: for long rods on several ranks."""
 
 
 def ordering(matrix: PETSc.Mat) -> dict[str, int]:
-    """MUMPS's ordering for a matrix on all its ranks."""
-    return BALANCED if matrix.comm.size > 1 and matrix.size[0] >= LONG else DENSE_ROWS
+    """MUMPS's ordering for a matrix on all its ranks, which PETSc takes from its options only.
+
+    QAMD (6) knows dense rows; PORD (4) makes balanced trees, slowly.
+    """
+    return {"mat_mumps_icntl_7": 4} if matrix.comm.size > 1 and matrix.size[0] >= LONG else {"mat_mumps_icntl_7": 6}
 
 
 @contextmanager

@@ -39,8 +39,6 @@ ASIDE = 1e-6
 
 GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
 """Names that branches are given as they are found."""
-FEW = 64
-"""Knots of tables below which elements meet at each: where there are more, an element has several."""
 SHORTEST, FARTHEST = 1e-15, 1e9
 """Length above which dolfinx makes a mesh, and arclength over the length beyond which its round-off is seen."""
 
@@ -376,7 +374,8 @@ class Scene(Contribution):
     def vertices(self) -> tuple[float, ...]:
         """Joints, and the knots of piecewise linear tables where these are few: there elements of a mesh meet."""
         knots = {s for table, name in self.tables if name == "s" for s in table.corners}
-        return self._apart({*self.joints, *(knots if len(knots) < FEW else ())})
+        # more of them have several in an element
+        return self._apart({*self.joints, *(knots if len(knots) < 64 else ())})
 
     def _apart(self, places: set[float]) -> tuple[float, ...]:
         """Places inside the rod in ascending order, one for what is one place."""

@@ -23,9 +23,6 @@ from rodfem.problem.scene import Inertia
 
 ODD = 1.0045237627951384
 """Sum of ``1/n^5`` over odd n, 31/32 zeta(5)."""
-TERMS = 6
-"""Terms of the series for the torsion of a rectangle, of which that number 7 is below 1e-17 in a square."""
-STRAIGHT = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -119,7 +116,7 @@ class Section:
         """Rotary inertia per length about the directors."""
         return self.density * self.I1, self.density * self.I2, self.density * (self.I1 + self.I2)
 
-    def energy(self, rod: str, natural: Sequence[float] = STRAIGHT) -> Callable[[Any, Any, Any], Any]:
+    def energy(self, rod: str, natural: Sequence[float] = (0.0, 0.0, 0.0)) -> Callable[[Any, Any, Any], Any]:
         """Quadratic stored energy ``W(v, k, c)`` of a rod of the kind ``rod``, with the strains that it is free in.
 
         ``natural`` (3,) are the curvatures and the twist of the natural state, per length.  Raises :class:`InputError`
@@ -205,17 +202,7 @@ def circle(radius: float, *, E: float, nu: float, density: float = 0.0) -> Secti
 
 @checked(outer=_positive, inner=_positive, **MATERIAL)
 def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A circular tube.
-
-    Parameters
-    ----------
-    outer, inner
-        Radii.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has.
-    """
+    """A circular tube of these radii, of a material as for :func:`circle`."""
     if not inner < outer:
         raise InputError(f"inner is {inner:g}: give a radius below the outer one, {outer:g}.")
     second, m = pi * (outer**4 - inner**4) / 4, (inner / outer) ** 2
@@ -225,20 +212,11 @@ def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.
 
 @checked(width=_positive, height=_positive, **MATERIAL)
 def rectangle(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A rectangle, of any proportion.
-
-    Parameters
-    ----------
-    width, height
-        Sides along ``d1`` and ``d2``.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has.
-    """
+    """A rectangle of any proportion, with sides along ``d1`` and ``d2``, of a material as for :func:`circle`."""
     long, short = max(width, height), min(width, height)
     # the sum of tanh(n pi long / 2 short) / n^5, which converges slowly, by that of its difference from 1 / n^5
-    decays = ((n, exp(-n * pi * long / short)) for n in range(1, 2 * TERMS, 2))
+    # the seventh term is below 1e-17 in a square
+    decays = ((n, exp(-n * pi * long / short)) for n in range(1, 12, 2))
     series = ODD - sum(2 * x / (1 + x) / n**5 for n, x in decays)
     J = long * short**3 * (1 / 3 - 64 / pi**5 * short / long * series)
     shear = 10 * (1 + nu) / (12 + 11 * nu)
@@ -247,17 +225,7 @@ def rectangle(width: float, height: float, *, E: float, nu: float, density: floa
 
 @checked(width=_positive, thickness=_positive, **MATERIAL)
 def strip(width: float, thickness: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A strip: a flat :func:`rectangle`, which bends easily about its width ``d1``.
-
-    Parameters
-    ----------
-    width, thickness
-        Sides along ``d1`` and ``d2``, the second the shorter one.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has, and for a strip that is thicker than wide.
-    """
+    """A strip: a flat :func:`rectangle`, no thicker than wide, which bends easily about its width ``d1``."""
     if thickness > width:
         raise InputError(f"thickness is {thickness:g}: give no more than the width, {width:g}, or a section.rectangle.")
     return rectangle(width, thickness, E=E, nu=nu, density=density)
@@ -265,17 +233,7 @@ def strip(width: float, thickness: float, *, E: float, nu: float, density: float
 
 @checked(width=_positive, height=_positive, **MATERIAL)
 def ellipse(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A solid ellipse.
-
-    Parameters
-    ----------
-    width, height
-        Axes along ``d1`` and ``d2``, twice the semi-axes.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has.
-    """
+    """A solid ellipse, with axes (twice the semi-axes) along ``d1`` and ``d2``, of a material as for :func:`circle`."""
     a, b = width / 2, height / 2
 
     def shear(along: float, across: float) -> float:

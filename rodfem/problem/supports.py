@@ -34,8 +34,6 @@ from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPO
 
 Floats = NDArray[np.float64]
 
-STATIONS = 9
-"""Places along the rod at which distributed forces are recorded."""
 SLIGHTLY, SMALL = 0.1, 1e-6
 """Negative stiffness that a spring may have, over the greatest one, and error of a fit that is none, relative."""
 FLAT = 1e-3
@@ -253,7 +251,7 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
 
 def _stations(scene: Scene) -> Floats:
     a, b = scene.interval
-    return np.asarray(a + (b - a) * (np.arange(STATIONS) + 0.5) / STATIONS)
+    return np.asarray(a + (b - a) * (np.arange(9) + 0.5) / 9)
 
 
 def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:

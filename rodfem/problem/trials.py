@@ -65,9 +65,7 @@ def _no_truth() -> Iterator[None]:
     """Have ``ufl.eq`` refused for true or false, which UFL answers by how its sides are written."""
 
     def refuse(condition: Any) -> bool:
-        raise UnnamedError(
-            "takes ufl.eq or ufl.ne for true or false: write ufl.conditional(ufl.eq(a, b), ..., ...)."
-        )
+        raise UnnamedError("takes ufl.eq or ufl.ne for true or false: write ufl.conditional(ufl.eq(a, b), ..., ...).")
 
     usual = EQ.__bool__, NE.__bool__
     EQ.__bool__ = NE.__bool__ = refuse
