@@ -668,7 +668,7 @@ FAULTS = {
         "rodfem/adaptivity/error_estimate.py", "if again is None or not alike(again, law):", "if again is None:", ERRORS
     ),
     "potential-of-constraints-at-nodes": Fault(
-        "rodfem/fem/equations.py", 'others["potential"] = potential', 'others["potential"] = L', WORK
+        "rodfem/fem/equations.py", '{"potential": potential}', '{"potential": L}', WORK
     ),
     "writhe-of-one-polygon": Fault(
         "rodfem/writhe.py", "(4 * polygons[-1] - polygons[-2]) / 3", "polygons[-1]", "tests/report/test_contents.py"

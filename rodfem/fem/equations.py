@@ -155,13 +155,10 @@ class Equations:
         self.names, self.line = list(scene.parameters), load_line(scene)
         self.base, self.direction = fem.Constant(mesh, self.line.origin), fem.Constant(mesh, self.line.direction)
         self.ends = fem.Constant(mesh, np.array(scene.interval, dtype=float))
-        length = self.length = self.ends[1] - self.ends[0]
-
+        self.length = self.ends[1] - self.ends[0]
         u, test, trial = fields.u, ufl.TestFunction(fields.space), ufl.TrialFunction(fields.space)
         dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": self.quadrature_degree(k)})
-        dx_nodes = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * k - 1, "quadrature_rule": "GLL"})
         self.measures = point_measures(mesh, [*scene.interval, *scene.joints])
-
         self.known = Known(fields, self.quadrature_degree(k) // 2)
         f = self.unknowns = self._named(ufl.split(u))
         c = self.constants = self._constants(f.load)
@@ -169,43 +166,62 @@ class Equations:
         W = scene.energy(along.v, along.k, c)
         a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
         sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
-        inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
-        rod = fields.formulation.integrand(self, f, c, W, along)
-        loads = [term * dx for of, site in inside for term in of.lagrangian(site)]
-        for of, site, measure in sites:
-            if measure is not None and not of.nodal:
-                loads += [term * measure for term in of.lagrangian(site)]
-        L = potential = rod * dx + sum(loads)
-        # constraints at nodes, zero at an equilibrium.  The potential does not have them: in a functional FFCx 0.5
-        # takes, beside a rule of the same degree, the points of that rule for both
-        if f.eta is not None:
-            L += lagrangian.unit_norm(f.eta, f.q) * dx_nodes
-        for of, site, measure in sites:
-            if of.nodal:
-                L += sum(term * (measure or dx_nodes) for term in of.lagrangian(site))
+        loads = self._loads(sites, dx)
+        potential = fields.formulation.integrand(self, W, along) * dx + sum(loads)
+        L = potential + self._nodal(sites)
         work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
         first = ufl.derivative(self.compilable(L), u, test) - self.compilable(work)
-        second = ufl.derivative(first, u, trial)
-        metric = (inertia.rotation_metric(a.q, b.q) if scene.normal is None else a.turned * b.turned) / length
-        if f.r is not None:
-            metric += ufl.dot(a.r, b.r) / length**3
-        elif f.v is not None:  # the strains stand for the centreline: without them a rod that stretches would not move
-            metric += ufl.inner(a.v, b.v) / length
-        kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c))) * dx
-        if f.r is not None:
-            kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
-        kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
+        kinetic = self._kinetic(a, b, sites, dx)
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.even = not extract_type(kinetic, ufl.SpatialCoordinate)
         self.uniform = not (extract_type(first, ufl.SpatialCoordinate) or scene.joints or self.known.tables)
-        others = {"energy": W * dx, "metric": metric * dx, "kinetic": kinetic}
+        others = {"energy": W * dx, "metric": self._metric(a, b) * dx, "kinetic": kinetic}
         if scene.conservative:
-            others["potential"] = potential
-            if loads:
-                others["loads"] = sum(loads)
+            others |= {"potential": potential} | ({"loads": sum(loads)} if loads else {})
         if not scene.ordinate.places:
             others["ordinate"] = (0.0 * c.s + scene.ordinate.of(along, c)) * dx
-        return {"jacobian": second, "residual": first} | {name: self.compilable(x) for name, x in others.items()}
+        derivatives = {"jacobian": ufl.derivative(first, u, trial), "residual": first}
+        return derivatives | {name: self.compilable(x) for name, x in others.items()}
+
+    @staticmethod
+    def _loads(sites: list[Any], dx: Any) -> list[Any]:
+        """Terms of what acts on the rod, first along it, then at points; without constraints at nodes."""
+        inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
+        at_points = [x for x in sites if x[2] is not None and not x[0].nodal]
+        return [term * dx for of, site in inside for term in of.lagrangian(site)] + [
+            term * measure for of, site, measure in at_points for term in of.lagrangian(site)
+        ]
+
+    def _nodal(self, sites: list[Any]) -> Any:
+        """Constraints at nodes, zero at an equilibrium.
+
+        The potential does not have them: in a functional FFCx 0.5 takes, beside a rule of the same degree, the points
+        of that rule for both.
+        """
+        f, rule = self.unknowns, {"quadrature_degree": 2 * self.fields.discretization.degree - 1}
+        dx = ufl.dx(domain=self.fields.mesh, metadata=rule | {"quadrature_rule": "GLL"})
+        out = 0 if f.eta is None else lagrangian.unit_norm(f.eta, f.q) * dx
+        for of, site, measure in sites:
+            if of.nodal:
+                out += sum(term * (measure or dx) for term in of.lagrangian(site))
+        return out
+
+    def _metric(self, a: Any, b: Any) -> Any:
+        """Integrand of the squared size of a change of state."""
+        planar = self.fields.scene.normal is not None
+        metric = (a.turned * b.turned if planar else inertia.rotation_metric(a.q, b.q)) / self.length
+        if a.r is not None:
+            return metric + ufl.dot(a.r, b.r) / self.length**3
+        # the strains stand for the centreline: without them a rod that stretches would not move
+        return metric if a.v is None else metric + ufl.inner(a.v, b.v) / self.length
+
+    def _kinetic(self, a: Any, b: Any, sites: list[Any], dx: Any) -> Any:
+        """Kinetic metric of the spectrum."""
+        f, c, own = self.unknowns, self.constants, self.fields.scene.inertia
+        kinetic = inertia.rotary(f.q, a.q, b.q, tuple(own.rho_I(c))) * dx
+        if f.r is not None:
+            kinetic += inertia.translational(a.r, b.r, own.rho_A(c)) * dx
+        return kinetic + sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
 
     @classmethod
     def compile_ahead(cls, fields: Fields) -> None:
@@ -237,7 +253,7 @@ class Equations:
         """Place of the functions that hold all along the rod; slope and curvatures pass through ``wrap``."""
         f, c, free = self.unknowns, self.constants, self.fields.scene.free_strains
         v, k = strain(free, self.components(f.v, len(free))), wrap(curvature(f.q, f.q.dx(0)))
-        r = self.fields.formulation.position(self, f, c, lambda field: field, None)
+        r = self.fields.formulation.position(self, c, lambda field: field, None)
         slope = {} if r is None else {"dr": wrap(r.dx(0))}
         return place(f.q, rotation(f.q), c.s, r, v=v, k=k, length=self.fields.scene.length, **slope)
 
@@ -277,7 +293,7 @@ class Equations:
 
         q, c = at(f.q), self._constants(at(f.load), s)
         side = None if inside else int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))
-        r = self.fields.formulation.position(self, f, c, at, side)
+        r = self.fields.formulation.position(self, c, at, side)
         return place(q, rotation(q), s, r, length=scene.length), c, at, measure
 
     # --- names -----------------------------------------------------------------------------------------------------

@@ -31,12 +31,8 @@ CONTACT_FORCE = "n"
 class Formulation(ABC):
     """Which unknowns a rod has besides rotations and strains, its Lagrangian in them, and where they say it is.
 
-    Attributes
-    ----------
-    name, words
-        Name in files and options, and what is unknown, for the command line.
-    centreline
-        Whether that is a field, ``r``.
+    ``name`` is that in files and options, ``words`` are what is unknown, and ``centreline`` says whether that is a
+    field, ``r``.
     """
 
     name: ClassVar[str]
@@ -44,7 +40,7 @@ class Formulation(ABC):
     centreline: ClassVar[bool]
 
     def refusal(self, scene: Scene) -> str:
-        """Why it does not apply to a scene, in words that follow its name; empty where it does."""
+        """Why it does not apply to a scene, in words that follow its name; empty if it does."""
         return ""
 
     def blocks(self, degree: int) -> list[Block]:
@@ -59,36 +55,24 @@ class Formulation(ABC):
         """What is no unknown, each with the reason."""
         return []
 
-    # --- the equations: ``f`` has fields and scalars by name, ``c`` the constants, as in Equations ------------------
+    @abstractmethod
+    def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
+        """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`rodfem.forms.lagrangian`."""
 
     @abstractmethod
-    def integrand(self, equations: Equations, f: Any, c: Constants, W: Any, along: Place) -> Any:
-        """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`rodfem.forms.lagrangian`.
-
-        ``equations`` are those that it is made for, ``f`` their fields and scalars by name, ``c`` the constants,
-        ``along`` the place along the rod.
-        """
+    def contact_force(self, equations: Equations) -> list[Any]:
+        """Components of the contact force in space (3,)."""
 
     @abstractmethod
-    def contact_force(self, equations: Equations, f: Any, c: Constants) -> list[Any]:
-        """Components of the contact force in space (3,); ``equations``, ``f`` and ``c`` as for :meth:`integrand`."""
-
-    @abstractmethod
-    def position(self, equations: Equations, f: Any, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
-        """Position (3,) where ``at`` restricts a field to, None where there is none.
-
-        ``equations``, ``f`` and ``c`` are as for :meth:`integrand`; ``side`` is 0 at the left end, 1 at the right end,
-        None elsewhere.
-        """
-
-    # --- the shape of a state, on the nodes and quadrature of a Shape -----------------------------------------------
+    def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
+        """Position (3,) where ``at`` restricts a field to, None if there is none; ``side`` is 0 or 1 at an end."""
 
     @abstractmethod
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Share of this rank in the position at a place without its offset (3,), or in that and the chord (2, 3).
 
-        ``shape`` has the nodes and quadrature, ``state`` the values.  ``integral`` are weights (2, points) of slopes in
-        their integrals to the place and over the rod, ``value`` (nodes,) of nodal values in the value there.
+        ``integral`` are weights (2, points) of slopes in their integrals to the place and over the rod, ``value``
+        (nodes,) of nodal values in the value there.
         """
 
     @abstractmethod
@@ -97,24 +81,11 @@ class Formulation(ABC):
 
     @abstractmethod
     def offset(self, fields: Fields, state: NodalValues, s: np.ndarray, chord: np.ndarray) -> np.ndarray:
-        """Offset of the positions of a ``state`` at the arclengths ``s`` (...,): (..., 3) or (3,).
-
-        ``fields`` are those of the state, ``chord`` (3,) is the difference of its ends.
-        """
+        """Offset of the positions at the arclengths ``s`` (...,): (..., 3) or (3,); ``chord`` is end minus start."""
 
     @abstractmethod
-    def store(self, shape: Shape, out: np.ndarray, c: Constants, r: np.ndarray, ends: tuple[Any, Any]) -> None:
-        """Write where the rod is into the local values ``out`` of a state.
-
-        Parameters
-        ----------
-        shape, out, c
-            Nodes, what is written to, and the constants of the state.
-        r
-            Positions of the owned cells' nodes, (cells, nodes, 3).
-        ends
-            Positions of the left and right end, (3,) each.
-        """
+    def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
+        """Write positions of the owned cells' nodes above the lift, (cells, nodes, 3), and of the ends into a state."""
 
     @abstractmethod
     def displacement(self, motions: Motions, state: NodalValues, change: NodalValues) -> np.ndarray:
@@ -133,17 +104,17 @@ class Pointwise(Formulation):
         """Centreline and contact force."""
         return [Block("r", 3, degree, True, False), Block(CONTACT_FORCE, 3, degree - 1, False, True)]
 
-    def integrand(self, equations: Equations, f: Any, c: Constants, W: Any, along: Place) -> Any:
+    def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
         """With ``r' = R v`` at each point."""
-        return lagrangian.pointwise(W, along.R, along.v, along.dr, f.n)
+        return lagrangian.pointwise(W, along.R, along.v, along.dr, equations.unknowns.n)
 
-    def contact_force(self, equations: Equations, f: Any, c: Constants) -> list[Any]:
+    def contact_force(self, equations: Equations) -> list[Any]:
         """A field."""
-        return [f.n[i] for i in range(3)]
+        return [equations.unknowns.n[i] for i in range(3)]
 
-    def position(self, equations: Equations, f: Any, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
+    def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Known everywhere."""
-        return at(f.r) + equations.lift(c)
+        return at(equations.unknowns.r) + equations.lift(c)
 
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """No chord is needed."""
@@ -158,10 +129,9 @@ class Pointwise(Formulation):
         """The lift."""
         return fields.lift(s, state.constants())
 
-    def store(self, shape: Shape, out: np.ndarray, c: Constants, r: np.ndarray, ends: tuple[Any, Any]) -> None:
+    def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
         """In the field."""
-        fields = shape.system.fields
-        out[fields.dofs["r"][shape.cells][:, shape.order]] = r - fields.lift(shape.s, c)
+        out[shape.system.fields.dofs["r"][shape.cells][:, shape.order]] = r
 
     def displacement(self, motions: Motions, state: NodalValues, change: NodalValues) -> np.ndarray:
         """Values of the field."""
@@ -215,23 +185,25 @@ class Reduced(Formulation):
             lines.append(f"contact force {', '.join(known)}: a dead force at an end that is free to move there")
         return lines
 
-    def integrand(self, equations: Equations, f: Any, c: Constants, W: Any, along: Place) -> Any:
+    def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
         """With the integral of ``r' = R v``."""
-        scene = equations.fields.scene
-        force = self.contact_force(equations, f, c)
-        left, right = (end_position(side, scene, c, f.scalars) for side in range(2))
+        force = self.contact_force(equations)
+        left, right = self._ends(equations, equations.constants)
         chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / equations.length)
 
-    def contact_force(self, equations: Equations, f: Any, c: Constants) -> list[Any]:
+    def contact_force(self, equations: Equations) -> list[Any]:
         """Unknown scalars, and what dead forces prescribe."""
-        scene = equations.fields.scene
-        return [f.scalars.get(f"n{i + 1}", scene.known_force(i, c) or 0.0) for i in range(3)]
+        scene, scalars, c = equations.fields.scene, equations.unknowns.scalars, equations.constants
+        return [scalars.get(f"n{i + 1}", scene.known_force(i, c) or 0.0) for i in range(3)]
 
-    def position(self, equations: Equations, f: Any, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
+    def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Known at an end that is held or whose position is a scalar unknown."""
-        r = [None] if side is None else end_position(side, equations.fields.scene, c, f.scalars)
+        r = [None] if side is None else self._ends(equations, c)[side]
         return None if None in r else ufl.as_vector(r)
+
+    def _ends(self, equations: Equations, c: Constants) -> list[list[Any]]:
+        return [end_position(side, equations.fields.scene, c, equations.unknowns.scalars) for side in range(2)]
 
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Integrals of the slope."""
@@ -246,7 +218,7 @@ class Reduced(Formulation):
         """Position of the left end."""
         return left_end(fields.scene, state.constants(), state.scalars, chord, float)
 
-    def store(self, shape: Shape, out: np.ndarray, c: Constants, r: np.ndarray, ends: tuple[Any, Any]) -> None:
+    def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
         """In the scalar positions of the ends."""
         fields = shape.system.fields
         for i, unknown in enumerate(fields.unknown_scalars):

@@ -163,7 +163,7 @@ class Shape:
         b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, chord, strict=True)])
         x = (self.s - system.scene.interval[0])[..., None] / system.scene.length
         r = a + before + inside + x * (b - a - chord)
-        system.fields.formulation.store(self, out, c, r, (a, b))
+        system.fields.formulation.store(self, out, r - system.fields.lift(self.s, c), (a, b))
         return system.vector(out)
 
     def weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -312,7 +312,7 @@ class Resultants:
             if isinstance(part.of, Constraint) and part.s is None:
                 site, _ = e.site(part, f, (f, f), along)
                 density += sum(part.of.lagrangian(site))
-        force = ufl.as_vector(fields.formulation.contact_force(e, f, c))
+        force = ufl.as_vector(fields.formulation.contact_force(e))
         if "dr" in vars(along):
             force += ufl.diff(density, along.dr)
         force, moment = ufl.dot(ufl.transpose(along.R), force), ufl.diff(density, along.k)
