@@ -63,28 +63,31 @@ class Discretization:
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
-        known = formulations.names()
-        if not isinstance(self.formulation, str) or self.formulation not in known:
-            named = (
-                "" if isinstance(self.formulation, str) else ", and give numbers by name, as in elements=8, degree=6"
-            )
-            raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}{named}.")
-        if self.factors not in FACTORS:
-            raise InputError(f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.")
-        if self.elements < 1:
-            raise InputError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
-        if not 1 <= self.degree <= HIGHEST:
-            raise InputError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
-        if self.elements > MOST:
-            raise InputError(f"A mesh of {self.elements} elements is too large: choose at most {MOST}.")
-        if self.vertices is not None:
-            if len(self.vertices) != self.elements + 1:
-                raise InputError(
-                    f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
-                )
-            width = SAME_PLACE * (self.vertices[-1] - self.vertices[0])
-            if not all(a + width < b for a, b in pairwise(self.vertices)):
-                raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
+        known, elements, vertices = formulations.names(), self.elements, self.vertices or ()
+        ascending = all(a + SAME_PLACE * (vertices[-1] - vertices[0]) < b for a, b in pairwise(vertices))
+        for wrong, sentence in (
+            (
+                self.formulation not in known,
+                f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}, and give numbers by "
+                "name, as in elements=8, degree=6.",
+            ),
+            (
+                self.factors not in FACTORS,
+                f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.",
+            ),
+            (
+                not 1 <= elements <= MOST,
+                f"A mesh of {elements} elements holds no rod, or is too large: give 1 to {MOST}.",
+            ),
+            (not 1 <= self.degree <= HIGHEST, f"Degree {self.degree} is not available: choose 1 to {HIGHEST}."),
+            (
+                vertices and len(vertices) != elements + 1,
+                f"{len(vertices)} vertices do not bound {elements} elements: give {elements + 1}.",
+            ),
+            (not ascending, "The vertices of a mesh must ascend along the rod: sort them, each once."),
+        ):
+            if wrong:
+                raise InputError(sentence)
 
     def finer(self, factor: int, richer: int = 0) -> Discretization:
         """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""

@@ -65,14 +65,17 @@ class Formulation(ABC):
 
     @abstractmethod
     def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
-        """Position (3,) where ``at`` restricts a field to, None if there is none; ``side`` is 0 or 1 at an end."""
+        """Position (3,) where ``at`` restricts a field to, None if there is none.
+
+        It is one in the ``equations``, where the constants are ``c``; ``side`` is 0 or 1 at an end.
+        """
 
     @abstractmethod
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Share of this rank in the position at a place without its offset (3,), or in that and the chord (2, 3).
 
         ``integral`` are weights (2, points) of slopes in their integrals to the place and over the rod, ``value``
-        (nodes,) of nodal values in the value there.
+        (nodes,) of nodal values in the value there; ``shape`` has the nodes, ``state`` the values.
         """
 
     @abstractmethod
@@ -81,11 +84,17 @@ class Formulation(ABC):
 
     @abstractmethod
     def offset(self, fields: Fields, state: NodalValues, s: np.ndarray, chord: np.ndarray) -> np.ndarray:
-        """Offset of the positions at the arclengths ``s`` (...,): (..., 3) or (3,); ``chord`` is end minus start."""
+        """Offset of the positions of a ``state`` on ``fields`` at the arclengths ``s`` (...,): (..., 3) or (3,).
+
+        ``chord`` (3,) is the difference of its ends.
+        """
 
     @abstractmethod
     def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
-        """Write positions of the owned cells' nodes above the lift, (cells, nodes, 3), and of the ends into a state."""
+        """Write positions ``r`` (cells, nodes, 3) above the lift, and those of the ``ends``, into local values ``out``.
+
+        ``shape`` has the owned cells and their nodes.
+        """
 
     @abstractmethod
     def displacement(self, motions: Motions, state: NodalValues, change: NodalValues) -> np.ndarray:
@@ -203,7 +212,7 @@ class Reduced(Formulation):
         return None if None in r else ufl.as_vector(r)
 
     def _ends(self, equations: Equations, c: Constants) -> list[list[Any]]:
-        return [end_position(side, equations.fields.scene, c, equations.unknowns.scalars) for side in range(2)]
+        return [_end_position(side, equations.fields.scene, c, equations.unknowns.scalars) for side in range(2)]
 
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Integrals of the slope."""
@@ -216,7 +225,7 @@ class Reduced(Formulation):
 
     def offset(self, fields: Fields, state: NodalValues, s: np.ndarray, chord: np.ndarray) -> np.ndarray:
         """Position of the left end."""
-        return left_end(fields.scene, state.constants(), state.scalars, chord, float)
+        return _left_end(fields.scene, state.constants(), state.scalars, chord, float)
 
     def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
         """In the scalar positions of the ends."""
@@ -230,11 +239,11 @@ class Reduced(Formulation):
         scene = motions.system.scene
         before, inside, chord = motions.integrals(motions.slope_changes(state, change))
         r = motions.joined(before + inside)
-        r = r + left_end(scene, scene.constants(), change.scalars, chord, lambda held: 0.0)
+        r = r + _left_end(scene, scene.constants(), change.scalars, chord, lambda held: 0.0)
         return r - motions.mean(r) if scene.closed else r
 
 
-def end_position(
+def _end_position(
     side: int, scene: Scene, c: Constants, scalars: Mapping[str, Any], given: Callable[[Any], Any] = lambda x: x
 ) -> list[Any]:
     """Position of the end on one ``side``: ``given(held)``, a scalar unknown by its name, or None (known force there).
@@ -248,11 +257,11 @@ def end_position(
     ]
 
 
-def left_end(
+def _left_end(
     scene: Scene, c: Constants, scalars: Mapping[str, Any], chord: np.ndarray, given: Callable[[Any], Any]
 ) -> np.ndarray:
     """Position (3,) of the left end: where it is held, or else a ``chord`` back from where the right end is."""
-    left, right = (end_position(side, scene, c, scalars, given) for side in range(2))
+    left, right = (_end_position(side, scene, c, scalars, given) for side in range(2))
     return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
 
 

@@ -3,8 +3,7 @@ r"""The continuous symmetries of a scene: infinitesimal motions of its state, an
 A rigid motion of space or of the cross-sections changes each field and group of scalars by one of a few elementary
 generators ``g_j`` (:mod:`rodfem.forms.symmetry`), linear or constant in its values; the motion of a closed rod along
 itself changes each field by its derivative in arclength.  A symmetry is a combination of them that carries equilibria
-into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, :mod:`rodfem.fem.verification` verifies them at
-each state).
+into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, and verifies them at each state).
 
 The symmetries form a linear space.  Those combinations ``g`` of their generators that vanish at a reference state
 ``x0`` are its own symmetries and have no phase condition.  The others, orthonormal in the metric ``M``, have one each,
@@ -50,7 +49,7 @@ SYMMETRIC_STATE = 1e-4
 Where symmetries are found an imperfection is round-off that is 1e-12 of the stiffest strain's terms: 1e-8 beside a
 twist 1e4 times as stiff as bending.  At a state that it moves by 1e-8/mu, the eigenvalue mu of that motion is not zero:
 it is counted as it is down to 1e-8/SYMMETRIC_STATE.  At states that it moves farther the symmetry is verified
-(:mod:`rodfem.fem.verification`) to the round-off of its eigenvalue, and dropped.
+to the round-off of its eigenvalue, and dropped.
 """
 NAMED = 1e-3
 """Weight of a part, relative to the greatest, above which it is named."""

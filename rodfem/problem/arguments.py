@@ -67,7 +67,10 @@ def finite(name: str, value: Any, example: float) -> float:
 
 
 def reals(name: str, values: Any, example: tuple[float, ...], size: int | None = None) -> tuple[float, ...]:
-    """Return ``values`` as a tuple of floats; raises :class:`InputError` unless they are ``size`` (any) numbers."""
+    """Return ``values`` as a tuple of floats; raises :class:`InputError` unless they are ``size`` (any) numbers.
+
+    ``name`` and ``example`` are for the sentence of the error.
+    """
     listed = isinstance(values, Iterable) and not isinstance(values, UNORDERED)
     given = tuple(values) if listed else None
     if given is None or (size is not None and len(given) != size):
@@ -140,7 +143,7 @@ def _belongs(named: Iterable[str], checks: dict[str, Check]) -> str:
 
 
 def a(kind: type | tuple[type, ...], example: str) -> Check:
-    """Check for an object of a class, or of one of some."""
+    """Check for an object of a class, or of one of some; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> Any:
         if not isinstance(value, kind):
@@ -157,7 +160,7 @@ def text(example: str) -> Check:
 
 
 def count(example: int, least: int = 0) -> Check:
-    """Check for a whole number, ``least`` or more."""
+    """Check for a whole number, ``least`` or more; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> int:
         value = whole(name, value, example)
@@ -174,7 +177,7 @@ def number(example: float) -> Check:
 
 
 def interval(low: float, high: float) -> Check:
-    """Check for two finite numbers, as in ``(low, high)``."""
+    """Check for two finite numbers, as in ``(low, high)``; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> tuple[float, ...]:
         found = reals(name, value, (low, high), 2)
@@ -186,7 +189,7 @@ def interval(low: float, high: float) -> Check:
 
 
 def each(one: Check) -> Check:
-    """Check for a sequence each of whose items passes a check."""
+    """Check for a sequence each of whose items passes a check; raises :class:`InputError` for anything else."""
 
     def check(name: str, values: Any) -> list[Any]:
         if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
@@ -197,7 +200,7 @@ def each(one: Check) -> Check:
 
 
 def path(example: str) -> Check:
-    """Check for a path, or the name of one."""
+    """Check for a path, or the name of one; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> Path:
         if not isinstance(value, (str, os.PathLike)) or not str(value) or not encodes(str(value)):
@@ -208,7 +211,7 @@ def path(example: str) -> Check:
 
 
 def function(example: str, arguments: int = 1) -> Check:
-    """Check for a function of so many arguments."""
+    """Check for a function of so many arguments; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> Any:
         if not takes(value, arguments):

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Any
 
+from rodfem.errors import InputError
 from rodfem.forms import inertia, loads
 from rodfem.problem.arguments import finite
 from rodfem.problem.roles import Role, functions_of, role_field
@@ -39,8 +40,9 @@ class Motion(Enum):
 class Group:
     """Scalar unknowns that belong together, multipliers unless they are positions; that of component 0 is ``name1``.
 
-    ``equation`` is what the equation of a multiplier states, with ``{}`` for its number; positions have none.
-    ``motion`` is what rigid motions do to them.  ``known(c)`` (3,) has the components of a vector that are no unknowns.
+    ``name`` begins their names, and ``words`` are for the terminal.  ``equation`` is what that of a multiplier states,
+    with ``{}`` for its number; positions have none. ``motion`` is what rigid motions do to them.  ``known(c)`` (3,) has
+    the components of a vector that are no unknowns, ``moment`` says whether a multiplier is a moment.
     """
 
     name: str
@@ -111,7 +113,7 @@ Term = Callable[[Site, Any], Any]
 
 @dataclass(frozen=True)
 class Load:
-    """A kind of load: its potential in space, that ``in_plane`` if it is another, or else its virtual ``work``.
+    """A kind of load: its ``potential`` in space, that ``in_plane`` if it is another, or else its virtual ``work``.
 
     A ``moment`` of a planar rod is about the normal, a force in the plane.
     """
@@ -201,8 +203,13 @@ class Attachment(Contribution):
     rotary_inertia: Given = role_field(Role("rotary inertia of an attachment", "f(c)", 3))
 
     def __post_init__(self) -> None:
-        """Check the place; raises :class:`InputError`."""
+        """Check the place, and that there is something; raises :class:`InputError`."""
         finite("s", self.s, 0.5)
+        if all(value is None for name, value in vars(self).items() if name != "s"):
+            raise InputError(
+                f"Nothing is attached at s = {self.s:g}: give the attachment a force, a follower force, an energy, a "
+                f"mass or a rotary inertia; a joint of two elements is breaks=({self.s:g},)."
+            )
 
     def kinetic(self, at: Site) -> Iterator[Any]:
         """Mass, where there is a centreline, and rotary inertia."""

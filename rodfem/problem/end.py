@@ -168,16 +168,11 @@ class End(Contribution):
             check_vector(f"hinge of the {side} end", self.hinge, 3)
             if not 0 < np.linalg.norm(_numbers(f"hinge of the {side} end", self.hinge)) < np.inf:
                 raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
-        if len(self.fixed(scene.constants())) == 3:
-            if self.follower is not None:
-                raise SceneError(
-                    f"A follower force acts on the {side} end, whose position is held: leave it free in one direction."
-                )
-            if self.force is not None:
-                raise SceneError(
-                    f"A dead force acts on the {side} end, whose position is held: it has no effect there; leave it "
-                    "out, or leave the position free in one direction."
-                )
+        if len(self.fixed(scene.constants())) == 3 and (self.force or self.follower):
+            raise SceneError(
+                f"A force acts on the {side} end, whose position is held: leave it out, or leave the position free in "
+                "one direction."
+            )
         if self.fixed_rotation is not None and (self.moment or self.follower_moment):
             raise SceneError(
                 f"A moment acts on the {side} end, whose directors are held: leave its rotation free, or use a hinge."

@@ -102,22 +102,22 @@ def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
 
 def needs_centreline(scene: Scene) -> str:
     """Say what in a scene needs the centreline as a field, in words; empty where nothing does."""
-    if not scene.conservative:
-        return "the mass of a rod under a load without potential"
-    if scene.distributed is not None:
-        return "a distributed force"
     c, inner = scene.constants(), scene.is_inside
-    if any(inner(x.s) and (x.force or x.mass) for x in scene.attachments):
-        return "what is attached along the rod"
-    if scene.inertia.rho_A(c) != 0:
-        return "the mass of the rod"
-    if floats(scene) and not all(scene.plain):
-        return "a rod that nothing holds, with more than dead forces at its ends,"
-    functions = [("the potential along the rod", scene.potential)] if scene.potential else []
-    functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
-    functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and inner(x.s)]
+    attached = [x for x in scene.attachments if inner(x.s)]
+    for what, needs in (
+        ("the mass of a rod under a load without potential", not scene.conservative),
+        ("a distributed force", scene.distributed is not None),
+        ("what is attached along the rod", any(x.force or x.mass for x in attached)),
+        ("the mass of the rod", scene.inertia.rho_A(c) != 0),
+        ("a rod that nothing holds, with more than dead forces at its ends,", floats(scene) and not all(scene.plain)),
+    ):
+        if needs:
+            return what
+    functions = [("the potential along the rod", scene.potential)]
+    functions += [("the ordinate", None if scene.ordinate.places else scene.ordinate.of)]
+    functions += [("what is attached along the rod", x.energy) for x in attached]
     functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or inner(x.s)]
-    return next((what for what, function in functions if asks_where(function, c)), "")
+    return next((what for what, function in functions if function and asks_where(function, c)), "")
 
 
 def floats(scene: Scene) -> bool:
@@ -181,7 +181,10 @@ _known_places = lru_cache(maxsize=64)(_places)
 def places_at(
     length: float, s: float, state: Sequence[Any], wrap: Callable[[Any], Any] = lambda x: x
 ) -> tuple[Place, Place]:
-    """Return a point and a place along the rod of a ``length``, in a ``state`` given as :data:`STATES` are."""
+    """Return a point and a place along the rod of a ``length``, in a ``state`` given as :data:`STATES` are.
+
+    ``s`` is the arclength; vectors pass through ``wrap``.
+    """
     units = (1.0, length, 1.0, 1.0 / length)
     numbers = ([float(unit * x) for x in values] for unit, values in zip(units, state, strict=True))
     q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)

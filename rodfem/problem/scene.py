@@ -271,9 +271,10 @@ class Scene(Contribution):
 
     def _check_kinds(self) -> None:
         """Raise :class:`InputError` for a field that is no such thing."""
-        for name in ("name", "title", *(["states"] if self.states is not None else [])):
-            text("column")(name, getattr(self, name))
-        for name in (self.name, *(() if self.states is None else (self.states,))):
+        names = {"name": self.name} | ({} if self.states is None else {"states": self.states})
+        for field_name, given in ({"title": self.title} | names).items():
+            text("column")(field_name, given)
+        for name in names.values():
             if name in ("", ".", "..") or not encodes(name) or set(name) & set("/\\\n"):
                 raise SceneError(f"The name {name!r} cannot be that of a folder: give a text without slashes.")
         if GIVEN.fullmatch(self.states or ""):
@@ -293,13 +294,8 @@ class Scene(Contribution):
             for x in a((tuple, list), f"a tuple, as in {name}={example}")(name, getattr(self, name)):
                 a(kind, example)(f"One of the {name}", x)
         for name, p in self.parameters.items():
-            if (
-                not isinstance(name, str)
-                or not name.isidentifier()
-                or iskeyword(name)
-                or name == "s"
-                or name[:2] == "__"
-            ):
+            known = isinstance(name, str) and name.isidentifier() and not iskeyword(name)
+            if not known or name == "s" or name.startswith("__"):
                 raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
             if not isinstance(p, Parameter):
                 real(name, p, 0.0)
@@ -315,8 +311,8 @@ class Scene(Contribution):
             )
         if not max(SHORTEST, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
             raise SceneError(
-                f"A rod from {a:g} to {b:g} is too short or too long for floats, or short beside its arclengths' "
-                "round-off: choose other units, or let the arclength begin at zero."
+                f"A rod from {a:g} to {b:g} is shorter than {SHORTEST:g}, beyond the range of floats, or short for its "
+                "arclengths' round-off: choose other units, or let the arclength begin at zero."
             )
         if not isinstance(self.rod, str) or self.rod not in RODS:
             raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")

@@ -202,7 +202,10 @@ def circle(radius: float, *, E: float, nu: float, density: float = 0.0) -> Secti
 
 @checked(outer=_positive, inner=_positive, **MATERIAL)
 def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A circular tube of these radii, of a material as for :func:`circle`."""
+    """A circular tube with the radii ``outer`` and ``inner``; ``E, nu, density`` are as for :func:`circle`.
+
+    Raises :class:`InputError` for numbers that no section has.
+    """
     if not inner < outer:
         raise InputError(f"inner is {inner:g}: give a radius below the outer one, {outer:g}.")
     second, m = pi * (outer**4 - inner**4) / 4, (inner / outer) ** 2
@@ -212,7 +215,10 @@ def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.
 
 @checked(width=_positive, height=_positive, **MATERIAL)
 def rectangle(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A rectangle of any proportion, with sides along ``d1`` and ``d2``, of a material as for :func:`circle`."""
+    """A rectangle of a ``width`` along ``d1`` and a ``height`` along ``d2``.
+
+    ``E, nu, density`` are as for :func:`circle`.
+    """
     long, short = max(width, height), min(width, height)
     # the sum of tanh(n pi long / 2 short) / n^5, which converges slowly, by that of its difference from 1 / n^5
     # the seventh term is below 1e-17 in a square
@@ -225,7 +231,10 @@ def rectangle(width: float, height: float, *, E: float, nu: float, density: floa
 
 @checked(width=_positive, thickness=_positive, **MATERIAL)
 def strip(width: float, thickness: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A strip: a flat :func:`rectangle`, no thicker than wide, which bends easily about its width ``d1``."""
+    """A strip: a flat :func:`rectangle` of a ``width`` and a ``thickness``, which bends easily about its width ``d1``.
+
+    ``E, nu, density`` are as for :func:`circle`.  Raises :class:`InputError` for a strip that is thicker than wide.
+    """
     if thickness > width:
         raise InputError(f"thickness is {thickness:g}: give no more than the width, {width:g}, or a section.rectangle.")
     return rectangle(width, thickness, E=E, nu=nu, density=density)
@@ -233,7 +242,10 @@ def strip(width: float, thickness: float, *, E: float, nu: float, density: float
 
 @checked(width=_positive, height=_positive, **MATERIAL)
 def ellipse(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A solid ellipse, with axes (twice the semi-axes) along ``d1`` and ``d2``, of a material as for :func:`circle`."""
+    """A solid ellipse whose axes are ``width`` along ``d1`` and ``height`` along ``d2``, twice the semi-axes.
+
+    ``E, nu, density`` are as for :func:`circle`.
+    """
     a, b = width / 2, height / 2
 
     def shear(along: float, across: float) -> float:

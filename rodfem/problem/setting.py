@@ -32,10 +32,12 @@ HELD, AXIS, TURNS = "held", "axis", "free"
 class Support:
     """Support and loads of a rod at the arclength ``s``, in one state; vectors are (3,), zero if there is none.
 
-    ``held`` components of the position are along e1, e2, e3, ``guide`` is the only direction in which it moves if that
-    need not be one of them.  ``frame`` is the unit quaternion of what holds the directors, or of the scene's start,
-    ``axis`` is along them.  Stiffnesses (3, 3) are along, and about, e1, e2, e3; ``force`` and ``moment`` are in the
-    frame of space, felt in the free directions, those of potentials that are no springs among them.
+    ``kind`` is that of :func:`kind_of`, ``turning`` one of :data:`HELD`, :data:`AXIS`, :data:`TURNS`.  ``held``
+    components of the position are along e1, e2, e3, ``guide`` is the only direction in which it moves if that need not
+    be one of them.  ``frame`` is the unit quaternion of what holds the directors, or of the scene's start, ``axis`` is
+    along them.  ``translation_stiffness`` and ``rotation_stiffness`` (3, 3) are along, and about, e1, e2, e3, ``mass``
+    is attached; ``force`` and ``moment`` are in the frame of space, felt in the free directions, those of potentials
+    that are no springs among them; ``follower`` and ``follower_moment`` are along the directors.
     """
 
     s: float

@@ -101,7 +101,7 @@ def _changing(scene: Scene, s: float, end: End, sample: Sample, springs: Floats)
     c = scene.constants(float(sample["load"]), s)
     frame, loads = _start(scene, s), np.zeros((2, 3))
     if end.energy is not None:
-        loads = load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
+        loads = _load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
         loads[1] *= end.turning != HELD
     if end.rotation is not None:
         frame = np.array([_number(x) for x in end.frame(c)])
@@ -144,7 +144,7 @@ def _springs(second: Floats) -> Floats:
     return second * (least > -SLIGHTLY * greatest)[:, None, None]
 
 
-def load_of(energy: OfPlace, c: Constants, x: Place, springs: Floats) -> Floats:
+def _load_of(energy: OfPlace, c: Constants, x: Place, springs: Floats) -> Floats:
     """Force and moment (2, 3) of a potential at a place ``x``, in the frame of space, where it is no spring's.
 
     Of springs of translation, with the stiffness ``springs[0]``, what is across all their directions; of springs of

@@ -107,10 +107,10 @@ def expressions_of(scene: Scene) -> Iterator[Any]:
         yield from (e for e in trial.expressions(0)[1] if e is not None)
 
 
-def _trials(scene: Scene) -> Iterator[Trial]:
+def _trials(scene: Scene) -> Iterator[_Trial]:
     for what, function, role in functions_of(scene):
         if role.call in OF_PLACES or (role.call == "f(c)" and role.size is not None):
-            yield from (Trial(scene, what, function, role, s) for s in _places(scene, function, role))
+            yield from (_Trial(scene, what, function, role, s) for s in _places(scene, function, role))
 
 
 def _places(scene: Scene, function: Any, role: Role) -> list[float | None]:
@@ -122,7 +122,7 @@ def _places(scene: Scene, function: Any, role: Role) -> list[float | None]:
 
 
 @dataclass(frozen=True)
-class Trial:
+class _Trial:
     """A function of a scene, ``what`` it is in words, and the arclength at which it acts, None along the rod."""
 
     scene: Scene

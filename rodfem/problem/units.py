@@ -26,7 +26,7 @@ ORDINARY = 1e3
 
 
 class Units(NamedTuple):
-    """Natural sizes of the rod, of the numbers that are recorded, and of eigenvalues of the motion."""
+    """Natural sizes: ``length, force, moment, energy`` of the rod, its ``load, ordinate``, and ``omega2``."""
 
     length: float
     force: float

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -284,14 +283,8 @@ def check_reach(scene: Scene) -> None:
 
 
 def check_places(scene: Scene) -> None:
-    """Raise :class:`SceneError` for attachments, constraints and breaks that are not on the rod, or for empty ones."""
+    """Raise :class:`SceneError` for an ordinate, an attachment, a constraint or a break that is not on the rod."""
     a, b = scene.interval
-    for x in scene.attachments:
-        if all(getattr(x, field.name) is None for field in fields(x) if field.name != "s"):
-            raise SceneError(
-                f"Nothing is attached at s = {x.s:g}: give the attachment a force, a follower force, an energy, a mass "
-                f"or a rotary inertia; a joint of two elements is breaks=({x.s:g},)."
-            )
     places = [("ordinate", s) for s in scene.ordinate.places] + [("break", s) for s in scene.breaks]
     places += [("attachment", x.s) for x in scene.attachments]
     places += [("constraint", x.s) for x in scene.constraints if x.s is not None]

@@ -103,7 +103,7 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
         for x in (None, (1.0,), "01", (False, True), {0.0, 1.0}, (0, 1j), (0, 10**400))
     ),
     ({"interval": (0.0, 1e200)}, "A rod from 0 to 1e.200"),
-    ({"interval": (1e16, 1e16 + 2), "ordinate": Ordinate("tip", 1e16, lambda r, q: 0.0)}, "short beside"),
+    ({"interval": (1e16, 1e16 + 2), "ordinate": Ordinate("tip", 1e16, lambda r, q: 0.0)}, "short for its arclengths"),
     *(
         ({"span": x}, r"span(\[\d\])? is")
         for x in (None, (1.0,), "03", (True, False), (0, 1j), {0: 1, 1: 2}, (0, 10**400))

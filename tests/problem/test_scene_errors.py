@@ -182,7 +182,7 @@ OFF_PLANE: list[tuple[dict, str]] = [
         ({"start": lambda s: (cos(s), 0.0, 0.0, 0.0)}, "start fails with TypeError.*array of arclengths"),
         # kinds
         ({"constraints": at(0.5, lambda x, c: x.r[0])}, r"constraints=\(at\("),
-        ({"attachments": Attachment(0.5)}, r"attachments=\(Attachment\("),
+        ({"attachments": Attachment(0.5, mass=1.0)}, r"attachments=\(Attachment\("),
         ({"breaks": 0.5}, r"breaks=\(0.5,\)"),
         ({"parameters": ["F", "B"]}, "give a dictionary"),
         ({"parameters": {"F": Parameter(0.0, admissible=(1.0, -1.0)), "B": 2.0}}, "give the lower bound first"),
@@ -220,7 +220,6 @@ OFF_PLANE: list[tuple[dict, str]] = [
         ({"ends": Ring(odd=True), "start": lambda s: turns(s, 2)}, r"Ring\(odd=False\)"),
         # places
         ({"attachments": (Attachment(1.5, force=lambda c: ZERO),)}, "attachment at s = 1.5 is not on the rod"),
-        ({"attachments": (Attachment(0.5),)}, r"Nothing is attached at s = 0.5: .*a mass.*breaks=\(0.5,\)"),
         ({"planar": "e3"}, "planar across 'e3'"),
         ({"planar": "e2"} | held(right=clamped(lambda c: (0.0, 0.2, 0.9))), "held at 0 and 0.2 along e2"),
         (
@@ -244,6 +243,11 @@ def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -
     message = str(raised.value)
     assert message.endswith(".") and "\n" not in message
     assert capfd.readouterr() == ("", "")
+
+
+def test_an_attachment_has_something() -> None:
+    with pytest.raises(InputError, match=r"Nothing is attached at s = 0.5: .*a mass.*breaks=\(0.5,\)"):
+        Attachment(0.5)
 
 
 def test_parameters_that_nothing_feels() -> None:
