@@ -103,7 +103,7 @@ class System:
         self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
-        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0}, sizes=self.natural_sizes)
+        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, self.natural_sizes)
         self.compiled = None
         if isinstance(self.lu, Chain) and CompiledNewton.serves(self.matrix, self.lu):
             self.compiled = CompiledNewton(self, self.matrix, self.lu)

@@ -172,11 +172,6 @@ class Elimination:
         """Number of fronts."""
         return int(self.lib.chain_fronts(self._chain))
 
-    @property
-    def largest(self) -> int:
-        """Order of the largest front of the last factors."""
-        return int(self.lib.chain_largest(self._chain))
-
 
 class Chain:
     """:class:`~rodfem.linalg.factorization.Factors` of matrices with one pattern, on one rank.
@@ -252,25 +247,14 @@ def package(prefix: str) -> str:
     return name
 
 
-def factors_of(
-    kind: str,
-    comm: MPI.Comm,
-    unknowns: int,
-    scalars: int,
-    controls: dict[int, int],
-    thresholds: dict[int, float] | None = None,
-    prefix: str = "",
-    sizes: Sizes | None = None,
-) -> Factors:
+def factors_of(kind: str, comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
     """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
 
     Those of another matrix, of 0 unknowns, and on several ranks are MUMPS's, which is the last resort of the others.
-    ``controls`` are its ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or
-    ``rodfem_cholesky_``, or with another ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the
-    matrices.  ``sizes`` are those of the unknowns, where they are not one.
+    ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.  ``sizes`` are those of the unknowns,
+    where they are not one.
     """
-    prefix = prefix or f"rodfem_{kind}_"
-    mumps = Mumps(kind, controls, thresholds, prefix, sizes)
-    if not unknowns or package(prefix) == MUMPS or comm.size > 1:
+    mumps = Mumps(kind, sizes)
+    if not unknowns or package(mumps.prefix) == MUMPS or comm.size > 1:
         return mumps
     return Chain(kind, scalars, mumps, sizes)

@@ -43,7 +43,7 @@ class Bordered:
         sizes = along, system.fields.dense_rows + borders
         natural = None if system.natural_sizes is None else self._sizes
         if constraints is None:
-            self.factors = factors_of("lu", self.comm, *sizes, {8: 0}, sizes=natural)
+            self.factors = factors_of("lu", self.comm, *sizes, natural)
         else:
             self.factors = inertia_factors(self.comm, *sizes, natural)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))

@@ -213,7 +213,7 @@ def test_deflation_alone(formulation: str) -> None:
     shift = float(expected[0]) - 1.0
     shifted = matrix.copy()
     shifted.axpy(-shift, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    factors = factors_of("lu", system.comm, 0, 0, {})
+    factors = factors_of("lu", system.comm, 0, 0)
     factors(shifted)
     assert assessor.inertia is not None
     for deflated, zeros in (((), 1), ([mode], 0)):
