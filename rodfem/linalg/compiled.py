@@ -161,8 +161,6 @@ def _compile(name: str) -> Path:
         return made.replace(folder / made.name)
 
 
-# --- the C compiler ----------------------------------------------------------------------------------------------
-
 OTHERS = ("cc", "gcc", "clang")
 """Programs that serve if the compiler of this Python is not there."""
 NO_COMPILER = (

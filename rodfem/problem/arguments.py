@@ -38,9 +38,6 @@ UNORDERED = str, bytes, Set, Mapping
 """Kinds that can be iterated over and are no lists of numbers."""
 
 
-# --- numbers, flags, functions -------------------------------------------------------------------------------------
-
-
 def whole(name: str, value: Any, example: int) -> int:
     """Return ``value`` as an int; raises :class:`InputError` unless it is a whole number (no bool, no float)."""
     if not isinstance(value, Integral) or isinstance(value, bool):
@@ -97,9 +94,6 @@ def takes(function: Any, arguments: int) -> bool:
 def encodes(name: str) -> bool:
     """Whether a name can be that of a file: no zero byte, no half of a surrogate pair."""
     return "\0" not in name and not any("\ud800" <= c <= "\udc7f" for c in name)
-
-
-# --- checks that are declared ----------------------------------------------------------------------------------------
 
 
 def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
@@ -221,9 +215,6 @@ def function(example: str, arguments: int = 1) -> Check:
         return value
 
     return check
-
-
-# --- values that functions of a scene return -------------------------------------------------------------------------
 
 
 def check_vector(what: str, values: Any, size: int) -> None:

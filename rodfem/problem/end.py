@@ -79,8 +79,6 @@ class End(Contribution):
     )
     energy: OfPlace | None = role_field(Role("energy of the {} end", "f(x, c)", 0, load=POTENTIAL))
 
-    # --- what is held ----------------------------------------------------------------------------------------------
-
     closed = False
     """Whether it is joined to the other end."""
     sign = 1.0
@@ -126,8 +124,6 @@ class End(Contribution):
             return [self.rotation is not None or any(held)]
         return [self.fixed_rotation is not None]
 
-    # --- what it contributes ---------------------------------------------------------------------------------------
-
     def contact_force(self, c: Constants) -> list[Any]:
         """Components of the contact force that dead forces prescribe, pulling outwards; None elsewhere."""
         force = [0.0] * 3 if self.force is None else self.force(c)
@@ -155,8 +151,6 @@ class End(Contribution):
     def _stiff(self, normal: int | None) -> list[Direction]:
         """Directions about which moments, as unknowns, keep the end from turning."""
         return [] if self.rotation is None or self.fixed_rotation is not None else across(self.hinge, normal)
-
-    # --- what is checked -------------------------------------------------------------------------------------------
 
     def check(self, side: str, scene: Scene) -> None:
         """Check shapes, and that nothing acts on what is held; raises :class:`SceneError`."""
@@ -208,8 +202,6 @@ def across(axis: tuple[float, float, float] | None, normal: int | None = None) -
         return list(UNIT)
     return [tuple(map(float, row)) for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
 
-
-# --- closed rods ------------------------------------------------------------------------------------------------------
 
 CLOSING_MOMENT = Group(
     "t", "closing moment", "closing of the ring's rotation, component {}", Motion.CLOSING, moment=True
@@ -287,9 +279,6 @@ class JoinedEnd(End):
 
 def _dot(multipliers: Any, values: Any, components: Any) -> Any:
     return sum(y * values[i] for y, i in zip(multipliers, components, strict=True))
-
-
-# --- guides -----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

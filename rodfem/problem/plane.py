@@ -28,24 +28,26 @@ ASIDE = 1e-3
 
 def check_plane(scene: Scene) -> None:
     """Raise :class:`SceneError` for what moves a planar rod out of its plane, or pushes it out."""
-    if (normal := scene.normal) is None:
-        return
-    for load in scene.loads():
-        c = scene.constants(load)
-        left, right = (end.held(c)[normal] for end in scene.sides)
-        if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
+    if scene.normal is not None:
+        for load in scene.loads():
+            _check_ends(scene, scene.normal, scene.constants(load))
+        _check_loads(scene, scene.normal)
+        _check_functions_of_states(scene, scene.normal)
+
+
+def _check_ends(scene: Scene, normal: int, c: Constants) -> None:
+    left, right = (end.held(c)[normal] for end in scene.sides)
+    if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
+        raise SceneError(
+            f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod is "
+            "planar: hold both at the same, or leave planar out."
+        )
+    for side, end in zip(SIDES, scene.sides, strict=True):
+        frame = np.array([float(x) for x in end.frame(c) or ()])
+        if frame.size and abs(np.delete(frame[1:], normal)).max() > NEGLIGIBLE * np.linalg.norm(frame):
             raise SceneError(
-                f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
-                "is planar: hold both at the same, or leave planar out."
+                f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
             )
-        for side, end in zip(SIDES, scene.sides, strict=True):
-            frame = None if end.rotation is None else np.array([float(x) for x in end.frame(c)])
-            if frame is not None and abs(np.delete(frame[1:], normal)).max() > NEGLIGIBLE * np.linalg.norm(frame):
-                raise SceneError(
-                    f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
-                )
-    _check_loads(scene, normal)
-    _check_functions_of_states(scene, normal)
 
 
 def _check_loads(scene: Scene, normal: int) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from math import inf, isfinite, isnan, nan
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -152,22 +153,23 @@ class _Trial:
             if self.of_place:
                 self.expressions(state)  # what it raises is no matter of the state
             for there in self._constants(state):
-                try:
-                    numbers = self._called(there, state)
-                except SceneError:
-                    if self.of_place:  # undefined: at a state that the rod need not take
-                        continue
-                    raise
-                self._check(numbers)
-                c, expressions = self.expressions(state)
+                numbers = self._numbers(there, state)
+                c, expressions = self.expressions(state) if numbers else (there, [])
                 for name, symbol in vars(c).items():
                     if isinstance(symbol, Symbol):
                         symbol.value = vars(there)[name]
-                for expression, number in zip(expressions, numbers, strict=True):
-                    if (expression is None) != (number is None):
-                        yield inf, 0.0, there
-                    elif number is not None:
-                        yield _value(expression), number_of(number), there
+                yield from ((*_pair(e, x), there) for e, x in zip(expressions, numbers, strict=True))
+
+    def _numbers(self, there: Constants, state: int) -> list[Any]:
+        """Numbers that the function returns; none if it is undefined: the rod need not take the state."""
+        try:
+            values = self._called(there, state)
+        except SceneError:
+            if self.of_place:
+                return []
+            raise
+        self._check(values)
+        return values
 
     @property
     def of_place(self) -> bool:
@@ -219,7 +221,7 @@ class _Trial:
             found = self._called(c, state, _named(OF_PLACES.get(self.role.call, ())))
         if self.of_place:
             self._check(found)
-        for part in (part for e in found if e is not None for part in parts(e)):
+        for part in chain.from_iterable(parts(e) for e in found if e is not None):
             if isinstance(part, ComplexValue) or (isinstance(part, ScalarValue) and not isfinite(part)):
                 raise SceneError(f"The {self.what} has {part} in it: return an expression of finite real numbers.")
         return c, [e if e is None else differentiated(ufl.as_ufl(e)) for e in found]
@@ -234,6 +236,13 @@ def _named(names: tuple[str, ...]) -> Callable[[Any], Any]:
         return ufl.as_vector([Symbol.named(f"{name}[{i}]", float(vector[i])) for i in range(size)])
 
     return symbolic
+
+
+def _pair(expression: Any, value: Any) -> tuple[float, float]:
+    """Values of an expression and of a function; of two that are None nan, of one that is None none that agree."""
+    if expression is None or value is None:
+        return (nan, nan) if expression is value else (inf, 0.0)
+    return _value(expression), number_of(value)
 
 
 def _value(expression: Any) -> float:
