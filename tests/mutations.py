@@ -274,9 +274,9 @@ FAULTS = {
         "rodfem/stability/soft_mode.py", "return None if kink else False", "return False", "tests/diagram/test_kinks.py"
     ),
     "constants-are-compared": Fault(
-        "rodfem/problem/symbols.py",
-        "if _is_a_persons(3):",
-        "if _is_a_persons(3) and False:",
+        "rodfem/problem/trials.py",
+        "abs(symbolic - number) <= least:",
+        "abs(symbolic - number) <= 1e9:",
         "tests/problem/test_symbols.py",
     ),
     "pairs-that-have-just-met-enter": Fault(
@@ -422,15 +422,9 @@ FAULTS = {
     ),
     "parabolas-through-steps-are-believed": Fault(
         "rodfem/fem/convexity.py",
-        " & (off <= EXPLAINED * (np.maximum(a, c) - b))",
+        " & (off <= 0.1 * (np.maximum(a, c) - b))",
         "",
         "tests/continuation/test_convexity.py",
-    ),
-    "planes-at-nine-loads": Fault(
-        "rodfem/problem/plane.py",
-        "if not all(vanishes(values[i]) for i in out):",
-        "if not all(vanishes(values[i], 1e9) for i in []):",
-        "tests/problem/test_scene_errors.py",
     ),
     "energies-prefer-a-side": Fault(
         "rodfem/problem/plane.py",
@@ -440,8 +434,8 @@ FAULTS = {
     ),
     "energies-are-tried-at-one-load": Fault(
         "rodfem/problem/plane.py",
-        "*map(scene.constants, scene.loads()), *(",
-        "*(",
+        "*map(scene.constants, scene.loads()), ",
+        "",
         "tests/problem/test_scene_errors.py",
     ),
     "pitchforks-by-their-loads": Fault(
@@ -577,7 +571,7 @@ FAULTS = {
         "tests/diagram/test_inertia_of_a_load.py",
     ),
     "starts-that-jump": Fault(
-        "rodfem/problem/start.py", "if left > TURNED / 2:", "if left > 9:", "tests/problem/test_scene_errors.py"
+        "rodfem/problem/validation.py", "if left > TURNED / 2:", "if left > 9:", "tests/problem/test_scene_errors.py"
     ),
     "states-that-cannot-be-counted": Fault(
         f"{CONTINUATION}first_equilibrium.py",
@@ -643,16 +637,10 @@ FAULTS = {
         "tests/continuation/test_convexity.py",
     ),
     "planes-are-tried-at-the-ends": Fault(
-        "rodfem/problem/local_state.py",
+        "rodfem/problem/plane.py",
         "for load in scene.loads() if scene.load in asked",
         "for load in scene.span if scene.load in asked",
         "tests/problem/test_scene_errors.py",
-    ),
-    "constraints-are-tried-at-one-place": Fault(
-        "rodfem/problem/results.py",
-        "or inside(scene.interval)",
-        "or [scene.interval[0]]",
-        "tests/problem/test_one_place.py tests/problem/test_scene_errors.py",
     ),
     "bar-below-the-location": Fault(
         "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
@@ -661,7 +649,7 @@ FAULTS = {
         "rodfem/adaptivity/error_estimate.py", "if again is None or not alike(again, law):", "if again is None:", ERRORS
     ),
     "potential-of-constraints-at-nodes": Fault(
-        "rodfem/fem/equations.py", 'others["potential"] = potential', 'others["potential"] = L', WORK
+        "rodfem/fem/equations.py", '{"potential": potential}', '{"potential": L}', WORK
     ),
     "writhe-of-one-polygon": Fault(
         "rodfem/writhe.py", "(4 * fine - coarse) / 3", "fine", "tests/report/test_contents.py"
@@ -686,7 +674,7 @@ FAULTS = {
     ),
     "constants-of-what-is-not-derived": Fault(
         "rodfem/fem/form_compiler.py",
-        "derived = apply_derivatives(apply_algebra_lowering(form))",
+        "derived = differentiated(form)",
         "derived = form",
         "tests/fem/test_convexity_constants.py",
     ),
@@ -694,7 +682,7 @@ FAULTS = {
         "rodfem/fem/invariance.py", "INVARIANT = 1e-12", "INVARIANT = 1e-9", "tests/fem/test_symmetries.py"
     ),
     "a-stiff-twist-hides-a-load": Fault(
-        "rodfem/fem/verification.py", "ZERO = 1e-10", "ZERO = 1e-4", "tests/fem/test_nearly_symmetric.py"
+        "rodfem/fem/invariance.py", "ZERO = 1e-10", "ZERO = 1e-4", "tests/fem/test_nearly_symmetric.py"
     ),
     "stiff-strains-hide-the-load": Fault(
         "rodfem/continuation/singular_points.py",
@@ -881,9 +869,9 @@ FAULTS = {
         "tests/output/test_summary.py",
     ),
     "mumps-in-any-units": Fault(
-        "rodfem/linalg/selection.py",
-        "Mumps(kind, controls, thresholds, prefix, sizes)",
-        "Mumps(kind, controls, thresholds, prefix)",
+        "rodfem/linalg/chain.py",
+        "Mumps(kind, sizes)",
+        "Mumps(kind)",
         "tests/problem/test_units.py",
     ),
     "frequencies-that-meet-and-part-in-a-step": Fault(

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import ROWS, cubic_weights, lagrange
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fem.parameters import Line, line
+from rodfem.fem.state import Line, line
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.units import size

@@ -21,9 +21,8 @@ from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
 from rodfem.fem.reactions import Reactions, reactions
 from rodfem.fem.resultants import Resultants
 from rodfem.fem.shape import Shape
-from rodfem.fem.state import Energies
+from rodfem.fem.state import LOAD, Energies, NodalValues
 from rodfem.fem.system import System
-from rodfem.fem.values import LOAD, NodalValues
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors
 from rodfem.problem.units import Units

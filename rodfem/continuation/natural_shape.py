@@ -19,7 +19,7 @@ from scipy.interpolate import PchipInterpolator
 from rodfem.errors import SceneError
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY
-from rodfem.problem.kinds import plain
+from rodfem.problem.arguments import plain
 from rodfem.problem.quaternions import CONJUGATE, directors, of_vector, product
 from rodfem.problem.scene import Scene
 

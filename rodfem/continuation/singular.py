@@ -55,7 +55,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE, Correction, Limits, newton
-from rodfem.fem.parameters import Line
+from rodfem.fem.state import Line
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.bordered import Bordered

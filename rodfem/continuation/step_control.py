@@ -7,7 +7,7 @@ from math import inf
 
 from rodfem.continuation.branch import Point
 from rodfem.errors import InputError
-from rodfem.problem.kinds import finite, real, whole
+from rodfem.problem.arguments import finite, real, whole
 from rodfem.tolerances import NEGLIGIBLE
 
 SHRINK, GROW = 0.4, 1.6

@@ -24,7 +24,7 @@ from rodfem.diagram.equilibria import ahead, first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fem.link import link
+from rodfem.fem.shape import link
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import APART, SAME_SPECIAL, SAME_STATE

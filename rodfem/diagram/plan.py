@@ -8,9 +8,8 @@ from typing import Any
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
-from rodfem.problem.arguments import a
+from rodfem.problem.arguments import a, real, reals, whole, yes_or_no
 from rodfem.problem.events import Event
-from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
@@ -95,7 +94,7 @@ class Plan:
             registry.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, ACCURACY)
-        flag("error_bars", self.error_bars)
+        yes_or_no("error_bars", self.error_bars)
         events = a((tuple, list), "Events, as in events=(Event('ends meet', of=f),)")("events", self.events)
         for i, event in enumerate(events):
             a(Event, "Events, as in events=(Event('ends meet', of=f),)")(f"events[{i}]", event)

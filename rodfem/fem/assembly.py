@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
     from rodfem.fem.known import Known
 
-KERNEL_ARGUMENTS = 6
-"""Number of arguments of a kernel of FFCx; since release 0.10 it takes custom data as well."""
-
 
 def _code() -> Any:
     return module("fem/assembly")
@@ -93,12 +90,8 @@ class Assembler:
 
     It is assembled on the cells of this rank.
 
-    Attributes
-    ----------
-    constants
-        Values of the constants of the form, as :meth:`pack_constants` found them.
-    pointer, function
-        The form for other compiled code, and the address of what assembles it.
+    ``constants`` are those of the form, as :meth:`pack_constants` found them; ``pointer`` and ``function`` are the
+    form, and the address of what assembles it, for other compiled code.
     """
 
     def __init__(self, form: Any, cells: Cells, known: Known, load: int, *, inside: bool = False) -> None:
@@ -116,7 +109,8 @@ class Assembler:
         memory = self._memory = Memory(ffi)
         held = memory.keep("integrals", ffi.new("Integral[]", len(integrals)))
         for i, (c, x) in enumerate(zip(held, integrals, strict=True)):
-            c.kernel, c.custom = int(ffi.cast("uintptr_t", x.kernel)), len(ffi.typeof(x.kernel).args) > KERNEL_ARGUMENTS
+            # since release 0.10 a kernel takes custom data as well
+            c.kernel, c.custom = int(ffi.cast("uintptr_t", x.kernel)), len(ffi.typeof(x.kernel).args) > 6
             c.kind, c.count, c.entities = x.kind, len(x.entities), memory.array(i, x.entities)
         sides = 1 + any(x.kind == compat.INTERIOR for x in integrals)
         pieces = sum(rows.shape[1] for rows in known.rows)

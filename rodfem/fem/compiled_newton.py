@@ -28,15 +28,9 @@ there were no factors at all."""
 class CompiledNewton:
     """Compiled assembly, and iteration, for one matrix of a system, which it fills, and its factors.
 
-    Attributes
-    ----------
-    border
-        Derivative of the equations in the load at the state last assembled, (n,).
-    origin
-        The state that an iteration began with, (n,).
-    active, conditions, offsets, forces
-        Of each drift scalar: whether it has a phase condition, that condition (drifts, n), its offset, and what a drift
-        of one adds to the equations (drifts, n).
+    ``border`` is the derivative of the equations in the load at the state last assembled, ``origin`` the state that an
+    iteration began with, (n,).  Of each drift scalar ``active`` says whether it has a phase condition, ``conditions``
+    and ``forces`` (drifts, n) have that, and what a drift of one adds to the equations.
     """
 
     @staticmethod

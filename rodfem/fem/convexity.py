@@ -14,10 +14,8 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
-from ufl.algorithms.analysis import extract_coefficients, extract_type
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.apply_derivatives import apply_derivatives
 
+from rodfem.expressions import Variable, differentiated, extract_coefficients, extract_type
 from rodfem.fem.equations import Equations
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature, strain
@@ -25,11 +23,6 @@ from rodfem.problem.roles import derived
 
 GRID = 25
 """Places of an element, at equal distances, at which a material that varies along it is looked at besides."""
-EXPLAINED = 0.1
-"""Error of a parabola at the two places beside its three, relative to how much these vary, up to which it is believed.
-
-One through a jump is not: it has lower values than the function.
-"""
 
 
 def second_derivative(e: Equations) -> tuple[Any, bool, Any]:
@@ -41,8 +34,8 @@ def second_derivative(e: Equations) -> tuple[Any, bool, Any]:
     W = scene.energy(v, ufl.as_vector([x[len(free) + i] for i in range(3)]), e.constants)
     hessian, every = ufl.diff(ufl.diff(W, x), x), range(len(free) + 3)
     vector = ufl.as_vector([hessian[i, j] for i in every for j in every])
-    expanded = apply_derivatives(apply_algebra_lowering(vector))
-    variables = extract_type(expanded, ufl.classes.Variable)
+    expanded = differentiated(vector)
+    variables = extract_type(expanded, Variable)
     return vector, any(node.ufl_operands[1] == x.label() for node in variables), expanded
 
 
@@ -75,22 +68,10 @@ class Convexity:
         self.evaluate = derived(e, "convexity", lambda: e.evaluated(vector, points))
 
     def holds(self, x: PETSc.Vec) -> bool:
-        """Whether the second derivative is positive definite along the whole rod at the state ``x``.
-
-        It is where Cholesky's factors exist; where not, or between places, the least eigenvalue decides.
-        """
-        if self.evaluate is None:
-            return True
+        """Whether the second derivative is positive definite along the whole rod at the state ``x``."""
         if self.varies and not self.margin(x, self.scales(x)) > 0:
             return False
-        mine = True
-        try:
-            np.linalg.cholesky(self._matrices(x))
-        except np.linalg.LinAlgError:
-            mine = False
-        comm = self.system.comm
-        sure = mine if comm.size == 1 else comm.allreduce(mine, op=MPI.LAND)
-        return sure or not self.lowest(x) <= 0
+        return not self.lowest(x) <= 0
 
     def lowest(self, x: PETSc.Vec) -> float:
         """Least eigenvalue over the whole rod at the state ``x``, relative to the largest one; 1 if it is constant."""
@@ -137,5 +118,6 @@ def _vertices(values: np.ndarray) -> np.ndarray:
     slope, curvature = (c - a) / 2, a - 2 * b + c
     before, after = (3 * a - 3 * b + c)[:, 1:] - values[:, :-3], (a - 3 * b + 3 * c)[:, :-1] - values[:, 3:]
     off = np.maximum(np.pad(abs(before), ((0, 0), (1, 0))), np.pad(abs(after), ((0, 0), (0, 1))))
-    believed = (abs(slope) <= curvature) & (curvature > 0) & (off <= EXPLAINED * (np.maximum(a, c) - b))
+    # a parabola through a jump is not believed: it has lower values than the function
+    believed = (abs(slope) <= curvature) & (curvature > 0) & (off <= 0.1 * (np.maximum(a, c) - b))
     return np.asarray(b[believed] - slope[believed] ** 2 / (2 * curvature[believed]))

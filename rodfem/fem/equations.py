@@ -17,18 +17,21 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from ufl.algorithms.analysis import extract_type
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.map_integrands import map_integrand_dags
-from ufl.constantvalue import FloatValue
-from ufl.corealg.multifunction import MultiFunction
-from ufl.corealg.traversal import traverse_unique_terminals
 
+from rodfem.expressions import (
+    Expr,
+    FloatValue,
+    MultiFunction,
+    apply_algebra_lowering,
+    extract_type,
+    map_integrand_dags,
+    parts,
+)
 from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import FEW, Discretization, Fields
 from rodfem.fem.known import Known
-from rodfem.fem.parameters import Line, load_line
+from rodfem.fem.state import Line, load_line
 from rodfem.forms import inertia, lagrangian
 from rodfem.forms.kinematics import curvature, strain
 from rodfem.forms.rotation import rotation
@@ -38,8 +41,6 @@ from rodfem.problem.roles import derived
 from rodfem.problem.scene import Part, Scene
 from rodfem.tolerances import same_place
 
-RECENT = 8
-"""Number of meshes of scenes with the same functions whose forms are kept."""
 KEPT = {sign * value for sign in (-1.0, 1.0) for value in (0.25, 0.5, 1.0, 2.0, 3.0, 4.0)}
 """Numbers that belong to formulas, as the half of an energy."""
 
@@ -49,7 +50,7 @@ def with_constants(form: Any, mesh: Any) -> Any:
 
     What is none, as a sum without terms, is returned as it is.
     """
-    if not isinstance(form, (ufl.Form, ufl.core.expr.Expr)):
+    if not isinstance(form, (ufl.Form, Expr)):
         return form
     if not any(number not in KEPT for number in _numbers(form)):
         return form
@@ -61,7 +62,7 @@ def with_constants(form: Any, mesh: Any) -> Any:
 def _numbers(form: Any) -> Iterator[float]:
     """Numbers in a form, or in an expression: to look for them takes a third of the time of a map."""
     for whole in [x.integrand() for x in form.integrals()] if isinstance(form, ufl.Form) else [form]:
-        yield from (float(x) for x in traverse_unique_terminals(whole) if isinstance(x, FloatValue))
+        yield from (float(x) for x in parts(whole) if isinstance(x, FloatValue))
 
 
 class _Constants(MultiFunction):
@@ -99,35 +100,12 @@ class Equations:
     those that its functions have in them.  Every parameter is ``p = base + direction * load`` with the scalar unknown
     ``load``: any of them can be varied.
 
-    Attributes
-    ----------
-    residual, jacobian
-        First and second derivative of the Lagrangian in all fields and scalars.
-    metric
-        ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square rotation).
-    kinetic
-        Kinetic metric of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``.
-    massless, even
-        Whether that is without any term, and without the arclength in it.
-    energy
-        Stored energy ``int W ds``.
-    potential
-        The Lagrangian without the constraints at nodes: at an equilibrium, where constraints are fulfilled, the total
-        potential energy.  None where a load has no potential.
-    loads
-        What acts on the rod in the potential, without the rod: loads, springs and foundations, and constraints that are
-        no ones at nodes.  None where there is nothing, or no potential.
-    ordinate
-        Ordinate of the scene where that is an integral over the rod, else None.
-    line
-        Parameters that the scalar unknown ``load`` stands for unless an evaluation says otherwise: the scene's load.
-    register
-        What the forms read now, of whichever scene: the ``line`` taken last, and since then the ``values`` that were
-        put where dolfinx reads them (:mod:`rodfem.fem.state`).
-    cells, local_places
-        Cells of this rank, and the places of a vector of all their degrees of freedom.
-    uniform
-        Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
+    ``metric`` is ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square
+    rotation), ``kinetic`` that of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``; it may be
+    ``massless``, or ``even``: without the arclength.  ``potential`` is the Lagrangian without the constraints at nodes,
+    at an equilibrium the total potential energy, None if a load has none; ``loads`` is that without the rod.  In
+    ``uniform`` equations there is no arclength, and nothing acts at points inside the rod.  ``register`` says what the
+    forms read now, of whichever scene: the ``line`` taken last, and the ``values`` that were put there since then.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -165,7 +143,7 @@ class Equations:
             fields = known.fields.bound(scene)
             assert fields is not None
             if fields.unknowns <= FEW:
-                recent[:] = [known, *recent[: RECENT - 1]]
+                recent[:] = [known, *recent[:7]]
         out = copy(known)
         out.fields, out.line = fields, load_line(scene)
         return out
@@ -177,13 +155,10 @@ class Equations:
         self.names, self.line = list(scene.parameters), load_line(scene)
         self.base, self.direction = fem.Constant(mesh, self.line.origin), fem.Constant(mesh, self.line.direction)
         self.ends = fem.Constant(mesh, np.array(scene.interval, dtype=float))
-        length = self.length = self.ends[1] - self.ends[0]
-
+        self.length = self.ends[1] - self.ends[0]
         u, test, trial = fields.u, ufl.TestFunction(fields.space), ufl.TrialFunction(fields.space)
         dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": self.quadrature_degree(k)})
-        dx_nodes = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * k - 1, "quadrature_rule": "GLL"})
         self.measures = point_measures(mesh, [*scene.interval, *scene.joints])
-
         self.known = Known(fields, self.quadrature_degree(k) // 2)
         f = self.unknowns = self._named(ufl.split(u))
         c = self.constants = self._constants(f.load)
@@ -191,43 +166,62 @@ class Equations:
         W = scene.energy(along.v, along.k, c)
         a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
         sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
-        inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
-        rod = fields.formulation.integrand(self, f, c, W, along)
-        loads = [term * dx for of, site in inside for term in of.lagrangian(site)]
-        for of, site, measure in sites:
-            if measure is not None and not of.nodal:
-                loads += [term * measure for term in of.lagrangian(site)]
-        L = potential = rod * dx + sum(loads)
-        # constraints at nodes, zero at an equilibrium.  The potential does not have them: in a functional FFCx 0.5
-        # takes, beside a rule of the same degree, the points of that rule for both
-        if f.eta is not None:
-            L += lagrangian.unit_norm(f.eta, f.q) * dx_nodes
-        for of, site, measure in sites:
-            if of.nodal:
-                L += sum(term * (measure or dx_nodes) for term in of.lagrangian(site))
+        loads = self._loads(sites, dx)
+        potential = fields.formulation.integrand(self, W, along) * dx + sum(loads)
+        L = potential + self._nodal(sites)
         work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
         first = ufl.derivative(self.compilable(L), u, test) - self.compilable(work)
-        second = ufl.derivative(first, u, trial)
-        metric = (inertia.rotation_metric(a.q, b.q) if scene.normal is None else a.turned * b.turned) / length
-        if f.r is not None:
-            metric += ufl.dot(a.r, b.r) / length**3
-        elif f.v is not None:  # the strains stand for the centreline: without them a rod that stretches would not move
-            metric += ufl.inner(a.v, b.v) / length
-        kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c))) * dx
-        if f.r is not None:
-            kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
-        kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
+        kinetic = self._kinetic(a, b, sites, dx)
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.even = not extract_type(kinetic, ufl.SpatialCoordinate)
         self.uniform = not (extract_type(first, ufl.SpatialCoordinate) or scene.joints or self.known.tables)
-        others = {"energy": W * dx, "metric": metric * dx, "kinetic": kinetic}
+        others = {"energy": W * dx, "metric": self._metric(a, b) * dx, "kinetic": kinetic}
         if scene.conservative:
-            others["potential"] = potential
-            if loads:
-                others["loads"] = sum(loads)
+            others |= {"potential": potential} | ({"loads": sum(loads)} if loads else {})
         if not scene.ordinate.places:
             others["ordinate"] = (0.0 * c.s + scene.ordinate.of(along, c)) * dx
-        return {"jacobian": second, "residual": first} | {name: self.compilable(x) for name, x in others.items()}
+        derivatives = {"jacobian": ufl.derivative(first, u, trial), "residual": first}
+        return derivatives | {name: self.compilable(x) for name, x in others.items()}
+
+    @staticmethod
+    def _loads(sites: list[Any], dx: Any) -> list[Any]:
+        """Terms of what acts on the rod, first along it, then at points; without constraints at nodes."""
+        inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
+        at_points = [x for x in sites if x[2] is not None and not x[0].nodal]
+        return [term * dx for of, site in inside for term in of.lagrangian(site)] + [
+            term * measure for of, site, measure in at_points for term in of.lagrangian(site)
+        ]
+
+    def _nodal(self, sites: list[Any]) -> Any:
+        """Constraints at nodes, zero at an equilibrium.
+
+        The potential does not have them: in a functional FFCx 0.5 takes, beside a rule of the same degree, the points
+        of that rule for both.
+        """
+        f, rule = self.unknowns, {"quadrature_degree": 2 * self.fields.discretization.degree - 1}
+        dx = ufl.dx(domain=self.fields.mesh, metadata=rule | {"quadrature_rule": "GLL"})
+        out = 0 if f.eta is None else lagrangian.unit_norm(f.eta, f.q) * dx
+        for of, site, measure in sites:
+            if of.nodal:
+                out += sum(term * (measure or dx) for term in of.lagrangian(site))
+        return out
+
+    def _metric(self, a: Any, b: Any) -> Any:
+        """Integrand of the squared size of a change of state."""
+        planar = self.fields.scene.normal is not None
+        metric = (a.turned * b.turned if planar else inertia.rotation_metric(a.q, b.q)) / self.length
+        if a.r is not None:
+            return metric + ufl.dot(a.r, b.r) / self.length**3
+        # the strains stand for the centreline: without them a rod that stretches would not move
+        return metric if a.v is None else metric + ufl.inner(a.v, b.v) / self.length
+
+    def _kinetic(self, a: Any, b: Any, sites: list[Any], dx: Any) -> Any:
+        """Kinetic metric of the spectrum."""
+        f, c, own = self.unknowns, self.constants, self.fields.scene.inertia
+        kinetic = inertia.rotary(f.q, a.q, b.q, tuple(own.rho_I(c))) * dx
+        if f.r is not None:
+            kinetic += inertia.translational(a.r, b.r, own.rho_A(c)) * dx
+        return kinetic + sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
 
     @classmethod
     def compile_ahead(cls, fields: Fields) -> None:
@@ -259,7 +253,7 @@ class Equations:
         """Place of the functions that hold all along the rod; slope and curvatures pass through ``wrap``."""
         f, c, free = self.unknowns, self.constants, self.fields.scene.free_strains
         v, k = strain(free, self.components(f.v, len(free))), wrap(curvature(f.q, f.q.dx(0)))
-        r = self.fields.formulation.position(self, f, c, lambda field: field, None)
+        r = self.fields.formulation.position(self, c, lambda field: field, None)
         slope = {} if r is None else {"dr": wrap(r.dx(0))}
         return place(f.q, rotation(f.q), c.s, r, v=v, k=k, length=self.fields.scene.length, **slope)
 
@@ -299,7 +293,7 @@ class Equations:
 
         q, c = at(f.q), self._constants(at(f.load), s)
         side = None if inside else int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))
-        r = self.fields.formulation.position(self, f, c, at, side)
+        r = self.fields.formulation.position(self, c, at, side)
         return place(q, rotation(q), s, r, length=scene.length), c, at, measure
 
     # --- names -----------------------------------------------------------------------------------------------------

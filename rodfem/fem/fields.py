@@ -11,22 +11,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.errors import InputError
 from rodfem.fem import formulations
-from rodfem.fem.arclength import Arclength
-from rodfem.fem.formulation import CONTACT_FORCE, Formulation
+from rodfem.fem.formulations import CONTACT_FORCE, Formulation
 from rodfem.fem.rotation_field import AngleField, QuaternionField, Turning
-from rodfem.fem.values import LOAD
+from rodfem.fem.state import LOAD
+from rodfem.problem.arguments import reals, whole
 from rodfem.problem.contribution import Block, Group, Unknown
-from rodfem.problem.kinds import reals, whole
 from rodfem.problem.local_state import Constants
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import SAME_PLACE, same_place
@@ -63,28 +63,31 @@ class Discretization:
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
-        known = formulations.names()
-        if not isinstance(self.formulation, str) or self.formulation not in known:
-            named = (
-                "" if isinstance(self.formulation, str) else ", and give numbers by name, as in elements=8, degree=6"
-            )
-            raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}{named}.")
-        if self.factors not in FACTORS:
-            raise InputError(f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.")
-        if self.elements < 1:
-            raise InputError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
-        if not 1 <= self.degree <= HIGHEST:
-            raise InputError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
-        if self.elements > MOST:
-            raise InputError(f"A mesh of {self.elements} elements is too large: choose at most {MOST}.")
-        if self.vertices is not None:
-            if len(self.vertices) != self.elements + 1:
-                raise InputError(
-                    f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
-                )
-            width = SAME_PLACE * (self.vertices[-1] - self.vertices[0])
-            if not all(a + width < b for a, b in pairwise(self.vertices)):
-                raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
+        known, elements, vertices = formulations.names(), self.elements, self.vertices or ()
+        ascending = all(a + SAME_PLACE * (vertices[-1] - vertices[0]) < b for a, b in pairwise(vertices))
+        for wrong, sentence in (
+            (
+                self.formulation not in known,
+                f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}, and give numbers by "
+                "name, as in elements=8, degree=6.",
+            ),
+            (
+                self.factors not in FACTORS,
+                f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.",
+            ),
+            (
+                not 1 <= elements <= MOST,
+                f"A mesh of {elements} elements holds no rod, or is too large: give 1 to {MOST}.",
+            ),
+            (not 1 <= self.degree <= HIGHEST, f"Degree {self.degree} is not available: choose 1 to {HIGHEST}."),
+            (
+                vertices and len(vertices) != elements + 1,
+                f"{len(vertices)} vertices do not bound {elements} elements: give {elements + 1}.",
+            ),
+            (not ascending, "The vertices of a mesh must ascend along the rod: sort them, each once."),
+        ):
+            if wrong:
+                raise InputError(sentence)
 
     def finer(self, factor: int, richer: int = 0) -> Discretization:
         """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""
@@ -162,22 +165,10 @@ def check_number(scene: Scene, discretization: Discretization, number: int) -> N
 class Fields:
     """Mesh, mixed space, the unknown ``u`` of all forms as a dolfinx Function, and the numbering of free unknowns.
 
-    Attributes
-    ----------
-    dofs
-        For each field the local degrees of freedom, (cells incl. ghosts, nodes per cell, components).
-    number
-        Global number of each local degree of freedom, -1 where clamped; (local size,) int32.
-    unknown_scalars, forces
-        Scalar unknowns without load and drifts; components of a constant contact force among them.
-    scalars
-        Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
-    copies
-        Local degrees of freedom of the scalars but for drifts, one in each cell, (cells, scalars).
-    clamped, clamps
-        Clamped local degrees of freedom; their values, zero for all others, (local size,).
-    asked
-        The discretisation as it was asked for.
+    ``dofs`` are the local degrees of freedom of each field, (cells incl. ghosts, nodes per cell, components),
+    ``copies`` those of the scalars but for drifts, one in each cell, (cells, scalars).  ``number`` (local size,) is the
+    global number of each, -1 where clamped, and ``clamps`` the value there, zero for all others; ``scalars`` has the
+    numbers of the scalars, ``n1``.. for a constant contact force, ``load``, and ``drift0``.. one for each symmetry.
     """
 
     def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
@@ -429,3 +420,70 @@ class Fields:
         if fixed:
             lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
         return lines + self.formulation.left_out(scene)
+
+
+class Arclength:
+    """Derivatives of states on the cells of one :class:`~rodfem.fem.fields.Fields`; each made when it is asked for."""
+
+    def __init__(self, fields: Fields) -> None:
+        """Keep the fields."""
+        self._fields = fields
+
+    @cached_property
+    def derivative(self) -> sp.csr_matrix:
+        """Matrix (local size, local size) of the derivative at nodes, the mean of the cells that share one.
+
+        Zero for scalars and at clamped degrees of freedom.
+        """
+        fields, size = self._fields, len(self._fields.number)
+        mean = sp.csr_matrix((size, size))
+        for block in fields.blocks:
+            (columns, values), dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+            rows = np.arange(len(dofs) + 1) * columns.shape[1]
+            slopes = sp.csr_matrix((values.ravel(), columns.ravel(), rows), shape=(len(dofs), size))
+            sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
+            shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
+            mean += sp.diags(1.0 / shared) @ sums @ slopes
+        return sp.diags(np.where(fields.number < 0, 0.0, 1.0)) @ mean.tocsr()
+
+    @cached_property
+    def jumps(self) -> sp.csr_matrix:
+        """Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline."""
+        fields = self._fields
+        columns, values = [], []
+        for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
+            slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+            order = np.argsort(dofs, kind="stable")
+            twins = np.flatnonzero(np.diff(dofs[order]) == 0)
+            sides = order[twins + 1], order[twins]
+            columns.append(np.hstack([slopes[0][side] for side in sides]))
+            values.append(np.hstack([sign * slopes[1][side] for sign, side in zip((1, -1), sides, strict=True)]))
+        rows = sum(len(c) for c in columns)
+        starts = np.cumsum([0, *(c.shape[1] for c in columns for _ in range(len(c)))])
+        entries = (np.concatenate([x.ravel() for x in parts]) for parts in (values, columns))
+        return sp.csr_matrix((*entries, starts), shape=(rows, len(fields.number)))
+
+
+def _slopes(fields: Fields, block: Block) -> tuple[np.ndarray, np.ndarray]:
+    """Derivative of a field at the nodes of each cell, in the order of the flattened ``fields.dofs``.
+
+    Columns and values of as many rows, (dofs, nodes) each.
+    """
+    dofs, ends = fields.dofs[block.name], fields.vertices
+    cells, nodes, components = dofs.shape
+    sizes = (ends[:, 1] - ends[:, 0]) / fields.scene.units.length
+    weights = differentiation(block.degree) / sizes[:, None, None]
+    shape = (cells, nodes, components, nodes)
+    columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape)
+    values = np.broadcast_to(weights[:, :, None, :], shape)
+    return columns.reshape(-1, nodes), values.reshape(-1, nodes)
+
+
+@cache
+def differentiation(degree: int) -> np.ndarray:
+    """Matrix of the derivative of the polynomial through values at the nodes of an element, at the nodes: (m, m)."""
+    nodes = compat.nodes(degree)
+    powers = np.vander(2 * nodes - 1, increasing=True)
+    slopes = np.zeros_like(powers)
+    slopes[:, 1:] = 2 * powers[:, :-1] * np.arange(1, len(nodes))
+    return np.asarray(slopes @ np.linalg.inv(powers))

@@ -11,16 +11,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.shape import Shape
+from rodfem.fem.state import LOAD
 from rodfem.fem.system import System
-from rodfem.fem.values import LOAD
 from rodfem.problem.local_state import inside
 
-AMPLITUDE = 0.1
-"""Size of the waves on top of the undeformed rod, in natural sizes."""
 SAME = 1e-9
 """Relative difference of fingerprints that is round-off."""
-OLDER = 3
-"""Numbers at a load that come first, in a list of those of both ends."""
 
 
 def fingerprint(system: System, span: tuple[float, float]) -> list[float | None]:
@@ -34,7 +30,7 @@ def fingerprint(system: System, span: tuple[float, float]) -> list[float | None]
     shape, mass = Shape(system), system.metric_matrix()
     found = [_numbers(system, shape, mass, load) for load in _loads(system, span)]
     ends, others = found[:2], found[2:]
-    out = [values[:OLDER] for values in ends] + [values[OLDER:] for values in ends] + others
+    out = [values[:3] for values in ends] + [values[3:] for values in ends] + others
     return [float(value) if np.isfinite(value) else None for values in out for value in values]
 
 
@@ -76,7 +72,7 @@ def _waves(system: System, load: float) -> PETSc.Vec:
     undeformed = np.array([1.0 if i == 2 else 0.0 for i in scene.free_strains])
     rest = {fields.turning.name: start.reshape(*fields.coordinates(fields.discretization.degree).shape, -1)}
     base = fields.filled(rest | {"v": undeformed, LOAD: load})
-    return system.vector(base + AMPLITUDE * fields.sizes * _wave(system))
+    return system.vector(base + 0.1 * fields.sizes * _wave(system))
 
 
 def _changes(system: System) -> PETSc.Vec:

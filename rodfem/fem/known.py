@@ -22,21 +22,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 from numpy.polynomial import legendre
-from ufl.algorithms.map_integrands import map_integrand_dags
-from ufl.classes import PositiveRestricted
-from ufl.corealg.multifunction import MultiFunction
-from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem import compat
+from rodfem.expressions import Expr, MultiFunction, PositiveRestricted, map_integrand_dags, parts
 from rodfem.problem.table import Entry, Table
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
-    from rodfem.fem.parameters import Line
+    from rodfem.fem.state import Line
 
-POINTS = 3
-"""Points of the rule of a piece of a table beyond half the degree of the polynomials: exact for cubics times these."""
 PLACES, BEYOND = 50, 0.1
 """Places of an element at which a polynomial stays in the range of a table, and how far beyond a bound it may be."""
 UNSEEN = 1e-11
@@ -44,20 +39,12 @@ UNSEEN = 1e-11
 
 
 class Known:
-    """Tables of a scene as a dolfinx Function.
+    """Tables of a scene as a dolfinx Function, None if it has no table.
 
-    Attributes
-    ----------
-    function
-        All values, None where the scene has no table.
-    tables, paths
-        Tables along the rod; and paths, each with the name of its constant.
-    along
-        Values of the tables in each local cell, (cells, values), in the order in which a cell has them.
-    rows
-        For each path where its pieces begin, and their coefficients, (pieces, size).
-    lines
-        For each path its constant at zero load, and the slope in the load, (paths, 2).
+    ``along`` are values of the ``tables`` along the rod in each local cell, (cells, values), in the order in which a
+    cell has them.  Of each of the ``paths``, with the name of its constant, ``rows`` say where its pieces begin, and
+    have their coefficients, (pieces, size), and ``lines`` (paths, 2) its constant at zero load, and the slope in the
+    load.
     """
 
     name = "known"
@@ -132,7 +119,7 @@ class Known:
 
     def put(self, form: Any) -> Any:
         """Return a form, or an expression, with the function in the place of the entries of tables."""
-        if self.function is None or not isinstance(form, (ufl.Form, ufl.core.expr.Expr)):
+        if self.function is None or not isinstance(form, (ufl.Form, Expr)):
             return form
         return map_integrand_dags(_Put(self), form, compress=False)
 
@@ -147,7 +134,7 @@ class Known:
         values = self._values[place : place + size]
         if name == "s":
             return values[entry.number]
-        if any(isinstance(node, PositiveRestricted) for node in unique_pre_traversal(at)):
+        if any(isinstance(node, PositiveRestricted) for node in parts(at)):
             values = [value("+") for value in values]
         t, (a, b, c, d) = at - values[0], values[1 + entry.number :: m]
         return a + t * (b + t * (c + t * d))
@@ -176,7 +163,8 @@ def _bounded(table: Table, a: float, b: float, p: int) -> np.ndarray:
 def _moments(table: Table, a: float, b: float, p: int) -> tuple[np.ndarray, float]:
     """Legendre coefficients (p + 1, m) of a table on an element, and the integral of the square of what they miss."""
     ends = _knots(table, a, b)
-    x, w = legendre.leggauss(p // 2 + POINTS)
+    # exact for cubics times the polynomials
+    x, w = legendre.leggauss(p // 2 + 3)
     half = np.diff(ends)[:, None] / 2
     s, weights = (ends[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
     basis, values = legendre.legvander((2 * s - a - b) / (b - a), p), table.at(s)

@@ -50,12 +50,8 @@ REMEDY = "no error is estimated; use breaks=(...) where a function jumps or has 
 class Pieces:
     """Forms of some ``equations`` on their own cells, each cut into equal pieces: values are (pieces, cells, n).
 
-    Attributes
-    ----------
-    dofs, rows
-        Local degrees of freedom of each cell, (cells, n), and which of these n each field has.
-    points, number
-        Points of the rule of an element, and number of pieces that make a rule of :data:`POINTS`.
+    ``dofs`` (cells, n) are local degrees of freedom, and ``rows`` says which of these n each field has.  The rule of an
+    element has as many ``points``, and a ``number`` of pieces makes a rule of :data:`POINTS`.
     """
 
     def __init__(self, equations: Equations) -> None:
@@ -84,17 +80,13 @@ class Pieces:
         places = Places(every, np.zeros_like(every), np.broadcast_to(chosen, (len(every), 1, every.shape[1])))
         return self._assembled(form, values, pieces, places)
 
-    def integral(self, form: Assembler, values: np.ndarray, pieces: int) -> float:
-        """A functional on the cells of this rank."""
-        return float(self._assembled(form, values, pieces, None))
-
-    def _assembled(self, form: Assembler, values: np.ndarray, pieces: int, places: Places | None) -> np.ndarray:
+    def _assembled(self, form: Assembler, values: np.ndarray, pieces: int, places: Places) -> np.ndarray:
         bases, mine = self._bases(pieces), self._form(form, pieces)
         local = values @ bases.transpose(0, 2, 1)
-        out = np.zeros(1 if places is None else local.size)
+        out = np.zeros(local.size)
         mine.constants = form.constants
         mine.add(local.ravel(), places, out)
-        return out[0] if places is None else out.reshape(local.shape) @ bases
+        return np.asarray(out.reshape(local.shape) @ bases)
 
     def _assembler(self, form: Assembler, pieces: int) -> Assembler:
         return Assembler(form.form, self._cells(pieces), self.equations.known.cut(pieces), self._load, inside=True)

@@ -77,7 +77,18 @@ class Profile:
 
 
 class Resultants:
-    """Evaluates strains, contact force and moment of the states of one system; collective over its ranks."""
+    r"""Evaluates strains, contact force and moment of the states of one system; collective over its ranks.
+
+    Inside an element both follow from the density ``L(r, r', R, k, ...)`` of the Lagrangian of the rod and its
+    constraints, without loads::
+
+        n = dL/dr',        m_i = dL/dk_i.
+
+    Of a rod without constraints along it ``n`` is the multiplier of ``r' = R v``, and ``m_i = dW/dk_i``: see
+    :mod:`rodfem.forms.lagrangian`.  A constraint along the rod, or of an integral over it, adds its reactions: ``n``
+    and ``m`` are those of the balances of force and moment, not of the stored energy alone (Antman, Nonlinear Problems
+    of Elasticity, 2005, chapter 8).
+    """
 
     def __init__(self, shape: Shape) -> None:
         """Derive and compile them for the system of a ``shape``."""
@@ -173,7 +184,7 @@ class Resultants:
             if isinstance(part.of, Constraint) and part.s is None:
                 site, _ = e.site(part, f, (f, f), along)
                 density += sum(part.of.lagrangian(site))
-        force = ufl.as_vector(fields.formulation.contact_force(e, f, c))
+        force = ufl.as_vector(fields.formulation.contact_force(e))
         if "dr" in vars(along):
             force += ufl.diff(density, along.dr)
         force, moment = ufl.dot(ufl.transpose(along.R), force), ufl.diff(density, along.k)

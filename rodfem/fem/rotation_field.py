@@ -10,7 +10,7 @@ import numpy as np
 
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.quaternions import of_vector, product
-from rodfem.problem.start import PLACES
+from rodfem.problem.validation import PLACES
 
 Start = Callable[[np.ndarray], np.ndarray] | None
 TURN = 2 * np.pi

@@ -1,4 +1,4 @@
-"""The shape of a state: centreline, rotations, and all fields in natural order along the rod."""
+"""The shape of a state: centreline, rotations, all fields in natural order along the rod; resultants; link."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
+from rodfem.errors import InputError
+from rodfem.fem.state import LOAD, NodalValues
 from rodfem.fem.system import System
-from rodfem.fem.values import LOAD, NodalValues
 from rodfem.forms.kinematics import UNDEFORMED
-from rodfem.problem.quaternions import directors
+from rodfem.problem.quaternions import CONJUGATE, directors, product
+from rodfem.writhe import writhe
 
+WRITHE_TO = 1e-5
+"""Change with which a writhe is accepted."""
 INWARDS = 1e-9
 """Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
 
@@ -63,14 +67,8 @@ class Gauss:
 class Shape:
     """Evaluates shapes of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks.
 
-    Attributes
-    ----------
-    cells
-        Slice of the owned cells among the local ones.
-    s
-        Arclengths of their nodes from left to right, (cells, nodes).
-    order
-        Order of the nodes of an element from left to right, (nodes,).
+    ``cells`` are the owned ones among the local ones, ``s`` the arclengths of their nodes from left to right, (cells,
+    nodes), and ``order`` the order of the nodes of an element from left to right.
     """
 
     def __init__(self, system: System) -> None:
@@ -162,7 +160,7 @@ class Shape:
         b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, chord, strict=True)])
         x = (self.s - system.scene.interval[0])[..., None] / system.scene.length
         r = a + before + inside + x * (b - a - chord)
-        system.fields.formulation.store(self, out, c, r, (a, b))
+        system.fields.formulation.store(self, out, r - system.fields.lift(self.s, c), (a, b))
         return system.vector(out)
 
     def weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -262,3 +260,38 @@ class Shape:
 def unique(values: np.ndarray) -> np.ndarray:
     """Values at the nodes of a continuous field, (elements, nodes, ...) -> (m, ...)."""
     return np.concatenate([values[:, :-1].reshape(-1, values.shape[-1]), values[-1:, -1]])
+
+
+def twist(s: np.ndarray, q: np.ndarray) -> float:
+    """Twist ``1/(2 pi) int k3 ds`` of directors given by quaternions ``q`` (m, 4) at ascending ``s`` (m,)."""
+    from scipy.integrate import trapezoid
+    from scipy.interpolate import CubicSpline
+
+    unit = q / np.linalg.norm(q, axis=1, keepdims=True)
+    spline = CubicSpline(s, unit)
+    fine = np.linspace(s[0], s[-1], 8 * len(s) + 1)
+    p, d = spline(fine), spline(fine, 1)
+    k3 = 2 * product(p * CONJUGATE, d)[:, 3] / np.sum(p * p, axis=1)
+    return float(trapezoid(k3, fine)) / (2 * np.pi)
+
+
+def link(sample: dict[str, Any]) -> tuple[int, float, float]:
+    """Linking number, twist and writhe of a state of a closed rod, given by :meth:`~rodfem.fem.shape.Shape.sample`.
+
+    The linking number of the edge traced by a director with the centreline is ``Lk = Tw + Wr`` (Calugareanu 1959, White
+    1969), with the twist ``Tw = 1/(2 pi) int k3 ds`` and the writhe ``Wr`` of the centreline.  It is an integer, and
+    does not change while the rod is deformed without passing through itself: it belongs to the scene's start.
+
+    Raises :class:`InputError` if the sum of the last two is not near an integer: the rod is not closed, or touches
+    itself.
+    """
+    from scipy.interpolate import CubicSpline
+
+    s, closed = np.asarray(sample["s"]), np.array(sample["r"])
+    closed[-1] = closed[0]
+    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=WRITHE_TO)
+    Tw = twist(s, np.asarray(sample["q"]))
+    Lk = round(Tw + Wr)
+    if abs(Tw + Wr - Lk) > 0.05:
+        raise InputError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")
+    return Lk, Tw, Wr

@@ -1,4 +1,4 @@
-"""A state of a rod: its values, and the equations evaluated there.
+"""A state of a rod: its values by name, the parameters that its load stands for, and the equations evaluated there.
 
 A form is assembled for the values that are handed in (:mod:`rodfem.fem.assembly`).  What dolfinx evaluates itself,
 expressions and the matrices of several ranks, is compiled for one dolfinx Function, the *register*.  Only this module
@@ -7,9 +7,10 @@ writes there: an evaluation puts its own values there first, unless they are the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,29 +19,94 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.fem.assembly import Assembler, Places
-from rodfem.fem.values import NodalValues
 from rodfem.linalg.matrices import shared
+from rodfem.problem.local_state import Constants
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
-    from rodfem.fem.parameters import Line
+    from rodfem.fem.fields import Fields
     from rodfem.fem.symmetries import Phase
     from rodfem.fem.system import System
+    from rodfem.problem.scene import Scene
+
+
+LOAD = "load"
+"""Name of the load among the scalars."""
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Parameters ``origin + t direction``, (number of parameters,) each, where ``t`` is the unknown ``load``."""
+
+    scene: Scene
+    origin: np.ndarray
+    direction: np.ndarray
+
+    def constants(self, t: float) -> Constants:
+        """All parameters as numbers, at the middle of the rod."""
+        values = (self.origin + t * self.direction).tolist()
+        return Constants(s=sum(self.scene.interval) / 2, **dict(zip(self.scene.parameters, values, strict=True)))
+
+
+def line(scene: Scene, origin: Mapping[str, float], direction: Mapping[str, float]) -> Line:
+    """Line through ``origin``, with the scene's values where it has none, along the named parameters."""
+    start = [origin.get(name, p.value) for name, p in scene.parameters.items()]
+    return Line(scene, np.array(start), np.array([direction.get(name, 0.0) for name in scene.parameters]))
+
+
+def load_line(scene: Scene) -> Line:
+    """Line along which the scene's load varies and all else has the scene's values."""
+    return line(scene, {scene.load: 0.0}, {scene.load: 1.0})
+
+
+class NodalValues:
+    """Values of fields and scalars, of a state or of a change of one; they never change.
+
+    ``local`` has each local degree of freedom, clamped ones and ghosts included; ``line`` are the parameters that the
+    load stands for.
+    """
+
+    def __init__(self, fields: Fields, local: np.ndarray, line: Line) -> None:
+        """Own the array from now on."""
+        local.setflags(write=False)
+        self.fields, self.local, self.line = fields, local, line
+
+    def values(self, name: str) -> np.ndarray:
+        """Nodal values of a field in all local cells, ghosts last, (cells, nodes, components)."""
+        return self.local[self.fields.dofs[name]]
+
+    @property
+    def turned(self) -> np.ndarray:
+        """Nodal values of the field of the rotation, (cells, nodes, components)."""
+        return self.values(self.fields.turning.name)
+
+    @property
+    def load(self) -> float:
+        """Value of the scalar ``load``."""
+        return float(self.local[self.fields.copies[0, -1]])
+
+    @cached_property
+    def scalars(self) -> dict[str, float]:
+        """Values of the scalars by name, the load among them."""
+        return dict(zip(self.fields.scalars, self.local[self.fields.copies[0]].tolist(), strict=False))
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """Values of all fields and scalars by name: see :meth:`~rodfem.fem.fields.Fields.filled`."""
+        return {name: self.values(name) for name in self.fields.dofs} | self.scalars
+
+    def constants(self) -> Constants:
+        """Parameters as numbers, at the middle of the rod."""
+        return self.line.constants(self.load)
 
 
 class Energies(NamedTuple):
     """Energies of a state; those of the loads are nan where a load has no potential.
 
-    Attributes
-    ----------
-    energy
-        Stored energy ``int W ds`` of the rod.
-    potential
-        Total potential energy ``V``, of the rod, loads, springs and foundations: what is stationary at an equilibrium.
-    conjugate
-        ``-dV/dload`` at fixed state: what the load does work on, as the displacement of its point or the angle of its
-        end.  The distinguished ordinate of Maddocks, Arch. Ration. Mech. Anal. 99 (1987): along a branch
-        ``dV = -conjugate dload``.
+    ``energy`` is the stored one, ``int W ds``, and ``potential`` the total ``V``, of the rod, loads, springs and
+    foundations: what is stationary at an equilibrium.  ``conjugate`` is ``-dV/dload`` at fixed state: what the load
+    does work on, as the displacement of its point or the angle of its end.  The distinguished ordinate of Maddocks,
+    Arch. Ration. Mech. Anal. 99 (1987): along a branch ``dV = -conjugate dload``.
     """
 
     energy: float
@@ -114,12 +180,7 @@ class Evaluation(NodalValues):
 class State(Evaluation):
     """State of a :class:`~rodfem.fem.system.System`, whose borders and matrices it uses; collective over its ranks.
 
-    Attributes
-    ----------
-    drifts
-        Drift scalars, the same on all ranks.
-    phases
-        Its phase conditions, by the symmetries that are left out, as :meth:`System.set_phase` has found them.
+    ``drifts`` are its drift scalars, and ``phases`` its phase conditions by the symmetries that are left out.
     """
 
     def __init__(self, system: System, local: np.ndarray, drifts: np.ndarray, line: Line) -> None:

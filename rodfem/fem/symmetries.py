@@ -3,8 +3,7 @@ r"""The continuous symmetries of a scene: infinitesimal motions of its state, an
 A rigid motion of space or of the cross-sections changes each field and group of scalars by one of a few elementary
 generators ``g_j`` (:mod:`rodfem.forms.symmetry`), linear or constant in its values; the motion of a closed rod along
 itself changes each field by its derivative in arclength.  A symmetry is a combination of them that carries equilibria
-into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, :mod:`rodfem.fem.verification` verifies them at
-each state).
+into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, and verifies them at each state).
 
 The symmetries form a linear space.  Those combinations ``g`` of their generators that vanish at a reference state
 ``x0`` are its own symmetries and have no phase condition.  The others, orthonormal in the metric ``M``, have one each,
@@ -33,7 +32,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.fem.values import LOAD, NodalValues
+from rodfem.fem.state import LOAD, NodalValues
 from rodfem.forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.linalg.matrices import times
 from rodfem.problem.contribution import Motion
@@ -41,8 +40,7 @@ from rodfem.problem.scene import Scene
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
-    from rodfem.fem.parameters import Line
-    from rodfem.fem.state import State
+    from rodfem.fem.state import Line, State
     from rodfem.fem.system import System
 
 SYMMETRIC_STATE = 1e-4
@@ -51,14 +49,12 @@ SYMMETRIC_STATE = 1e-4
 Where symmetries are found an imperfection is round-off that is 1e-12 of the stiffest strain's terms: 1e-8 beside a
 twist 1e4 times as stiff as bending.  At a state that it moves by 1e-8/mu, the eigenvalue mu of that motion is not zero:
 it is counted as it is down to 1e-8/SYMMETRIC_STATE.  At states that it moves farther the symmetry is verified
-(:mod:`rodfem.fem.verification`) to the round-off of its eigenvalue, and dropped.
+to the round-off of its eigenvalue, and dropped.
 """
 NAMED = 1e-3
 """Weight of a part, relative to the greatest, above which it is named."""
 ALONG = 1e-5
 """As :data:`SYMMETRIC_STATE`, of the part of a ring's motion along itself that exact symmetries leave over."""
-MESH = 10.0
-"""Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
 SHARE = 0.3
 """Largest weight of a rigid motion of metric norm one in a drift's force, beside the symmetry of the same norm."""
 
@@ -311,13 +307,6 @@ class Generators:
             self._line, self._fixed = line, found[0]
         return None if self._varies else self._fixed
 
-    def in_unknowns(self) -> sp.csr_matrix:
-        """``A`` of all generators, one below the other, for vectors of the system on one rank."""
-        fields, n = self.system.fields, self.system.fields.unknowns
-        columns = fields.number[self._columns]
-        place = sp.csr_matrix((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))
-        return (self._forth @ place).tocsr()
-
     def _constant_at(self, line: Line, load: float) -> np.ndarray:
         fields = self.system.fields
         at_load = NodalValues(fields, fields.filled({LOAD: load}), line)
@@ -329,16 +318,10 @@ class Generators:
             return np.zeros((0, len(self._rows)))
         return times(self._forth, state.local[self._columns]).reshape(self.count, -1) + self._constant(state)
 
-    def linear(self, d: PETSc.Vec) -> np.ndarray:
-        """``A d`` of all generators for a change of state, (count, own rows)."""
-        return times(self._forth, self._gathered(d)).reshape(self.count, -1)
-
     def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
         """``A^t y`` of all generators, (count, own rows)."""
-        return times(self._back, self._gathered(covector)).reshape(self.count, -1)
-
-    def _gathered(self, vector: PETSc.Vec) -> np.ndarray:
-        return self.system.gathered(vector)[: len(self._columns)]
+        own = self.system.gathered(covector)[: len(self._columns)]
+        return times(self._back, own).reshape(self.count, -1)
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
         """Vector of the system with these own rows, without component along drifts."""
@@ -351,22 +334,9 @@ class Generators:
 class Phase:
     """Phase conditions of one reference state, by the number of their drift scalars.
 
-    Attributes
-    ----------
-    rows
-        ``M g`` of each active condition by its drift scalar, this rank's rows.
-    forces
-        What one of each drift scalar of an active condition adds to the equations, this rank's rows.
-    offsets
-        ``g . M x0`` for each drift scalar.
-    broken
-        Weights of the generators in each ``g``.
-    kept
-        Weights of those combinations that the reference has itself, a row each.
-    reference
-        ``x0``, None where no condition is active.
-    vector
-        Makes a vector of own rows.
+    ``rows`` are ``M g`` of each active condition, and ``forces`` what one of its drift scalar adds to the equations,
+    this rank's rows; ``offsets`` are ``g . M x0``.  ``broken`` has the weights of the generators in each ``g``,
+    ``kept`` those of combinations that the ``reference`` has itself.  ``vector`` makes a vector of own rows.
     """
 
     rows: dict[int, np.ndarray]
@@ -489,7 +459,7 @@ def _orthogonal(
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
         sizes.append(system.norm(system.generators.vector(rest @ state.generators)))
         combinations = np.vstack([combinations, rest])
-        least.append(max(MESH * mismatch(state), ALONG))
+        least.append(max(10.0 * mismatch(state), ALONG))
     return combinations, sizes, least
 
 

@@ -26,53 +26,26 @@ from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_
 from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import FEW, Discretization
-from rodfem.fem.invariance import find_motion_along, find_symmetries
-from rodfem.fem.parameters import Line
-from rodfem.fem.state import State
+from rodfem.fem.invariance import Verification, find_motion_along, find_symmetries
+from rodfem.fem.state import LOAD, Line, NodalValues, State
 from rodfem.fem.symmetries import DriftForces, Generators, Symmetry, capable, may_slide, no_phase, phase_at
-from rodfem.fem.values import LOAD, NodalValues
-from rodfem.fem.verification import Verification
-from rodfem.linalg.chain import Chain
+from rodfem.linalg.chain import Chain, factors_of
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
-from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
 
-FINE = 128
-"""Number of elements of a mesh on which a rod may move along itself as well as in truth."""
-RECENT = 4
-"""Number of states of up to FEW unknowns that are kept, of more one: a row is left for its neighbours and met again."""
-
 
 class System:
     """Residual, Jacobian and metric of a scene at a discretisation, and their borders.
 
-    Attributes
-    ----------
-    metric
-        Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
-    lu
-        LU factors of the last Jacobian that a :class:`~rodfem.fem.state.State` factored.
-    symmetries
-        Those found in the equations of the scene; the motion of a closed rod along itself comes last.
-    line
-        Parameters that the load of a state stands for where nothing else is said: the scene's load, unless a locus in
-        two parameters is followed.
-    generators
-        Changes of a state by the symmetries.
-    drift_forces
-        What is added to the forces of drift scalars of a rod that nothing holds, under loads without a potential.
-    verification
-        What verifies the symmetries at the states where the second variation is assembled.
-    compiled
-        Newton's method in compiled code with LU factors, None where PETSc makes them.
-    damping
-        Multiple of the metric added to every Jacobian.  Not zero where a state belongs to a family of equilibria at one
-        and the same load that no symmetry explains: the Jacobian is singular there, and Newton's method must not move
-        along the family.
+    ``symmetries`` are those found in the equations of the scene; the motion of a closed rod along itself comes last.
+    ``line`` has the parameters that the load of a state stands for if nothing else is said: the scene's load, unless a
+    locus in two parameters is followed.  ``damping`` is a multiple of the metric added to every Jacobian.  It is not
+    zero if a state belongs to a family of equilibria at one and the same load that no symmetry explains: the Jacobian
+    is singular there, and Newton's method must not move along the family.
     """
 
     def __init__(
@@ -101,7 +74,8 @@ class System:
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
         self._recent: list[tuple[bytes, State]] = []
-        self._kept = RECENT if self.fields.unknowns <= FEW else 1
+        # a row is left for its neighbours and met again
+        self._kept = 4 if self.fields.unknowns <= FEW else 1
         self._ordinary = scene.units.ordinary
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
         self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
@@ -129,7 +103,7 @@ class System:
         self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
-        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0}, sizes=self.natural_sizes)
+        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, self.natural_sizes)
         self.compiled = None
         if isinstance(self.lu, Chain) and CompiledNewton.serves(self.matrix, self.lu):
             self.compiled = CompiledNewton(self, self.matrix, self.lu)
@@ -147,7 +121,8 @@ class System:
         if not may_slide(scene):
             return found
         if not equations.uniform:
-            fine = replace(d, elements=FINE + len(scene.joints), degree=max(d.degree, 6))
+            # a rod moves along itself there as well as in truth
+            fine = replace(d, elements=128 + len(scene.joints), degree=max(d.degree, 6))
             equations = Equations.of(scene, fine, MPI.COMM_SELF)
         along = find_motion_along(equations)
         return found if along is None else [*found, along]

@@ -44,7 +44,7 @@ from rodfem.errors import POINTWISE, InputError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix
-from rodfem.problem.ring import CLOSING_MOMENT
+from rodfem.problem.end import CLOSING_MOMENT
 from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
 

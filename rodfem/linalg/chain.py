@@ -13,14 +13,17 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.linalg.compiled import buffer, module
-from rodfem.linalg.factorization import Mumps, Sizes
+from rodfem.linalg.factorization import Factors, Mumps, Sizes
 from rodfem.linalg.matrices import Entries
 
+CHAIN, MUMPS = "chain", "mumps"
+"""Names of what factors a rod's matrices."""
 LARGEST = 2000
 """Delayed pivots that a front may have: with more of them the matrix is no chain."""
 SINGULAR, TOO_LARGE = 1, 2
@@ -169,11 +172,6 @@ class Elimination:
         """Number of fronts."""
         return int(self.lib.chain_fronts(self._chain))
 
-    @property
-    def largest(self) -> int:
-        """Order of the largest front of the last factors."""
-        return int(self.lib.chain_largest(self._chain))
-
 
 class Chain:
     """:class:`~rodfem.linalg.factorization.Factors` of matrices with one pattern, on one rank.
@@ -235,3 +233,28 @@ class Chain:
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
         return (self.resort if self.resort and self.resorted else self.elimination).inertia()
+
+
+def package(prefix: str) -> str:
+    """Name of what factors a rod's matrices: PETSc's option with the prefix, or what is best.
+
+    Raises :class:`InputError` for another name.
+    """
+    best = MUMPS if np.issubdtype(PETSc.ScalarType, np.complexfloating) else CHAIN
+    name = str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
+    if name not in (CHAIN, MUMPS):
+        raise InputError(f"Nothing factors matrices by the name {name!r}: choose {CHAIN} or {MUMPS}.")
+    return name
+
+
+def factors_of(kind: str, comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
+    """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
+
+    Those of another matrix, of 0 unknowns, and on several ranks are MUMPS's, which is the last resort of the others.
+    ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.  ``sizes`` are those of the unknowns,
+    where they are not one.
+    """
+    mumps = Mumps(kind, sizes)
+    if not unknowns or package(mumps.prefix) == MUMPS or comm.size > 1:
+        return mumps
+    return Chain(kind, scalars, mumps, sizes)

@@ -13,8 +13,12 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import os
 import re
+import shlex
+import shutil
 import sys
+import sysconfig
 import tempfile
 from collections.abc import Hashable
 from functools import cache, partial
@@ -25,7 +29,6 @@ from typing import TYPE_CHECKING, Any
 from rodfem import code_cache
 from rodfem.code_cache import Job
 from rodfem.errors import SetupError
-from rodfem.linalg import compiler
 
 if TYPE_CHECKING:
     import numpy as np
@@ -146,7 +149,7 @@ def _found(name: str) -> Path | None:
 
 def _compile(name: str) -> Path:
     """Compile in a folder of its own; what is moved to the cache is whole, whoever else compiles it meanwhile."""
-    compiler.require()
+    require_compiler()
     folder = code_cache.folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -156,3 +159,42 @@ def _compile(name: str) -> Path:
     with room as inside:
         made = Path(builder(name).compile(tmpdir=inside))
         return made.replace(folder / made.name)
+
+
+OTHERS = ("cc", "gcc", "clang")
+"""Programs that serve if the compiler of this Python is not there."""
+NO_COMPILER = (
+    "There is no C compiler, which the equations of a rod are compiled with: install one with 'apt install gcc' (as "
+    "root), or with 'pip install \"rodfem[cc]\"' (ziglang, without root), or name yours in the variable CC."
+)
+
+NO_HEADERS = (
+    "This Python has no header files ({} is missing), which compiled code needs: install them with 'apt install "
+    "python3-dev' (as root), or use a Python that has them, as those of uv, pyenv and conda do."
+)
+
+
+def require_compiler() -> None:
+    """Have a C compiler for cffi and FFCx; raises :class:`SetupError` if there is none."""
+    if missing_compiler():
+        raise SetupError(missing_compiler())
+
+
+@cache
+def missing_compiler() -> str:
+    """Sentence on what lacks for compiling C; empty if nothing does.
+
+    The compiler is that of the variable CC, of this Python, another one on the path, or that of ziglang.
+    """
+    given = os.environ.get("CC") or sysconfig.get_config_var("CC") or OTHERS[0]
+    if shutil.which(shlex.split(given)[0]) is None:
+        if os.environ.get("CC"):
+            return f"There is no C compiler {given!r}, which the variable CC names: unset CC, or correct it."
+        command = next((name for name in OTHERS if shutil.which(name)), None)
+        if command is None and importlib.util.find_spec("ziglang"):
+            command = shlex.join([sys.executable, "-m", "ziglang", "cc"])
+        if command is None:
+            return NO_COMPILER
+        os.environ |= {"CC": command, "LDSHARED": f"{command} -shared"}
+    header = Path(sysconfig.get_path("include"), "Python.h")
+    return "" if header.is_file() else NO_HEADERS.format(header)

@@ -15,26 +15,28 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
+from rodfem.tolerances import TINY
 
 Sizes = Callable[[], PETSc.Vec]
 """Natural sizes of the unknowns of a matrix, asked for when it is factored."""
 PETSC_ERR_LIB = 76
 """PETSc's error code for a failure in a library below."""
+PIVOT = 1e-3
+"""Threshold of the pivots of LDL^t, relative to the largest entry of a column."""
 LONG = 20_000
 """Unknowns from which a rod on several ranks is long.
 
 The elimination tree that QAMD makes of a chain is as deep as the chain is long: MUMPS in parallel gains nothing on it,
 and at 1e5 elements its parallel analysis overflows its stack.
 """
-DENSE_ROWS = {"mat_mumps_icntl_7": 6}
-"""MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
-BALANCED = {"mat_mumps_icntl_7": 4}
-"""MUMPS's ordering that makes balanced trees (PORD), slowly: for long rods on several ranks."""
 
 
 def ordering(matrix: PETSc.Mat) -> dict[str, int]:
-    """MUMPS's ordering for a matrix on all its ranks."""
-    return BALANCED if matrix.comm.size > 1 and matrix.size[0] >= LONG else DENSE_ROWS
+    """MUMPS's ordering for a matrix on all its ranks, which PETSc takes from its options only.
+
+    QAMD (6) knows dense rows; PORD (4) makes balanced trees, slowly.
+    """
+    return {"mat_mumps_icntl_7": 4} if matrix.comm.size > 1 and matrix.size[0] >= LONG else {"mat_mumps_icntl_7": 6}
 
 
 @contextmanager
@@ -84,24 +86,14 @@ class Mumps:
     D`` that is factored, which has the same inertia.
     """
 
-    def __init__(
-        self,
-        kind: str,
-        controls: dict[int, int],
-        thresholds: dict[int, float] | None = None,
-        prefix: str = "",
-        sizes: Sizes | None = None,
-    ) -> None:
-        """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix.
+    def __init__(self, kind: str, sizes: Sizes | None = None) -> None:
+        """Keep the kind, ``lu`` or ``cholesky`` (LDL^t), for when there is a matrix.
 
-        ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``prefix`` that of PETSc's options, and ``sizes`` returns the
-        natural sizes of the unknowns when a matrix is factored; None where they are one.
+        ``sizes`` returns the natural sizes of the unknowns when a matrix is factored; None where they are one.
         """
-        self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
-        self.sizes = sizes
+        self.kind, self.sizes, self.prefix = kind, sizes, f"rodfem_{kind}_"
         self._scaled: PETSc.Mat | None = None
         self._scaled_from = 0
-        self.prefix = prefix or f"rodfem_{kind}_"
         self.room = 50
         self.ksp = PETSc.KSP()
         self.factor: PETSc.Mat | None = None
@@ -188,11 +180,11 @@ class Mumps:
         self.factor, self._matrix = pc.getFactorMatrix(), matrix.handle
         self.factor.setOptionsPrefix(self.prefix)  # made before PETSc's own set-up, it has none
         self.factor.setMumpsIcntl(14, self.room)
+        self.factor.setMumpsIcntl(8, 0)  # no scaling
         if self.kind == "cholesky":
             self.factor.setMumpsIcntl(13, 1)  # the root of the tree is on one rank, which counts
-        for control, value in self.controls.items():
-            self.factor.setMumpsIcntl(control, value)
-        for control, threshold in self.thresholds.items():
-            self.factor.setMumpsCntl(control, threshold)
+            self.factor.setMumpsIcntl(24, 1)  # MUMPS reports the inertia
+            self.factor.setMumpsCntl(3, -TINY)  # no pivot is taken for zero
+            self.factor.setMumpsCntl(1, PIVOT)
         with preferred(self.prefix, ordering(matrix)):
             self.ksp.setUp()

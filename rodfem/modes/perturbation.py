@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.shape import Shape
-from rodfem.fem.values import NodalValues
+from rodfem.fem.state import NodalValues
 from rodfem.problem.quaternions import CONJUGATE, directors, product
 
 

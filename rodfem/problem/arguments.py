@@ -1,28 +1,31 @@
-"""Checks of the arguments of public functions, declared once for each at its head.
+"""Checks of arguments: each returns the value to go on with, or raises one sentence with an example.
 
-:func:`checked` takes a check for each argument by name: a function of the argument's name and value that returns the
-value to go on with, or raises :class:`InputError` in one sentence that names the value, what was expected and an
-example.  A default is not checked.
+A check takes the argument's name and its value.  :func:`checked` declares those of a public function at its head; a
+dataclass calls them for its fields.  The sentences are :class:`InputError`; those on the functions of a scene, whose
+names are words (``force on the left end``), are :class:`SceneError`.
 
-These functions work in one thread at a time, as neither PETSc nor FFCx can be used by two: others wait.
+Public functions work in one thread at a time, as neither PETSc nor FFCx can be used by two: others wait.
 """
 
 from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import fields, is_dataclass
 from functools import wraps
-from math import isfinite
+from math import isfinite, nan
+from numbers import Integral, Real
 from pathlib import Path
 from reprlib import Repr
 from threading import RLock
 from typing import Any, ParamSpec, TypeVar
 
-from rodfem.errors import InputError
-from rodfem.problem import kinds
-from rodfem.problem.kinds import finite, reals, whole
+import numpy as np
+import ufl
+
+from rodfem.errors import InputError, SceneError
+from rodfem.expressions import Condition, Expr
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -31,12 +34,73 @@ ONE_THREAD = RLock()
 """Held while a public function works."""
 SHORT = Repr()
 SHORT.maxother = SHORT.maxstring = 60
+UNORDERED = str, bytes, Set, Mapping
+"""Kinds that can be iterated over and are no lists of numbers."""
+
+
+def whole(name: str, value: Any, example: int) -> int:
+    """Return ``value`` as an int; raises :class:`InputError` unless it is a whole number (no bool, no float)."""
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        raise InputError(f"{name} is {value!r}: give a whole number, as in {name}={example}.")
+    return int(value)
+
+
+def real(name: str, value: Any, example: float) -> float:
+    """Return ``value`` as a float; raises :class:`InputError` unless it is a number (no bool, no string)."""
+    if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} is {value!r}: give a number, as in {name}={example:g}.")
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(f"{name} is an integer too large for a float: give a smaller one.") from None
+
+
+def finite(name: str, value: Any, example: float) -> float:
+    """Return ``value`` as a float; raises :class:`InputError` unless it is a finite number."""
+    value = real(name, value, example)
+    if not isfinite(value):
+        raise InputError(f"{name} is {value:g}: give a finite number, as in {name}={example:g}.")
+    return float(value)
+
+
+def reals(name: str, values: Any, example: tuple[float, ...], size: int | None = None) -> tuple[float, ...]:
+    """Return ``values`` as a tuple of floats; raises :class:`InputError` unless they are ``size`` (any) numbers.
+
+    ``name`` and ``example`` are for the sentence of the error.
+    """
+    listed = isinstance(values, Iterable) and not isinstance(values, UNORDERED)
+    given = tuple(values) if listed else None
+    if given is None or (size is not None and len(given) != size):
+        raise InputError(f"{name} is {values!r}: give {size or 'a tuple of'} numbers, as in {name}={example}.")
+    return tuple(real(f"{name}[{i}]", value, example[0]) for i, value in enumerate(given))
+
+
+def yes_or_no(name: str, value: Any) -> bool:
+    """Return ``value``; raises :class:`InputError` unless it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} is {value!r}: give True or False.")
+    return bool(value)
+
+
+def takes(function: Any, arguments: int) -> bool:
+    """Whether this is a function of so many arguments."""
+    try:
+        inspect.signature(function).bind(*range(arguments))
+    except (TypeError, ValueError):  # no function, another number of arguments, or a class without a signature
+        return False
+    return True
+
+
+def encodes(name: str) -> bool:
+    """Whether a name can be that of a file: no zero byte, no half of a surrogate pair."""
+    return "\0" not in name and not any("\ud800" <= c <= "\udc7f" for c in name)
 
 
 def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Decorator of a function whose arguments are checked, and converted, before anything else is done.
 
-    The function raises :class:`TypeError`, with the names of its arguments, where one is missing or is none of them.
+    A default is not checked.  The function raises :class:`TypeError`, with the names of its arguments, if one is
+    missing or unknown.
     """
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
@@ -63,13 +127,11 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
 
 
 def _belongs(named: Iterable[str], checks: dict[str, Check]) -> str:
-    """Say which of the last arguments is of a dataclass that has one of some names as a field; empty where none is."""
+    """Say which of the last arguments is of a dataclass that has one of some names as a field; empty if none is."""
+    kinds = {argument: getattr(check, "kind", None) for argument, check in reversed(checks.items())}
     for name in named:
-        for argument, check in reversed(checks.items()):
-            kind = getattr(check, "kind", None)
-            if not isinstance(kind, type) or not is_dataclass(kind) or name in checks:
-                continue
-            if name in {f.name for f in fields(kind)}:
+        for argument, kind in kinds.items():
+            if isinstance(kind, type) and is_dataclass(kind) and name in {f.name for f in fields(kind)} - checks.keys():
                 return f"; give {argument}={kind.__name__}({name}=...)"
     return ""
 
@@ -86,25 +148,26 @@ def a(kind: type | tuple[type, ...], example: str) -> Check:
     return check
 
 
+def text(example: str) -> Check:
+    """Check for a string."""
+    return a(str, f"a text, as in {example!r}")
+
+
 def count(example: int, least: int = 0) -> Check:
     """Check for a whole number, ``least`` or more; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> int:
-        number = whole(name, value, example)
-        if number < least:
-            raise InputError(f"{name} is {number}: give {least} or more, as in {name}={example}.")
-        return number
+        value = whole(name, value, example)
+        if value < least:
+            raise InputError(f"{name} is {value}: give {least} or more, as in {name}={example}.")
+        return int(value)
 
     return check
 
 
 def number(example: float) -> Check:
-    """Check for a finite real number; raises :class:`InputError` for anything else."""
-
-    def check(name: str, value: Any) -> float:
-        return finite(name, value, example)
-
-    return check
+    """Check for a finite real number."""
+    return lambda name, value: finite(name, value, example)
 
 
 def interval(low: float, high: float) -> Check:
@@ -141,21 +204,53 @@ def path(example: str) -> Check:
     return check
 
 
-def encodes(name: str) -> bool:
-    """Whether a name can be that of a file: no zero byte, no half of a surrogate pair."""
-    return "\0" not in name and not any("\ud800" <= c <= "\udc7f" for c in name)
-
-
-def text(example: str) -> Check:
-    """Check for a string."""
-    return a(str, f"a text, as in {example!r}")
-
-
 def function(example: str, arguments: int = 1) -> Check:
     """Check for a function of so many arguments; raises :class:`InputError` for anything else."""
-    return lambda name, value: kinds.function(name, value, arguments, example)
+
+    def check(name: str, value: Any) -> Any:
+        if not takes(value, arguments):
+            raise InputError(
+                f"{name} is {value!r}: give a function of {arguments} argument(s), as in {name}={example}."
+            )
+        return value
+
+    return check
 
 
-def yes_or_no(name: str, value: Any) -> bool:
-    """Check for True or False; raises :class:`InputError` for anything else."""
-    return kinds.flag(name, value)
+def check_vector(what: str, values: Any, size: int) -> None:
+    """Raise :class:`SceneError` unless ``values`` has ``size`` components."""
+    if isinstance(values, UNORDERED):
+        raise SceneError(f"The {what} is {values!r}: give {size} components in a tuple.")
+    try:
+        given = len(values)
+    except TypeError:
+        raise SceneError(f"The {what} is a single value: give {size} components.") from None
+    if given != size:
+        raise SceneError(f"The {what} has {given} components: give {size}.")
+
+
+def check_scalar(what: str, value: Any) -> None:
+    """Raise :class:`SceneError` unless ``value`` is a scalar, a number or an expression."""
+    try:
+        shape = ufl.as_ufl(value).ufl_shape
+    except Exception:  # of UFL's own, which differ from release to release
+        raise SceneError(f"The {what} is {value!r}: return a number or a UFL expression.") from None
+    if shape != ():
+        raise SceneError(f"The {what} has the shape {shape}: return a scalar.")
+    if isinstance(value, (bool, np.bool_, Condition)):
+        raise SceneError(f"The {what} is true or false, {value}: return a number, or ufl.conditional(...).")
+
+
+def plain(value: Any) -> float:
+    """Return a number, or a constant expression, as a float; raises :class:`TypeError` for anything else."""
+    if isinstance(value, (str, bytes, bool, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim):
+        raise TypeError(f"{value!r} is no number")
+    return float(value)
+
+
+def number_of(value: Any) -> float:
+    """Number that an expression without unknowns stands for; nan if it has none, or a complex one."""
+    try:
+        return plain(value(()) if isinstance(value, Expr) else value)
+    except Exception:  # of UFL's own, too, which differ from release to release
+        return nan

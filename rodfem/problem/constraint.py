@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rodfem.problem.arguments import finite, yes_or_no
 from rodfem.problem.contribution import Block, Contribution, Group, Motion, Site, Unknown
-from rodfem.problem.kinds import flag
 from rodfem.problem.roles import Role, role_field
 
 if TYPE_CHECKING:
-    from rodfem.problem.local_state import Constants, OfPlace, Place
+    from rodfem.problem.local_state import Constants, Given, OfPlace, Place
 
 MULTIPLIERS = Group("g", "multipliers of constraints", "constraint {} of the scene", Motion.MIXED)
 
@@ -32,6 +32,11 @@ class Constraint(Contribution):
     whole: ClassVar[bool] = False
     """Whether it is one of the whole rod, by an integral."""
 
+    def __post_init__(self) -> None:
+        """Check the place; raises :class:`InputError`."""
+        if self.s is not None:
+            finite("s", self.s, 0.5)
+
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """One scalar multiplier."""
         return [Unknown(MULTIPLIERS, number)]
@@ -49,9 +54,7 @@ class Constraint(Contribution):
 class Integral(Constraint):
     """An integral over the rod that ``equals(c)``, which is spread over the rod."""
 
-    equals: Callable[[Constants], Any] = role_field(
-        Role("value of an integral constraint", "f(c)", 0, placed=False), lambda c: 0.0
-    )
+    equals: Given = role_field(Role("value of an integral constraint", "f(c)", 0, placed=False), lambda c: 0.0)
     words = "integral constraint"
     whole = True
 
@@ -77,7 +80,7 @@ class Everywhere(Constraint):
         return [Block(f"{self.letter}{number}", 1, degree if self.nodal else degree - 1, self.nodal, True, True)]
 
 
-def integral(of: OfPlace, equals: Callable[[Constants], Any] = lambda c: 0.0) -> Constraint:
+def integral(of: OfPlace, equals: Given = 0.0) -> Constraint:
     """Constrain ``int of(x, c) ds = equals(c)``: a total twist, say.  The multiplier is one scalar."""
     return Integral(of, equals=equals)
 
@@ -89,4 +92,4 @@ def at(s: float, of: OfPlace) -> Constraint:
 
 def everywhere(of: OfPlace, *, strain: bool) -> Constraint:
     """Constrain ``of(x, c) = 0`` all along the rod; ``strain`` says whether it is one of strains or of positions."""
-    return Everywhere(of, nodal=not flag("strain", strain))
+    return Everywhere(of, nodal=not yes_or_no("strain", strain))

@@ -1,4 +1,4 @@
-"""Contributions of a part of a scene to its problem: scalar unknowns, terms of the Lagrangian, virtual work.
+"""Contributions of a part of a scene to its problem: scalar unknowns, loads, terms of the Lagrangian, virtual work.
 
 An end, an attachment, a constraint, and the scene itself with what acts along the rod, are each a
 :class:`Contribution`.  Unknowns, equations, words and checks of a discretised scene are those of its contributions.
@@ -11,10 +11,13 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Any
 
-from rodfem.problem.roles import functions_of
+from rodfem.errors import InputError
+from rodfem.forms import inertia, loads
+from rodfem.problem.arguments import finite
+from rodfem.problem.roles import Role, functions_of, role_field
 
 if TYPE_CHECKING:
-    from rodfem.problem.local_state import Constants, Place
+    from rodfem.problem.local_state import Constants, Given, OfPlace, Place
 
 Direction = tuple[float, ...]
 UNIT: tuple[Direction, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -35,22 +38,11 @@ class Motion(Enum):
 
 @dataclass(frozen=True)
 class Group:
-    """Scalar unknowns that belong together, multipliers unless they are positions.
+    """Scalar unknowns that belong together, multipliers unless they are positions; that of component 0 is ``name1``.
 
-    Attributes
-    ----------
-    name
-        Beginning of their names: that of component 0 is ``name1``.
-    words
-        What they are, for the terminal.
-    equation
-        What the equation of a multiplier states, with ``{}`` for its number; empty for positions, which are none.
-    motion
-        What rigid motions do to them.
-    known
-        ``known(c)``, values (3,) of the components of a vector that are no unknowns, None elsewhere.
-    moment
-        Whether a multiplier is a moment, not a force.
+    ``name`` begins their names, and ``words`` are for the terminal.  ``equation`` is what that of a multiplier states,
+    with ``{}`` for its number; positions have none. ``motion`` is what rigid motions do to them.  ``known(c)`` (3,) has
+    the components of a vector that are no unknowns, ``moment`` says whether a multiplier is a moment.
     """
 
     name: str
@@ -99,22 +91,10 @@ class Block:
 class Site:
     """Expressions of the state where a contribution is, of which it makes its terms.
 
-    Attributes
-    ----------
-    x, c
-        Place and constants, as functions ``f(x, c)`` receive them.
-    y
-        Values of the contribution's own unknowns, in their order.
-    turned
-        Field of the rotation: quaternion (4,), or the angle of a planar rod.
-    normal
-        Component across the plane of a planar rod, None in space.
-    free
-        Components of the position that move.
-    first, second
-        Variations with ``r`` (3,), None without a centreline, and ``q`` (4,).
-    whole
-        Of a closed planar rod the angle by which it turns in all, else None.
+    Functions ``f(x, c)`` receive the place ``x`` and the constants ``c``; ``y`` are the contribution's own unknowns.
+    ``turned`` is the field of the rotation, quaternion (4,) or angle, ``normal`` the component across the plane of a
+    planar rod, ``free`` are components of the position that move.  ``first`` and ``second`` are variations with ``r``
+    (3,), if there is a centreline, and ``q`` (4,).  ``whole`` is the angle by which a closed planar rod turns in all.
     """
 
     x: Place
@@ -128,8 +108,50 @@ class Site:
     whole: Any = None
 
 
+Term = Callable[[Site, Any], Any]
+
+
+@dataclass(frozen=True)
+class Load:
+    """A kind of load: its ``potential`` in space, that ``in_plane`` if it is another, or else its virtual ``work``.
+
+    A ``moment`` of a planar rod is about the normal, a force in the plane.
+    """
+
+    potential: Term | None = None
+    in_plane: Term | None = None
+    work: Term = lambda at, value: 0
+    moment: bool = False
+
+    def potential_in(self, *, planar: bool) -> Term | None:
+        """Potential of a planar rod, or of one in space, None where there is none."""
+        return (planar and self.in_plane) or self.potential
+
+
+def _felt(at: Site, force: Any) -> Any:
+    """Potential of a dead force in the free directions; None where it is the contact force of the reduced rod."""
+    return -sum(force[i] * at.x.r[i] for i in at.free) if "r" in vars(at.x) and at.free else None
+
+
+def _about_normal(at: Site, moment: Any) -> Any:
+    """Minus moment times angle: in a plane all moments are about its normal."""
+    return -moment[at.normal] * at.turned
+
+
+POTENTIAL = Load(lambda at, value: value)
+DEAD = Load(lambda at, force: loads.dead(at.x.r, force))
+DEAD_AT_END = Load(_felt)
+FOLLOWER = Load(work=lambda at, force: loads.follower_work(at.x.R, force, at.first.r))
+MOMENT = Load(
+    in_plane=_about_normal, work=lambda at, moment: loads.moment_work(at.x.q, moment, at.first.q), moment=True
+)
+FOLLOWER_MOMENT = Load(
+    in_plane=_about_normal, work=lambda at, moment: loads.follower_moment_work(at.x.q, moment, at.first.q), moment=True
+)
+
+
 class Contribution:
-    """Part of a scene; one without unknowns contributes its loads (:mod:`rodfem.problem.load`), and nothing else."""
+    """Part of a scene; one without unknowns contributes its loads, and nothing else."""
 
     nodal = False
     """Whether its terms along the rod are collocated at nodes."""
@@ -163,3 +185,35 @@ class Contribution:
     def kinetic(self, at: Site) -> Iterator[Any]:
         """Terms of the kinetic metric."""
         return iter(())
+
+
+@dataclass(frozen=True)
+class Attachment(Contribution):
+    """Something attached at arclength ``s``.
+
+    A dead ``force(c)``, a ``follower(c)`` force by its components along the directors, a potential ``energy(x, c)`` (a
+    spring), a ``mass(c)``, a ``rotary_inertia(c)`` (3,) about the directors; or constants.
+    """
+
+    s: float
+    force: Given = role_field(Role("force of an attachment", "f(c)", 3, load=DEAD))
+    follower: Given = role_field(lambda x: Role(f"follower force at s = {x.s:g}", "f(c)", 3, load=FOLLOWER))
+    energy: OfPlace | None = role_field(Role("energy of an attachment", "f(x, c)", 0, load=POTENTIAL))
+    mass: Given = role_field(Role("mass of an attachment", "f(c)", 0))
+    rotary_inertia: Given = role_field(Role("rotary inertia of an attachment", "f(c)", 3))
+
+    def __post_init__(self) -> None:
+        """Check the place, and that there is something; raises :class:`InputError`."""
+        finite("s", self.s, 0.5)
+        if all(value is None for name, value in vars(self).items() if name != "s"):
+            raise InputError(
+                f"Nothing is attached at s = {self.s:g}: give the attachment a force, a follower force, an energy, a "
+                f"mass or a rotary inertia; a joint of two elements is breaks=({self.s:g},)."
+            )
+
+    def kinetic(self, at: Site) -> Iterator[Any]:
+        """Mass, where there is a centreline, and rotary inertia."""
+        if self.mass is not None and at.first.r is not None:
+            yield inertia.translational(at.first.r, at.second.r, self.mass(at.c))
+        if self.rotary_inertia is not None:
+            yield inertia.rotary(at.x.q, at.first.q, at.second.q, tuple(self.rotary_inertia(at.c)))

@@ -1,7 +1,8 @@
 """Supports and loads of a rod: its ends, attachments along it, and constraints.
 
 Everything here is plain immutable data.  Functions of the named constants ``c`` return expressions that work on UFL and
-on numbers alike; functions ``f(x, c)`` of a *place* receive the state of the rod there:
+on numbers alike, and a constant may stand in the place of one.  Functions ``f(x, c)`` of a *place* receive the state of
+the rod there:
 
 * ``x.r`` (3,) the centreline, ``x.q`` (4,) the quaternion, ``x.R`` (3, 3) the rotation, ``x.d1, x.d2, x.d3`` (3,) the
   directors, ``x.s`` the arclength;
@@ -12,19 +13,19 @@ They return UFL scalars (see :mod:`rodfem.forms.loads` for a stock of them).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from rodfem.errors import InputError
+import numpy as np
+
+from rodfem.errors import InputError, SceneError
 from rodfem.forms import loads
 from rodfem.forms.rotation import IDENTITY
-from rodfem.problem.attachment import Attachment
+from rodfem.problem.arguments import reals
 from rodfem.problem.constraint import Constraint, Integral, at, everywhere, integral
-from rodfem.problem.end import End
-from rodfem.problem.kinds import function, reals
-from rodfem.problem.local_state import Constants, OfConstants, OfPlace, Place, Quaternion
-from rodfem.problem.ring import Ring
-from rodfem.problem.sliding_hinge import SlidingHinge, sliding_hinge
+from rodfem.problem.contribution import Attachment
+from rodfem.problem.end import End, Ring, SlidingHinge
+from rodfem.problem.local_state import Constants, Given, OfPlace, Place, Quaternion
+from rodfem.tolerances import NEGLIGIBLE
 
 __all__ = [
     "Attachment",
@@ -47,16 +48,16 @@ __all__ = [
 ]
 
 
-def clamped(position: OfConstants = lambda c: (0.0, 0.0, 0.0), rotation: Quaternion | OfConstants = IDENTITY) -> End:
-    """Return an end whose position and directors are given, both as functions of the constants if wanted."""
+def clamped(position: Given = (0.0, 0.0, 0.0), rotation: Given = IDENTITY) -> End:
+    """Return an end whose position (3,) and directors are given, both as functions of the constants if wanted."""
     return End(position=position, rotation=rotation)
 
 
 def pinned(
-    position: OfConstants = lambda c: (0.0, 0.0, 0.0),
-    force: OfConstants | None = None,
-    moment: OfConstants | None = None,
-    follower_moment: OfConstants | None = None,
+    position: Given = (0.0, 0.0, 0.0),
+    force: Given = None,
+    moment: Given = None,
+    follower_moment: Given = None,
 ) -> End:
     """Return an end whose position is given and whose directors turn freely.
 
@@ -67,18 +68,16 @@ def pinned(
     return End(position=position, force=force, moment=moment, follower_moment=follower_moment)
 
 
-def sliding(
-    position: OfConstants, rotation: Quaternion | OfConstants = IDENTITY, force: OfConstants | None = None
-) -> End:
+def sliding(position: Given, rotation: Given = IDENTITY, force: Given = None) -> End:
     """Return an end whose directors are held, and that moves freely where ``position(c)`` says None."""
     return End(position=position, rotation=rotation, force=force)
 
 
 def hinged(
     axis: tuple[float, float, float],
-    position: OfConstants = lambda c: (0.0, 0.0, 0.0),
-    rotation: Quaternion | OfConstants = IDENTITY,
-    force: OfConstants | None = None,
+    position: Given = (0.0, 0.0, 0.0),
+    rotation: Given = IDENTITY,
+    force: Given = None,
 ) -> End:
     """Return an end that turns freely about one ``axis`` only, given along the directors of ``rotation``.
 
@@ -88,12 +87,36 @@ def hinged(
     return End(position=position, rotation=rotation, hinge=axis, force=force)
 
 
+def sliding_hinge(
+    axis: tuple[float, float, float],
+    along: tuple[float, float, float],
+    position: Given = (0.0, 0.0, 0.0),
+    rotation: Given = IDENTITY,
+    force: Given = None,
+) -> SlidingHinge:
+    """Return an end that turns about one ``axis`` only, and slides along a direction of space.
+
+    ``axis`` is given along the directors of ``rotation``, ``along`` in space, any vector but zero; ``position`` (3,) is
+    a point of the guide, ``force`` a dead force along it.  Raises :class:`SceneError` for a direction that is none.
+    """
+    direction = np.array(reals("along", along, (0.6, 0.0, 0.8), 3))
+    largest = abs(direction).max()
+    if not 0 < largest < np.inf:
+        what = "zero" if largest == 0 else f"{tuple(direction.tolist())}"
+        raise SceneError(f"The direction in which a hinge slides is {what}: give one, as in along=(0.6, 0.0, 0.8).")
+    direction = direction / largest
+    direction /= np.linalg.norm(direction)
+    unit = tuple(np.where(abs(direction) > NEGLIGIBLE, direction, 0.0).tolist())
+    push = force if force is None else lambda c: tuple(t * value_of(force, c) for t in unit)
+    return SlidingHinge(position, rotation, push, hinge=axis, along=unit)
+
+
 def free(
-    force: OfConstants | None = None,
-    follower: OfConstants | None = None,
+    force: Given = None,
+    follower: Given = None,
     energy: OfPlace | None = None,
-    moment: OfConstants | None = None,
-    follower_moment: OfConstants | None = None,
+    moment: Given = None,
+    follower_moment: Given = None,
 ) -> End:
     """Return an end without support, loaded by forces, a potential energy, moments, or nothing.
 
@@ -104,11 +127,11 @@ def free(
 
 
 def elastic(
-    translation: Callable[[Constants], Any] | None = None,
-    rotation: Callable[[Constants], Any] | None = None,
+    translation: Given = None,
+    rotation: Given = None,
     anchor: tuple[float, float, float] = (0.0, 0.0, 0.0),
     directors: Quaternion = IDENTITY,
-    force: OfConstants | None = None,
+    force: Given = None,
 ) -> End:
     """Return an end held by springs: stiffness in translation and in rotation, each one number or three.
 
@@ -120,16 +143,15 @@ def elastic(
     (3,) is a dead force.  Raises :class:`InputError` for an anchor or directors that are none, and the scene refuses a
     number below zero: what pushes away is no spring, but an ``energy``.
     """
-    for name, given in (("translation", translation), ("rotation", rotation)):
-        if given is not None:
-            function(name, given, 1, "lambda c: 1.0")
     reals("anchor", anchor, (0.0, 0.0, 1.0), 3)
     if not any(reals("directors", directors, IDENTITY, 4)):
         raise InputError("The directors of an elastic end are the zero quaternion: give one of unit norm.")
 
     def energy(x: Place, c: Constants) -> Any:
-        out = 0 if translation is None else loads.spring(x.r, _held_by(translation(c)), anchor)
-        return out + (0 if rotation is None else loads.rotational_spring(x.q, _held_by(rotation(c)), directors))
+        out = 0 if translation is None else loads.spring(x.r, _held_by(value_of(translation, c)), anchor)
+        return out + (
+            0 if rotation is None else loads.rotational_spring(x.q, _held_by(value_of(rotation, c)), directors)
+        )
 
     return End(energy=energy, force=force)
 
@@ -140,3 +162,8 @@ def _held_by(stiffness: Any) -> Any:
         if isinstance(k, int | float) and k < 0:
             raise ValueError(f"a stiffness of {k:g} pushes away: give zero or more, or End(energy=...)")
     return stiffness
+
+
+def value_of(given: Any, c: Constants) -> Any:
+    """Value of a function of the constants, or of a constant in the place of one."""
+    return given(c) if callable(given) else given

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from math import sqrt
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import ufl
 
@@ -43,10 +43,6 @@ class Constants(SimpleNamespace):
             f"{', '.join([*known, 'c.s (the arclength)'])}."
         )
 
-    def __getitem__(self, name: object) -> Any:
-        """Say how a constant is written."""
-        raise UnnamedError(f"asks for c[{name!r}]: constants are attributes, write c.{str(name).strip()}.")
-
 
 def watched(c: Constants) -> tuple[Constants, set[str]]:
     """Return the same constants, and the set of names that they will have been asked for."""
@@ -63,6 +59,8 @@ def watched(c: Constants) -> tuple[Constants, set[str]]:
 Place = SimpleNamespace
 Vector = Sequence[Any]
 OfConstants = Callable[[Constants], Vector]
+Given: TypeAlias = Any
+"""A function of the constants ``c``, or a constant in the place of one; None if there is none."""
 OfPlace = Callable[[Place, Constants], Any]
 Quaternion = tuple[float, float, float, float]
 
@@ -104,22 +102,22 @@ def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
 
 def needs_centreline(scene: Scene) -> str:
     """Say what in a scene needs the centreline as a field, in words; empty where nothing does."""
-    if not scene.conservative:
-        return "the mass of a rod under a load without potential"
-    if scene.distributed is not None:
-        return "a distributed force"
     c, inner = scene.constants(), scene.is_inside
-    if any(inner(x.s) and (x.force or x.mass) for x in scene.attachments):
-        return "what is attached along the rod"
-    if scene.inertia.rho_A(c) != 0:
-        return "the mass of the rod"
-    if floats(scene) and not all(scene.plain):
-        return "a rod that nothing holds, with more than dead forces at its ends,"
-    functions = [("the potential along the rod", scene.potential)] if scene.potential else []
-    functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
-    functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and inner(x.s)]
+    attached = [x for x in scene.attachments if inner(x.s)]
+    for what, needs in (
+        ("the mass of a rod under a load without potential", not scene.conservative),
+        ("a distributed force", scene.distributed is not None),
+        ("what is attached along the rod", any(x.force or x.mass for x in attached)),
+        ("the mass of the rod", scene.inertia.rho_A(c) != 0),
+        ("a rod that nothing holds, with more than dead forces at its ends,", floats(scene) and not all(scene.plain)),
+    ):
+        if needs:
+            return what
+    functions = [("the potential along the rod", scene.potential)]
+    functions += [("the ordinate", None if scene.ordinate.places else scene.ordinate.of)]
+    functions += [("what is attached along the rod", x.energy) for x in attached]
     functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or inner(x.s)]
-    return next((what for what, function in functions if asks_where(function, c)), "")
+    return next((what for what, function in functions if function and asks_where(function, c)), "")
 
 
 def floats(scene: Scene) -> bool:
@@ -173,24 +171,25 @@ def some_places(
 
 
 def _places(length: float, state: int, s: float, wrap: Callable[[Any], Any] = lambda x: x) -> tuple[Place, Place]:
-    units = (1.0, length, 1.0, 1.0 / length)
-    numbers = ([float(unit * x) for x in values] for unit, values in zip(units, STATES[state], strict=True))
-    q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
-    R = rotation(q)
-    return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+    return places_at(length, s, STATES[state], wrap)
 
 
 _known_places = lru_cache(maxsize=64)(_places)
 """The same, made once: each check of a scene asks for these places."""
 
 
-def trials(scene: Scene, function: OfConstants) -> Iterator[Constants]:
-    """Constants at which a function of them is tried: at the loads, and at the arclengths, if it asks for them."""
-    c, asked = watched(scene.constants())
-    function(c)
-    places = scene.samples() if "s" in asked else [None]
-    for load in scene.loads() if scene.load in asked else [None]:
-        yield from (scene.constants(load, s) for s in places)
+def places_at(
+    length: float, s: float, state: Sequence[Any], wrap: Callable[[Any], Any] = lambda x: x
+) -> tuple[Place, Place]:
+    """Return a point and a place along the rod of a ``length``, in a ``state`` given as :data:`STATES` are.
+
+    ``s`` is the arclength; vectors pass through ``wrap``.
+    """
+    units = (1.0, length, 1.0, 1.0 / length)
+    numbers = ([float(unit * x) for x in values] for unit, values in zip(units, state, strict=True))
+    q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
+    R = rotation(q)
+    return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
 
 
 def asked_for(scene: Scene, c: Constants | None = None) -> set[str]:

@@ -10,16 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from difflib import get_close_matches
 from functools import wraps
 from logging import getLogger
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rodfem.errors import SceneError
 
 if TYPE_CHECKING:
-    from rodfem.problem.load import Load
+    from rodfem.problem.contribution import Load
 
 T = TypeVar("T")
 Conversion = Callable[[Any], Any]
@@ -49,26 +47,11 @@ class UnnamedError(SceneError):
 class Role:
     """Purpose of a function of a scene.
 
-    Attributes
-    ----------
-    words
-        Its name in a sentence, with ``{}`` for where it is: ``force on the {} end``.
-    call
-        How it is called: ``f(c)`` of the constants, ``f(x, c)`` of a place, or another.
-    size
-        Number of components that it returns, 0 for a scalar, None where that is checked elsewhere.
-    along
-        Whether its place is the whole rod; of a function of the constants, whether it is one of the arclength.
-    or_value
-        Whether a constant value may stand in its place.
-    load
-        Kind of load that it is, None where it is none.
-    hint, returns
-        How it is to be written, for where it fails; what converts the value that it returns.
-    gaps
-        Whether a component may be None.
-    placed
-        Whether the constants that it is given have the arclength; those of an end, or of all of the rod, have none.
+    ``words`` have ``{}`` for where it is: ``force on the {} end``; ``call`` is ``f(c)`` of the constants, ``f(x, c)``
+    of a place, or another.  It returns ``size`` components, 0 for a scalar, None if that is checked elsewhere; one may
+    be None if there are ``gaps``.  Its place is the whole rod if it is ``along``; unless ``placed`` its constants lack
+    the arclength.  ``or_value`` lets a constant stay as it is, ``load`` is the kind of load, ``hint`` how it is
+    written, and ``returns`` converts its value.
     """
 
     words: str
@@ -116,18 +99,17 @@ class Placeless:
             raise UnnamedError("asks for the arclength c.s, but does not vary along the rod: write the number.")
         return getattr(self._constants, name)
 
-    def __getitem__(self, name: object) -> Any:
-        """Say how a constant is written."""
-        return self._constants[name]
-
 
 Visit = Callable[[str, Any, Role], Any]
 
 
-def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[..., Any]:
-    """Return ``function`` such that all it raises is a :class:`SceneError` that names it."""
+def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
+    """Return ``function`` such that all it raises is a :class:`SceneError` that names it; or one for a constant."""
     if hasattr(function, "guards"):
         return function
+    if not callable(function):
+        constant = function
+        function = lambda c: constant  # noqa: E731
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
@@ -142,7 +124,7 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
         except (Exception, SystemExit) as trouble:  # whatever a person's function may raise
             first = str(trouble).split("\n", 1)[0].rstrip(".")
             wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
-            hint = _spelled(trouble) or (role.meanings if wrong and role.meanings else role.hint)
+            hint = role.meanings if wrong and role.meanings else role.hint
             raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {hint}.") from trouble
         finally:
             LOG_OF_UFL.disabled = silent
@@ -160,15 +142,6 @@ def derived(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
     if key not in known:
         known[key] = make()
     return known[key]
-
-
-def _spelled(trouble: BaseException) -> str:
-    """Names like one that a module was asked for in vain: that of the arctangent differs between versions of UFL."""
-    module = getattr(trouble, "obj", None)
-    if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):
-        return ""
-    near = get_close_matches(trouble.name or "", dir(module), n=3)
-    return f"choose {' or '.join(f'{module.__name__}.{name}' for name in near)}" if near else ""
 
 
 def functions_of(owner: Any, *, nested: bool = True) -> list[tuple[str, Callable[..., Any], Role]]:

@@ -6,49 +6,44 @@ named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from keyword import iskeyword
 from math import inf, isfinite
+from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import ufl
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.apply_derivatives import apply_derivatives
-from ufl.utils.stacks import StackDict
 
 from rodfem.errors import SceneError
+from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import RODS, UNDEFORMED
-from rodfem.problem.contribution import Contribution
-from rodfem.problem.kinds import plain
-from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
+from rodfem.problem.arguments import a, encodes, finite, plain, real, reals, text
+from rodfem.problem.constraint import Constraint
+from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Contribution
+from rodfem.problem.end import End, Ring
 from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.plane import check_plane
 from rodfem.problem.roles import Role, changes, derived, functions_of, guarded, role_field
-from rodfem.problem.start import check_continuity
-from rodfem.problem.symbols import symbols
 from rodfem.problem.table import Table, tables_of
+from rodfem.problem.trials import check_function, symbols
 from rodfem.problem.units import Units, units_of
-from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
+from rodfem.problem.validation import LARGEST, TINIEST, check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
 ASIDE = 1e-6
 """Distance beside an end or a break at which the material is asked, relative to the rod's length."""
 
-SHORTEST = 1e-15
-"""Length of a rod above which dolfinx makes a mesh of it: the round-off of one."""
-FEW = 64
-"""Knots of tables below which elements meet at each: where there are more, an element has several."""
-FARTHEST = 1e9
-"""Arclength, over the rod's length, beyond which round-off of arclengths is seen."""
+GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
+"""Names that branches are given as they are found."""
+SHORTEST, FARTHEST = 1e-15, 1e9
+"""Length above which dolfinx makes a mesh, and arclength over the length beyond which its round-off is seen."""
 
 if TYPE_CHECKING:
-    from rodfem.problem.attachment import Attachment
-    from rodfem.problem.constraint import Constraint
-    from rodfem.problem.end import End
-    from rodfem.problem.local_state import OfConstants, OfPlace, Vector
-    from rodfem.problem.ring import Ring
+    from rodfem.problem.local_state import Given, OfPlace, Vector
 
 
 @dataclass(frozen=True)
@@ -65,6 +60,13 @@ class Parameter:
     admissible: tuple[float, float] = (-inf, inf)
     words: str = ""
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the kinds; raises :class:`InputError`."""
+        real("value", self.value, 1.0)
+        reals("admissible", self.admissible, (0.0, inf), 2)
+        for name in ("label", "words", "unit"):
+            text("P")(name, getattr(self, name))
 
     def check(self, name: str, value: float) -> None:
         """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""
@@ -97,10 +99,8 @@ class Inertia:
     no ``rho_I`` the rotary inertia is zero, as of a slender one; without either it is one, by which eigenvalues count.
     """
 
-    rho_A: Callable[[Constants], Any] = role_field(Role("mass per length", "f(c)", 0, along=True), _massless)
-    rho_I: Callable[[Constants], Vector] = role_field(
-        Role("rotary inertia per length", "f(c)", 3, along=True), _unit_rotary
-    )
+    rho_A: Given = role_field(Role("mass per length", "f(c)", 0, along=True), _massless)
+    rho_I: Given = role_field(Role("rotary inertia per length", "f(c)", 3, along=True), _unit_rotary)
 
     def __post_init__(self) -> None:
         """Give a rod with a mass no rotary inertia but its own."""
@@ -142,6 +142,13 @@ class Ordinate:
     of: Callable[[Any, Any], Any] = field(metadata={"role": _role_of_ordinate})
     label: str = ""
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the kinds; raises :class:`InputError`."""
+        for name in ("name", "label", "unit"):
+            text("tip")(name, getattr(self, name))
+        if self.s is not None:
+            finite("s", self.s, 1.0)
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -237,8 +244,8 @@ class Scene(Contribution):
     span: tuple[float, float]
     title: str = ""
     inertia: Inertia = Inertia()
-    distributed: OfConstants | None = role_field(Role("distributed force", "f(c)", 3, along=True, load=DEAD))
-    follower: OfConstants | None = role_field(Role("distributed follower force", "f(c)", 3, along=True, load=FOLLOWER))
+    distributed: Given = role_field(Role("distributed force", "f(c)", 3, along=True, load=DEAD))
+    follower: Given = role_field(Role("distributed follower force", "f(c)", 3, along=True, load=FOLLOWER))
     potential: OfPlace | None = role_field(Role("potential along the rod", "f(x, c)", 0, along=True, load=POTENTIAL))
     attachments: tuple[Attachment, ...] = ()
     constraints: tuple[Constraint, ...] = ()
@@ -250,14 +257,53 @@ class Scene(Contribution):
     states: str | None = None
 
     def __post_init__(self) -> None:
-        """Check all that can be checked before any computation; raises :class:`SceneError`."""
-        check_kinds(self)
+        """Check all that can be checked before any computation; raises :class:`InputError`."""
+        self._check_kinds()
         for field_name, value in changes(self, guarded).items():
             object.__setattr__(self, field_name, value)
         for pair in ("interval", "span"):
-            object.__setattr__(self, pair, two_numbers(f"The {pair}", getattr(self, pair)))
-        named = {n: p if isinstance(p, Parameter) else Parameter(float(p)) for n, p in self.parameters.items()}
+            object.__setattr__(self, pair, reals(pair, getattr(self, pair), (0.0, 1.0), 2))
+        named = {n: p if isinstance(p, Parameter) else Parameter(p) for n, p in self.parameters.items()}
         object.__setattr__(self, "parameters", named)
+        self._check_values()
+        check_scene(self)
+        check_plane(self)
+
+    def _check_kinds(self) -> None:
+        """Raise :class:`InputError` for a field that is no such thing."""
+        names = {"name": self.name} | ({} if self.states is None else {"states": self.states})
+        for field_name, given in ({"title": self.title} | names).items():
+            text("column")(field_name, given)
+        for name in names.values():
+            if name in ("", ".", "..") or not encodes(name) or set(name) & set("/\\\n"):
+                raise SceneError(f"The name {name!r} cannot be that of a folder: give a text without slashes.")
+        if GIVEN.fullmatch(self.states or ""):
+            raise SceneError(
+                f"states is {self.states!r}, a name which others are given: choose another, as 'straight'."
+            )
+        if not isinstance(self.ends, (tuple, list, Ring)) or [isinstance(x, End) for x in self.ends] != [True, True]:
+            raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
+        a(Mapping, "a dictionary, as in {'P': Parameter(0.0)}")("parameters", self.parameters)
+        a(Inertia, "one, as in Inertia(rho_A=1.0)")("inertia", self.inertia)
+        a(Ordinate, "an Ordinate(name, s, of)")("ordinate", self.ordinate)
+        for name, kind, example in (
+            ("attachments", Attachment, "(Attachment(0.5, mass=1.0),)"),
+            ("constraints", Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
+            ("breaks", Real, "(0.5,)"),
+        ):
+            for x in a((tuple, list), f"a tuple, as in {name}={example}")(name, getattr(self, name)):
+                a(kind, example)(f"One of the {name}", x)
+        for name, p in self.parameters.items():
+            known = isinstance(name, str) and name.isidentifier() and not iskeyword(name)
+            if not known or name == "s" or name.startswith("__"):
+                raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
+            if not isinstance(p, Parameter):
+                real(name, p, 0.0)
+        for what, function, role in functions_of(self):
+            check_function(what, function, role)
+
+    def _check_values(self) -> None:
+        """Raise :class:`SceneError` for a rod without a length, an unknown kind or load, or a constant out of range."""
         a, b = self.interval
         if not (isfinite(a) and isfinite(b) and a < b):
             raise SceneError(
@@ -265,8 +311,8 @@ class Scene(Contribution):
             )
         if not max(SHORTEST, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
             raise SceneError(
-                f"A rod from {a:g} to {b:g} is shorter than {SHORTEST:g}, beyond the range of floats, or short beside "
-                "its arclengths' round-off: choose other units, or let the arclength begin at zero."
+                f"A rod from {a:g} to {b:g} is shorter than {SHORTEST:g}, beyond the range of floats, or short for its "
+                "arclengths' round-off: choose other units, or let the arclength begin at zero."
             )
         if not isinstance(self.rod, str) or self.rod not in RODS:
             raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")
@@ -274,13 +320,7 @@ class Scene(Contribution):
             raise SceneError(f"The load {self.load!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
         for name, parameter in self.parameters.items():
             parameter.check(name, parameter.value)
-        for s in self.ordinate.places:
-            if not a <= s <= b:
-                raise SceneError(f"The ordinate's arclength {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
         self.check_span(self.span)
-        check_scene(self)
-        check_plane(self)
-        check_continuity(self)
 
     @cached_property
     def tables(self) -> list[tuple[Table, str]]:
@@ -330,7 +370,8 @@ class Scene(Contribution):
     def vertices(self) -> tuple[float, ...]:
         """Joints, and the knots of piecewise linear tables where these are few: there elements of a mesh meet."""
         knots = {s for table, name in self.tables if name == "s" for s in table.corners}
-        return self._apart({*self.joints, *(knots if len(knots) < FEW else ())})
+        # more of them have several in an element
+        return self._apart({*self.joints, *(knots if len(knots) < 64 else ())})
 
     def _apart(self, places: set[float]) -> tuple[float, ...]:
         """Places inside the rod in ascending order, one for what is one place."""
@@ -511,13 +552,13 @@ class Scene(Contribution):
             v[component] = x[position]
         k = ufl.as_vector([x[len(free_v) + i] for i in range(3)])
         W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, c))
-        return c, apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
+        return c, differentiated(ufl.diff(ufl.diff(W, x), x))
 
     def _stiffness_at(self, s: float | None) -> np.ndarray:
         c, hessian = derived(self.energy, ("hessian", self.rod, *self.parameters), self._hessian)
         for name, value in vars(self.constants(s=s)).items():
             getattr(c, name).value = value
         out = np.zeros((len(self.free_strains) + 3,) * 2)
-        for i, j in zip(*np.tril_indices(len(out)), strict=True):  # not hessian(...): it differentiates every time
-            out[i, j] = out[j, i] = float(hessian.evaluate((), {}, (int(i), int(j)), StackDict()))
+        for i, j in zip(*np.tril_indices(len(out)), strict=True):
+            out[i, j] = out[j, i] = float(evaluated(hessian, (int(i), int(j))))
         return out

@@ -18,15 +18,11 @@ from typing import Any
 from rodfem.errors import InputError
 from rodfem.forms.energy import bending_and_twist, shear_and_stretch
 from rodfem.forms.kinematics import RODS
-from rodfem.problem.arguments import checked
-from rodfem.problem.kinds import finite, reals
+from rodfem.problem.arguments import checked, finite, reals
 from rodfem.problem.scene import Inertia
 
 ODD = 1.0045237627951384
 """Sum of ``1/n^5`` over odd n, 31/32 zeta(5)."""
-TERMS = 6
-"""Terms of the series for the torsion of a rectangle, of which that number 7 is below 1e-17 in a square."""
-STRAIGHT = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -120,7 +116,7 @@ class Section:
         """Rotary inertia per length about the directors."""
         return self.density * self.I1, self.density * self.I2, self.density * (self.I1 + self.I2)
 
-    def energy(self, rod: str, natural: Sequence[float] = STRAIGHT) -> Callable[[Any, Any, Any], Any]:
+    def energy(self, rod: str, natural: Sequence[float] = (0.0, 0.0, 0.0)) -> Callable[[Any, Any, Any], Any]:
         """Quadratic stored energy ``W(v, k, c)`` of a rod of the kind ``rod``, with the strains that it is free in.
 
         ``natural`` (3,) are the curvatures and the twist of the natural state, per length.  Raises :class:`InputError`
@@ -206,14 +202,7 @@ def circle(radius: float, *, E: float, nu: float, density: float = 0.0) -> Secti
 
 @checked(outer=_positive, inner=_positive, **MATERIAL)
 def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A circular tube.
-
-    Parameters
-    ----------
-    outer, inner
-        Radii.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
+    """A circular tube with the radii ``outer`` and ``inner``; ``E, nu, density`` are as for :func:`circle`.
 
     Raises :class:`InputError` for numbers that no section has.
     """
@@ -226,20 +215,14 @@ def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.
 
 @checked(width=_positive, height=_positive, **MATERIAL)
 def rectangle(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A rectangle, of any proportion.
+    """A rectangle of a ``width`` along ``d1`` and a ``height`` along ``d2``.
 
-    Parameters
-    ----------
-    width, height
-        Sides along ``d1`` and ``d2``.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has.
+    ``E, nu, density`` are as for :func:`circle`.
     """
     long, short = max(width, height), min(width, height)
     # the sum of tanh(n pi long / 2 short) / n^5, which converges slowly, by that of its difference from 1 / n^5
-    decays = ((n, exp(-n * pi * long / short)) for n in range(1, 2 * TERMS, 2))
+    # the seventh term is below 1e-17 in a square
+    decays = ((n, exp(-n * pi * long / short)) for n in range(1, 12, 2))
     series = ODD - sum(2 * x / (1 + x) / n**5 for n, x in decays)
     J = long * short**3 * (1 / 3 - 64 / pi**5 * short / long * series)
     shear = 10 * (1 + nu) / (12 + 11 * nu)
@@ -248,16 +231,9 @@ def rectangle(width: float, height: float, *, E: float, nu: float, density: floa
 
 @checked(width=_positive, thickness=_positive, **MATERIAL)
 def strip(width: float, thickness: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A strip: a flat :func:`rectangle`, which bends easily about its width ``d1``.
+    """A strip: a flat :func:`rectangle` of a ``width`` and a ``thickness``, which bends easily about its width ``d1``.
 
-    Parameters
-    ----------
-    width, thickness
-        Sides along ``d1`` and ``d2``, the second the shorter one.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has, and for a strip that is thicker than wide.
+    ``E, nu, density`` are as for :func:`circle`.  Raises :class:`InputError` for a strip that is thicker than wide.
     """
     if thickness > width:
         raise InputError(f"thickness is {thickness:g}: give no more than the width, {width:g}, or a section.rectangle.")
@@ -266,16 +242,9 @@ def strip(width: float, thickness: float, *, E: float, nu: float, density: float
 
 @checked(width=_positive, height=_positive, **MATERIAL)
 def ellipse(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A solid ellipse.
+    """A solid ellipse whose axes are ``width`` along ``d1`` and ``height`` along ``d2``, twice the semi-axes.
 
-    Parameters
-    ----------
-    width, height
-        Axes along ``d1`` and ``d2``, twice the semi-axes.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has.
+    ``E, nu, density`` are as for :func:`circle`.
     """
     a, b = width / 2, height / 2
 

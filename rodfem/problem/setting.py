@@ -30,32 +30,14 @@ HELD, AXIS, TURNS = "held", "axis", "free"
 
 @dataclass(frozen=True)
 class Support:
-    """Support and loads of a rod at one place, in one state.
+    """Support and loads of a rod at the arclength ``s``, in one state; vectors are (3,), zero if there is none.
 
-    Attributes
-    ----------
-    s
-        Arclength of the place.
-    kind
-        ``clamp``, ``slide``, ``hinge``, ``pin``, ``spring`` or ``free``: see :func:`kind_of`.
-    held
-        Which components of the position along e1, e2, e3 are held, (3,) of bool.
-    turning
-        Freedom of the directors: :data:`HELD`, :data:`AXIS` or :data:`TURNS`.
-    axis
-        That axis along the directors, (3,); zero without one.
-    frame
-        Unit quaternion of what holds the directors, of the scene's start where nothing does, (4,).
-    translation_stiffness, rotation_stiffness
-        Of springs, along e1, e2, e3 and about axes along them, (3, 3); zero without one.
-    mass
-        Attached there.
-    force, moment
-        In the frame of space, felt in the free directions, (3,); those of potentials that are no springs among them.
-    follower, follower_moment
-        Along the directors, (3,).
-    guide
-        The only direction in which the position moves where that need not be e1, e2 or e3, (3,); zero without one.
+    ``kind`` is that of :func:`kind_of`, ``turning`` one of :data:`HELD`, :data:`AXIS`, :data:`TURNS`.  ``held``
+    components of the position are along e1, e2, e3, ``guide`` is the only direction in which it moves if that need not
+    be one of them.  ``frame`` is the unit quaternion of what holds the directors, or of the scene's start, ``axis`` is
+    along them.  ``translation_stiffness`` and ``rotation_stiffness`` (3, 3) are along, and about, e1, e2, e3, ``mass``
+    is attached; ``force`` and ``moment`` are in the frame of space, felt in the free directions, those of potentials
+    that are no springs among them; ``follower`` and ``follower_moment`` are along the directors.
     """
 
     s: float
@@ -96,18 +78,11 @@ def kind_of(held: int, turning: str, sprung: bool) -> str:
 
 @dataclass(frozen=True)
 class Tie:
-    """Geometry that a constraint keeps, in one state.
+    """Geometry that a constraint keeps, in one state; what it does not have is nan.
 
-    Attributes
-    ----------
-    s
-        Arclength of the point that it keeps; nan for the two ends, or for the whole rod.
-    line
-        The two points (2, 3) whose distance it keeps: a fixed one and that of the rod, or the two ends; nan without.
-    normal
-        Unit normal (3,) of the surface on which it keeps the point; nan without.
-    note
-        The constraint in words where it has no place in a picture, else empty.
+    Of the point at ``s`` that is the ``line`` (2, 3) from a fixed point to it, or the unit ``normal`` (3,) of the
+    surface on which it is; of the two ends the line between them.  ``note`` is the constraint in words if it has
+    neither.
     """
 
     s: float

@@ -20,26 +20,22 @@ from typing import Any
 import numpy as np
 import ufl
 from numpy.typing import NDArray
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.apply_derivatives import apply_derivatives
-from ufl.utils.stacks import StackDict
 
 from rodfem.errors import SceneError
+from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY, product, rotation
 from rodfem.problem import quaternions
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
-from rodfem.problem.local_state import Constants, OfPlace, asks_where, place
+from rodfem.problem.local_state import Constants, OfPlace, Place, place
 from rodfem.problem.scene import Scene
 from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPORTS, TIES, Support, Tie, kind_of
 
 Floats = NDArray[np.float64]
 
-STATIONS = 9
-"""Places along the rod at which distributed forces are recorded."""
-STEP, SMALL = 1e-3, 1e-6
-"""Of differences of potentials (relative to the rod's length; in radian), and what is zero beside the greatest."""
+SLIGHTLY, SMALL = 0.1, 1e-6
+"""Negative stiffness that a spring may have, over the greatest one, and error of a fit that is none, relative."""
 FLAT = 1e-3
 """Curvature times the rod's length, or difference of two curvatures relative to them, that is taken for zero."""
 Sample = dict[str, Any]
@@ -55,7 +51,7 @@ def supports_of(scene: Scene, sample: Sample) -> dict[str, Support]:
         c, start = scene.constants(load, s), _start(scene, s)
         springs = np.zeros((2, 3, 3))
         if end.energy is not None:
-            springs = stiffness_of(end.energy, c, s, scene.length, _state(sample, s)[0], start)
+            springs = _springs(second_derivative_of(end.energy, c, _point(scene, s, _state(sample, s)[0], start)))
         out[name] = Support(
             s=s,
             kind=kind_of(len(end.fixed(c)), end.turning, bool(springs.any())),
@@ -94,12 +90,18 @@ def _state(sample: Sample, s: float) -> tuple[Floats, Floats]:
     return r, q / np.linalg.norm(q)
 
 
+def _point(scene: Scene, s: float, r: Floats, q: Floats) -> Place:
+    """Place of a position (3,) and a quaternion (4,), numbers."""
+    turned = ufl.as_vector(q.tolist())
+    return place(turned, rotation(turned), s, ufl.as_vector(r.tolist()), length=scene.length)
+
+
 def _changing(scene: Scene, s: float, end: End, sample: Sample, springs: Floats) -> dict[str, Floats]:
     """Attributes of a support that depend on the state: its frame, forces and moments by their names."""
     c = scene.constants(float(sample["load"]), s)
     frame, loads = _start(scene, s), np.zeros((2, 3))
     if end.energy is not None:
-        loads = load_of(end.energy, c, s, scene.length, *_state(sample, s), springs)
+        loads = _load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
         loads[1] *= end.turning != HELD
     if end.rotation is not None:
         frame = np.array([_number(x) for x in end.frame(c)])
@@ -112,57 +114,43 @@ def _changing(scene: Scene, s: float, end: End, sample: Sample, springs: Floats)
     }
 
 
-def stiffness_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q: Floats) -> Floats:
-    """Stiffness of springs with the potential ``energy(x, c)`` at ``s``, in translation and rotation, (2, 3, 3).
-
-    By differences about the position ``r`` (3,) and the unit quaternion ``q`` (4,); of translation, or of rotation,
-    zero where the second derivative is not positive semidefinite, so that the potential is no spring's.  ``c`` are the
-    constants, ``length`` is that of the rod, for the steps.
-    """
-    out = np.zeros((2, 3, 3))
-    for which in (0, 1):
-        if which == 0 and not asks_where(energy, c):
-            continue
-
-        def value(change: Floats, which: int = which) -> float:
-            turned = quaternions.product(quaternions.of_vector(change), q)
-            return _number(energy(_point(r, turned, s, length) if which else _point(r + change, q, s, length), c))
-
-        out[which] = _spring(*_second(value, STEP * (length if which == 0 else 1.0)))
-    return out
+def _near(function: OfPlace, c: Constants, x: Place) -> tuple[Any, Any]:
+    """A change of position and rotation vector, (6,) along e1 to e3, and ``function(x, c)`` there, to second order."""
+    change = ufl.variable(ufl.as_vector([0.0] * 6))
+    spin = ufl.as_vector([change[3], change[4], change[5]])
+    q = product(ufl.as_vector([1.0 - ufl.dot(spin, spin) / 8, spin[0] / 2, spin[1] / 2, spin[2] / 2]), x.q)
+    r = ufl.as_vector([x.r[0] + change[0], x.r[1] + change[1], x.r[2] + change[2]])
+    return change, ufl.as_ufl(function(place(q, rotation(q), x.s, r, length=x.length), c))
 
 
-def _spring(second: Floats, noise: float) -> Floats:
-    """Second derivative (3, 3) where it is a spring's, else zero; it is zero where it is not above ``noise``."""
-    greatest = float(abs(second).max())
-    return second * bool(np.linalg.eigvalsh(second).min() > -1e2 * STEP * greatest and greatest > SMALL * noise)
+def derivative_of(function: OfPlace, c: Constants, x: Place) -> Floats:
+    """Derivative (2, 3) of ``function(x, c)`` in the position and in the rotation vector, in the frame of space."""
+    change, value = _near(function, c, x)
+    slope = differentiated(ufl.diff(value, change))
+    return np.array([float(evaluated(slope, (i,))) for i in range(6)]).reshape(2, 3)
 
 
-def _second(value: Callable[[Floats], float], h: float) -> tuple[Floats, float]:
-    """Second derivative (3, 3) of a function of a vector (3,) at zero, and the greatest of the values met."""
-    basis, out = h * np.eye(3), np.zeros((3, 3))
-    here, ahead, behind = value(np.zeros(3)), [value(e) for e in basis], [value(-e) for e in basis]
-    for i in range(3):
-        out[i, i] = (ahead[i] - 2 * here + behind[i]) / h**2
-        for j in range(i):
-            out[i, j] = out[j, i] = (value(basis[i] + basis[j]) - ahead[i] - ahead[j] + here) / h**2
-    return out, max(map(abs, (here, *ahead, *behind)))
+def second_derivative_of(function: OfPlace, c: Constants, x: Place) -> Floats:
+    """Second derivatives (2, 3, 3) of ``function(x, c)`` in the position and in the rotation vector."""
+    change, value = _near(function, c, x)
+    bend = differentiated(ufl.diff(ufl.diff(value, change), change))
+    blocks = [[(first + i, first + j) for i in range(3) for j in range(3)] for first in (0, 3)]
+    return np.array([[float(evaluated(bend, place)) for place in block] for block in blocks]).reshape(2, 3, 3)
 
 
-def _point(r: Floats, q: Floats, s: float, length: float) -> Any:
-    """Place of a position (3,) and a quaternion (4,), numbers."""
-    turned = ufl.as_vector(q.tolist())
-    return place(turned, rotation(turned), s, ufl.as_vector(r.tolist()), length=length)
+def _springs(second: Floats) -> Floats:
+    """Second derivatives (n, 3, 3) that are those of springs, zero for what is not positive semidefinite."""
+    least, greatest = np.linalg.eigvalsh(second)[:, 0], abs(second).max(axis=(1, 2))
+    return second * (least > -SLIGHTLY * greatest)[:, None, None]
 
 
-def load_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q: Floats, springs: Floats) -> Floats:
-    """Force and moment (2, 3) of a potential at ``s``, in the frame of space, where it is no spring's.
+def _load_of(energy: OfPlace, c: Constants, x: Place, springs: Floats) -> Floats:
+    """Force and moment (2, 3) of a potential at a place ``x``, in the frame of space, where it is no spring's.
 
     Of springs of translation, with the stiffness ``springs[0]``, what is across all their directions; of springs of
-    rotation, with ``springs[1]``, nothing.  ``energy(x, c)`` is the potential with the constants ``c``, ``length`` that
-    of the rod; the state at ``s`` is the position ``r`` (3,) and the unit quaternion ``q`` (4,).
+    rotation, with ``springs[1]``, nothing.
     """
-    out = -derivative_of(energy, c, s, length, r, q)
+    out = -derivative_of(energy, c, x)
     if springs[0].any():
         values, axes = np.linalg.eigh(springs[0])
         loose = axes[:, values < FLAT * values.max()]
@@ -170,23 +158,6 @@ def load_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q
         out[0] = across * bool(np.linalg.norm(across) > FLAT * np.linalg.norm(out[0]))
     out[1] *= not springs[1].any()
     return out
-
-
-def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: Floats, q: Floats) -> Floats:
-    """Derivative (2, 3) of ``function(x, c)`` in the position and in the spin, both in the frame of space.
-
-    At the position ``r`` (3,) and the unit quaternion ``q`` (4,); by UFL. ``s`` is the arclength, of a rod of that
-    ``length``.
-    """
-    x = ufl.variable(ufl.as_vector([*r.tolist(), 0.0, 0.0, 0.0]))
-    spin = ufl.as_vector([x[3], x[4], x[5]])
-    directors = [ufl.as_vector(d) for d in quaternions.directors(q).T.tolist()]
-    turned = [d + ufl.cross(spin, d) for d in directors]  # to first order, which is enough
-    R = ufl.as_matrix([[d[i] for d in turned] for i in range(3)])
-    rotated = product(ufl.as_vector([1.0, x[3] / 2, x[4] / 2, x[5] / 2]), ufl.as_vector(q.tolist()))
-    value = ufl.as_ufl(function(place(rotated, R, s, ufl.as_vector([x[0], x[1], x[2]]), length=length), c))
-    slope = apply_derivatives(apply_algebra_lowering(ufl.diff(value, x)))
-    return np.array([float(slope.evaluate((), {}, (i,), StackDict())) for i in range(6)]).reshape(2, 3)
 
 
 def section_of(scene: Scene) -> tuple[Floats, Floats]:
@@ -208,21 +179,16 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
 
     It is one's where it is a spring's everywhere, and no function of the strains.
     """
-    potential, load = scene.potential, float(sample["load"])
-    if potential is None:
+    if scene.potential is None:
         return None
-    s, found = _stations(scene), []
-    for at in s.tolist():
-        c, (r, q) = scene.constants(load, at), _state(sample, at)
-
-        def value(change: Floats, at: float = at, c: Constants = c, r: Floats = r, q: Floats = q) -> float:
-            return _number(potential(_point(r + change, q, at, scene.length), c))
-
-        try:
-            found.append(_spring(*_second(value, STEP * scene.length)))
-        except SceneError:  # it asks for strains, which a point does not have
-            return None
-    return (s, np.array(found)) if np.any(found) else None
+    s, load = _stations(scene), float(sample["load"])
+    places = [_point(scene, at, *_state(sample, at)) for at in s.tolist()]
+    try:
+        second = [second_derivative_of(scene.potential, scene.constants(load, x.s), x)[0] for x in places]
+    except SceneError:  # it asks for strains, which a point does not have
+        return None
+    found = _springs(np.array(second))
+    return (s, found) if found.any() else None
 
 
 def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
@@ -246,13 +212,13 @@ def _tie(scene: Scene, constraint: Constraint, a: Floats | None, sample: Sample)
 
 def _surface(scene: Scene, of: OfPlace, s: float, sample: Sample) -> tuple[Floats, Floats]:
     """Line (2, 3) from the centre of a surface to the point on it, or its unit normal (3,); nan for what it is not."""
-    c, (r, q), none = scene.constants(float(sample["load"]), s), _state(sample, s), np.full((2, 3), np.nan)
-    slope = derivative_of(of, c, s, scene.length, r, q)[0]
+    r, q = _state(sample, s)
+    c, x, none = scene.constants(float(sample["load"]), s), _point(scene, s, r, q), np.full((2, 3), np.nan)
+    slope, second = derivative_of(of, c, x)[0], second_derivative_of(of, c, x)[0]
     size = float(np.linalg.norm(slope))
     if size == 0.0:
         return none, none[0]
     normal = slope / size
-    second, _ = _second(lambda change: _number(of(_point(r + change, q, s, scene.length), c)), STEP * scene.length)
     tangents = np.linalg.svd(normal[None])[2][1:]
     first, last = np.linalg.eigvalsh(tangents @ second @ tangents.T / size)
     if max(abs(first), abs(last)) * scene.length > FLAT and abs(last - first) < FLAT * abs(first + last):
@@ -285,7 +251,7 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
 
 def _stations(scene: Scene) -> Floats:
     a, b = scene.interval
-    return np.asarray(a + (b - a) * (np.arange(STATIONS) + 0.5) / STATIONS)
+    return np.asarray(a + (b - a) * (np.arange(9) + 0.5) / 9)
 
 
 def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:

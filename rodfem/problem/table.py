@@ -10,17 +10,15 @@ longer an expression than one of two.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
-from ufl.classes import Indexed, Label, Sum, Variable
-from ufl.core.expr import Expr
 
 from rodfem.errors import SceneError
-from rodfem.problem.local_state import Constants, asked_for
+from rodfem.expressions import Expr, Indexed, Label, Sum, Variable, parts
 from rodfem.problem.roles import UnnamedError
+from rodfem.problem.trials import Symbol, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -88,12 +86,11 @@ class Table:
 
         Raises :class:`UnnamedError` for another expression.
         """
-        if (isinstance(x, _Named) and not x.name) or (isinstance(x, Expr) and not isinstance(x, CONSTANTS)):
-            raise UnnamedError(
-                f"calls the {self.what} with an expression: call it with c.s, or with one constant alone."
-            )
-        if isinstance(x, _Named):
-            x.calls.append((self, x.name))
+        if isinstance(x, Expr) and not isinstance(x, Symbol):
+            if not isinstance(x, CONSTANTS) or any(isinstance(part, Symbol) for part in parts(x)):
+                raise UnnamedError(
+                    f"calls the {self.what} with an expression: call it with c.s, or with one constant alone."
+                )
         if isinstance(x, Expr):
             values = tuple(Entry(x, self, i) for i in range(len(self._labels)))
         else:
@@ -123,45 +120,23 @@ class Entry(Variable):  # type: ignore[misc]
         return float(self.table.at(np.array([at]))[0, self.number])
 
 
-class _Named(float):
-    """A constant that knows its ``name``, and notes the ``calls`` of tables; what is computed of it has no name."""
-
-    name = ""
-    calls: list[tuple[Table, str]]
-
-
-def _computed(operation: str) -> Callable[..., Any]:
-    def operate(*operands: float) -> Any:
-        value = getattr(float, operation)(*operands)
-        return value if value is NotImplemented else _Named(value)
-
-    return operate
-
-
-for _operation in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv", "pow", "rpow", "neg", "abs"):
-    setattr(_Named, f"__{_operation}__", _computed(f"__{_operation}__"))
-
-
 def tables_of(scene: Scene) -> list[tuple[Table, str]]:
     """Tables that the functions of a ``scene`` call, each with the name of what they call it with, as ``s``.
 
     Raises :class:`SceneError` where they do not have what they are called with.
     """
-    calls: list[tuple[Table, str]] = []
-    c = Constants(**{name: _Named(value) for name, value in vars(scene.constants()).items()})
-    for name, value in vars(c).items():
-        value.name, value.calls = name, calls
-    asked_for(scene, c)
+    entries = (part for e in expressions_of(scene) for part in parts(e) if isinstance(part, Entry))
+    calls = dict.fromkeys((e.table, e.ufl_operands[0].name.removeprefix("c.")) for e in entries)
     for table, name in calls:
-        value = float(vars(c)[name])
+        value = vars(scene.constants())[name]
         needed = scene.interval if name == "s" else scene.span if name == scene.load else (value, value)
-        low, high, beside = *sorted(needed), NEGLIGIBLE * np.ptp(table.knots)
-        if low < table.knots[0] - beside or high > table.knots[-1] + beside:
+        low, high, margin = *sorted(needed), NEGLIGIBLE * np.ptp(table.knots)
+        if low < table.knots[0] - margin or high > table.knots[-1] + margin:
             raise SceneError(
                 f"The {table.what} has rows from {name} = {table.knots[0]:g} to {table.knots[-1]:g}, but is needed "
                 f"from {low:g} to {high:g}: give rows for all of that."
             )
-    return list(dict.fromkeys(calls))
+    return list(calls)
 
 
 def tabulated(s: Any, values: Any, order: int = 1) -> Table:
@@ -212,7 +187,7 @@ class Rotations(Table):
         """Quaternion at a constant of the scene, or at a number."""
         q = super().__call__(x)
         norm = ufl.sqrt(sum(a**2 for a in q))
-        return tuple(a / norm if isinstance(a, ufl.core.expr.Expr) else float(a / norm) for a in q)
+        return tuple(a / norm if isinstance(a, Expr) else float(a / norm) for a in q)
 
 
 def path(t: Any, values: Any, smooth: bool = True) -> Table:

@@ -26,17 +26,7 @@ ORDINARY = 1e3
 
 
 class Units(NamedTuple):
-    """Natural sizes.
-
-    Attributes
-    ----------
-    length, force, moment, energy
-        Of the rod: its length and stiffness.
-    load, ordinate
-        Of the numbers that are recorded.
-    omega2
-        Of eigenvalues of the motion.
-    """
+    """Natural sizes: ``length, force, moment, energy`` of the rod, its ``load, ordinate``, and ``omega2``."""
 
     length: float
     force: float

@@ -2,42 +2,21 @@
 
 from __future__ import annotations
 
-import inspect
-import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields
-from keyword import iskeyword
 from math import isfinite
-from numbers import Real
-from reprlib import Repr
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import ufl
 
-from rodfem.errors import InputError, SceneError
-from rodfem.forms.kinematics import UNDEFORMED
-from rodfem.problem.attachment import Attachment
-from rodfem.problem.constraint import Constraint
-from rodfem.problem.end import SIDES, End
-from rodfem.problem.kinds import check_scalar, number_of, real, reals
-from rodfem.problem.local_state import (
-    STATES,
-    asked_for,
-    asks_where,
-    floats,
-    functions_of_places,
-    some_places,
-)
-from rodfem.problem.results import check_expression, check_results, check_same
-from rodfem.problem.roles import Role, functions_of, is_object
-from rodfem.problem.symbols import check_expressions
+from rodfem.errors import SceneError
+from rodfem.problem.arguments import number_of
+from rodfem.problem.end import SIDES
+from rodfem.problem.local_state import STATES, asked_for, asks_where, floats, functions_of_places
+from rodfem.problem.trials import check_functions
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-SHORT = Repr()
 LARGEST, TINIEST = 1e60, 1e-60
 """Lengths, widths of ranges and stiffnesses whose powers are floats."""
 EPS, FELT = float(np.finfo(float).eps), 1e-3
@@ -45,122 +24,24 @@ EPS, FELT = float(np.finfo(float).eps), 1e-3
 FLEXIBLE = "choose a kind of rod without the stiff strains"
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
-GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
-"""Names that branches are given as they are found."""
+PLACES = 1001
+"""Arclengths at which a start is evaluated."""
+TURNED = 0.3
+"""Angle, in radian, between neighbours that may be a jump."""
 
 
-def check_kinds(scene: Scene) -> None:
-    """Check the kind of all that a scene is made of; raises :class:`SceneError`."""
-    check_file_name("scene", scene.name)
-    if scene.states is not None:
-        check_file_name("first branch, states,", scene.states)
-        if GIVEN.fullmatch(scene.states):
-            raise SceneError(
-                f"The first branch, states, has the name {scene.states!r}, which others are given: choose another, as "
-                "'straight'."
-            )
-    if not isinstance(scene.title, str):
-        raise SceneError(f"The title is {scene.title!r}: give a text.")
-    if (
-        not isinstance(scene.ends, Iterable)
-        or isinstance(scene.ends, Iterator)
-        or [isinstance(end, End) for end in scene.ends] != [True, True]
-    ):
-        raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
-    for what, given, kind, example in (
-        ("attachments", scene.attachments, Attachment, "(Attachment(0.5, force=...),)"),
-        ("constraints", scene.constraints, Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
-        ("breaks", scene.breaks, Real, "(0.5,)"),
-    ):
-        if not (isinstance(given, (tuple, list)) and all(isinstance(x, kind) for x in given)):
-            raise SceneError(f"The {what} are {given!r}: give a tuple of them, as in {what}={example}.")
-    if not isinstance(scene.parameters, Mapping):
-        raise SceneError(f"The parameters are {scene.parameters!r}: give a dictionary, as in {{'P': Parameter(0.0)}}.")
-    for name, parameter in scene.parameters.items():
-        check_parameter(name, parameter)
-    if not (is_object(scene.inertia) and hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
-        call = ", or call it if it is a method" if callable(scene.inertia) else ""
-        raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0){call}.")
-    if not (is_object(scene.ordinate) and hasattr(scene.ordinate, "places")):
-        raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
-    for what, words in (
-        ("name", scene.ordinate.name), ("label", scene.ordinate.label), ("unit", scene.ordinate.unit),
-    ):  # fmt: skip
-        if not isinstance(words, str):
-            raise SceneError(f"The {what} of the ordinate is {words!r}: give a text.")
-    check_places_are_numbers(scene)
-    for what, function, role in functions_of(scene):
-        if not callable(function):
-            raise SceneError(f"The {what} is {function!r}: give a function {role.call}{_as_function(function, role)}.")
-        try:
-            inspect.signature(function).bind(*range(role.arguments))
-        except (TypeError, ValueError):  # ValueError for classes of Python's own, which have no signature
-            meanings = f", where {role.meanings}" if role.meanings else ""
-            raise SceneError(
-                f"The {what} is no function of {role.arguments} argument(s): give {role.call}{meanings}."
-            ) from None
-
-
-def _as_function(value: Any, role: Role) -> str:
-    """How a function of the constants that returns a ``value`` is written; how that of a cross-section is found."""
-    if role.call == "f(c)" and (len(value) == role.size if isinstance(value, tuple | list) else role.size == 0):
-        return f", as in lambda c: {value!r}"
-    return ", as section.energy(rod) is" if callable(getattr(value, "energy", None)) else ""
-
-
-def check_parameter(name: object, parameter: Any) -> None:
-    """Raise :class:`SceneError` for a parameter whose name, value, label, words, unit or bounds make no sense."""
-    if not isinstance(name, str) or not name.isidentifier() or iskeyword(name) or name == "s" or name.startswith("__"):
-        raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
-    value = getattr(parameter, "value", parameter)
-    texts = [getattr(parameter, text, "") for text in ("label", "words", "unit")]
-    try:
-        real(name, value, 0.0)
-    except InputError:
-        if value is not parameter:
-            raise SceneError(
-                f"The value of the parameter {name} is {value!r}: give a number first, as in Parameter(1.0, 'P')."
-            ) from None
-    try:
-        real(name, value, 0.0)
-        bounds = reals(name, getattr(parameter, "admissible", (0.0, 1.0)), (0.0, 1.0), 2)
-    except InputError:
-        bounds = ()
-    if not bounds or not all(isinstance(text, str) for text in texts):
-        raise SceneError(
-            f"The parameter {name} is {SHORT.repr(parameter)}: give a number or a Parameter, as in Parameter(1.0, 'P')."
-        )
-
-
-def two_numbers(what: str, pair: Any) -> tuple[float, float]:
-    """Return a pair as floats; raises :class:`SceneError` for anything but two numbers."""
-    try:
-        low, high = reals(what, pair, (0.0, 1.0), 2)
-    except InputError:
-        raise SceneError(f"{what} is {SHORT.repr(pair)}: give two numbers, as in (0.0, 1.0).") from None
-    return low, high
-
-
-def check_file_name(whose: str, name: object) -> None:
-    """Raise :class:`SceneError` for a name that cannot be that of a folder, or of an entry of a file."""
-    if not isinstance(name, str) or name in ("", ".", "..") or not writes(name):
-        raise SceneError(
-            f"The {whose} has the name {name!r}: give a text without slashes, as it names folders and entries of files."
-        )
-
-
-def writes(name: str) -> bool:
-    """Whether a name can be written as that of a file."""
-    return not any(c in name for c in "/\\\0\n") and not any("\ud800" <= c <= "\udfff" for c in name)
-
-
-def check_places_are_numbers(scene: Scene) -> None:
-    """Raise :class:`SceneError` for an arclength that is no finite number."""
-    places = [("ordinate", s) for s in getattr(scene.ordinate, "places", ())]
-    places += [("attachment", x.s) for x in scene.attachments] + [("break", s) for s in scene.breaks]
-    for what, s in [*places, *(("constraint", x.s) for x in scene.constraints if x.s is not None)]:
-        if not isinstance(s, Real) or isinstance(s, bool) or not isfinite(s):
-            raise SceneError(f"The {what} is at s = {s!r}: give an arclength, one number.")
+def check_scene(scene: Scene) -> None:
+    """Check places, functions, supports and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
+    if scene.planar not in (None, "e1", "e2"):
+        raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
+    check_places(scene)
+    check_functions(scene)
+    _ = scene.tables  # they cover what they are needed for
+    check_start(scene)
+    check_supports(scene)
+    check_convexity(scene)
+    check_inertia(scene)
+    check_ordinate(scene)
 
 
 def check_load(scene: Scene) -> None:
@@ -173,43 +54,53 @@ def check_load(scene: Scene) -> None:
 
 
 def check_ordinate(scene: Scene) -> None:
-    """Raise :class:`SceneError` where the ordinate is no number, at states where it need not be defined."""
-    if not scene.ordinate.places:
-        along = some_places(scene, wrap=ufl.variable)[True]
-        check_expression("ordinate along the rod", scene.ordinate.of(along, scene.constants()))
-        return
+    """Raise :class:`SceneError` if the ordinate at a point is no number in any state; it may be undefined in one."""
     values = []
-    for q, r, *_ in STATES:
+    for q, r, *_ in STATES if scene.ordinate.places else ():
         try:
-            values.append([scene.ordinate.of(np.array(r) * scene.length, np.array(q, dtype=float)) for _ in range(2)])
+            values.append(scene.ordinate.of(np.array(r) * scene.length, np.array(q, dtype=float)))
         except SceneError as trouble:
             if isinstance(trouble.__cause__, (TypeError, LookupError, AttributeError, NameError)):
                 raise
-    for first, second in values:
-        check_same("ordinate", first, second)
-    if values and not any(isfinite(first) for first, _ in values):
-        raise SceneError(f"The ordinate is {values[0][0]} whatever the state: return a finite number.")
+    if values and not any(map(isfinite, values)):
+        raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
 
 
 def check_start(scene: Scene) -> None:
-    """Check that the start returns quaternions, of rotations in the plane; raises :class:`SceneError`."""
+    """Check that the start is continuous, of rotations in the plane; raises :class:`SceneError`.
+
+    Of a jump every mesh makes a twist within one element, which Newton's method may take for a state of the rod.
+    """
     if scene.start is None:
         return
-    s = np.linspace(*scene.interval, 5)
+    s = np.linspace(*scene.interval, PLACES)
     q = scene.start(s)
-    check_same("start", q, scene.start(s))
-    if q.shape != (5, 4):
-        raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
+    if q.shape != (PLACES, 4):
+        raise SceneError(
+            f"The start has the shape {q.shape} at {PLACES} arclengths: return a quaternion for each, ({PLACES}, 4)."
+        )
     if not (np.isfinite(q).all() and (np.linalg.norm(q, axis=1) > 0).all()):
         raise SceneError("The start is no rotation everywhere: return quaternions of unit norm.")
     if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > NEGLIGIBLE:
         raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")
+    for i in np.flatnonzero(_angles(q) > TURNED).tolist():
+        low, high = float(s[i]), float(s[i + 1])
+        for _ in range(32):  # a continuous start turns by nothing in what is left then
+            middle = (low + high) / 2
+            first, second = _angles(scene.start(np.array([low, middle, high])))
+            low, high = (low, middle) if first > second else (middle, high)
+        left = float(_angles(scene.start(np.array([low, high])))[0])
+        if left > TURNED / 2:
+            raise SceneError(
+                f"The start jumps by {left:.3g} radian at s = {low:.6g}: let it be continuous, as rotations are."
+            )
 
 
-def check_energy(scene: Scene) -> None:
-    """Check that the stored energy is a scalar."""
-    v, k = ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0])
-    check_scalar("stored energy", scene.energy(v, k, scene.constants()))
+def _angles(q: np.ndarray) -> np.ndarray:
+    """Angles between rotations (m, 4) that are neighbours, (m - 1,); quaternions of opposite signs are one rotation."""
+    q = q / np.linalg.norm(q, axis=1)[:, None]
+    apart = np.minimum(np.linalg.norm(q[1:] - q[:-1], axis=1), np.linalg.norm(q[1:] + q[:-1], axis=1))
+    return np.asarray(4 * np.arcsin(np.minimum(apart / 2, 1.0)))
 
 
 def check_inertia(scene: Scene) -> None:
@@ -256,63 +147,52 @@ def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[flo
     return carried, turned
 
 
-def check_scene(scene: Scene) -> None:
-    """Check supports, places and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
-    if scene.planar not in (None, "e1", "e2"):
-        raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
-    check_energy(scene)
-    _ = scene.tables
-    check_places(scene)
-    check_results(scene)
-    check_expressions(scene)
-    check_start(scene)
-    check_supports(scene)
-    check_convexity(scene)
-    check_inertia(scene)
-    check_ordinate(scene)
-
-
 def check_convexity(scene: Scene) -> None:
-    """Raise :class:`SceneError` where the stored energy is not strictly convex at the undeformed state."""
+    """Raise :class:`SceneError` if the stored energy is not strictly convex at the undeformed state."""
     for s in scene.samples() if scene.depends_on_s() else [None]:
         where = "" if s is None else f" at s = {s:g}"
         try:
             stiffness = scene.stiffness(s)
         except (ArithmeticError, ValueError):  # of a root or a logarithm whose derivative has a pole there
             stiffness = np.full((3, 3), np.nan)
-        except TypeError as trouble:  # of float(), for a complex number
-            raise SceneError(f"The stored energy is no real number{where}: leave complex numbers out.") from trouble
-        if not np.isfinite(stiffness).all():
-            raise SceneError(
-                f"The second derivative of the stored energy at the undeformed state is not finite{where}: choose "
-                "constants for which it is."
+        if trouble := _trouble_with_stiffness(scene, stiffness):
+            raise SceneError(trouble.format(where))
+
+
+def _trouble_with_stiffness(scene: Scene, stiffness: np.ndarray) -> str:
+    """Sentence on a second derivative of the energy that no rod has, with ``{}`` for the place; else empty."""
+    if not np.isfinite(stiffness).all():
+        return (
+            "The second derivative of the stored energy at the undeformed state is not finite{}: choose constants for "
+            "which it is."
+        )
+    if not stiffness.any():
+        return (
+            "The stored energy is flat at the undeformed state{}: write it as a function of the strains v and k whose "
+            "second derivative there is not zero, with UFL (ufl.cosh), without math and numpy."
+        )
+    if not TINIEST / scene.length**2 < abs(stiffness).max() < LARGEST / scene.length**2:
+        return (
+            f"The stiffness of {abs(stiffness).max():.3g}{{}} is so far from one that its powers are no floats: choose "
+            "other units."
+        )
+    balanced = in_lengths(stiffness, scene)
+    if not is_definite(balanced):
+        return (
+            "The stored energy is not convex{}: its second derivative at the undeformed state has the eigenvalue "
+            f"{np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
+        )
+    strains, coupling = balanced[:-3, :-3], balanced[:-3, -3:]
+    # stiff strains hide no bending, but bending and twist, with the strains that go with them, must be comparable
+    relaxed: np.ndarray = balanced[-3:, -3:] - coupling.T @ np.linalg.solve(strains, coupling)
+    for values, least in ((np.linalg.eigvalsh(relaxed), SOFTEST), (np.linalg.eigvalsh(balanced), STIFFEST)):
+        if values[0] <= least * values[-1]:
+            return (
+                "The stored energy is convex, but for round-off{}: with the rod's length as unit its second derivative "
+                f"at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; {FLEXIBLE}, or "
+                "constants that are nearer to each other."
             )
-        if not stiffness.any():
-            raise SceneError(
-                f"The stored energy is flat at the undeformed state{where}: write it as a function of the strains v "
-                "and k whose second derivative there is not zero, with UFL (ufl.cosh), without math and numpy."
-            )
-        if not TINIEST / scene.length**2 < abs(stiffness).max() < LARGEST / scene.length**2:
-            raise SceneError(
-                f"The stiffness of {abs(stiffness).max():.3g}{where} is so far from one that its powers are no floats: "
-                "choose other units."
-            )
-        balanced = in_lengths(stiffness, scene)
-        if not is_definite(balanced):
-            raise SceneError(
-                f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
-                f"eigenvalue {np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
-            )
-        strains, coupling = balanced[:-3, :-3], balanced[:-3, -3:]
-        # stiff strains hide no bending, but bending and twist, with the strains that go with them, must be comparable
-        relaxed: np.ndarray = balanced[-3:, -3:] - coupling.T @ np.linalg.solve(strains, coupling)
-        for values, least in ((np.linalg.eigvalsh(relaxed), SOFTEST), (np.linalg.eigvalsh(balanced), STIFFEST)):
-            if values[0] <= least * values[-1]:
-                raise SceneError(
-                    f"The stored energy is convex, but for round-off{where}: with the rod's length as unit its second "
-                    f"derivative at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; "
-                    f"{FLEXIBLE}, or constants that are nearer to each other."
-                )
+    return ""
 
 
 def in_lengths(stiffness: np.ndarray, scene: Scene) -> np.ndarray:
@@ -403,15 +283,10 @@ def check_reach(scene: Scene) -> None:
 
 
 def check_places(scene: Scene) -> None:
-    """Raise :class:`SceneError` for attachments, constraints and breaks that are not on the rod, or for empty ones."""
+    """Raise :class:`SceneError` for an ordinate, an attachment, a constraint or a break that is not on the rod."""
     a, b = scene.interval
-    for x in scene.attachments:
-        if all(getattr(x, field.name) is None for field in fields(x) if field.name != "s"):
-            raise SceneError(
-                f"Nothing is attached at s = {x.s:g}: give the attachment a force, a follower force, an energy, a mass "
-                f"or a rotary inertia; a joint of two elements is breaks=({x.s:g},)."
-            )
-    places = [("attachment", x.s) for x in scene.attachments] + [("break", s) for s in scene.breaks]
+    places = [("ordinate", s) for s in scene.ordinate.places] + [("break", s) for s in scene.breaks]
+    places += [("attachment", x.s) for x in scene.attachments]
     places += [("constraint", x.s) for x in scene.constraints if x.s is not None]
     for what, s in places:
         if not a <= s <= b:

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.linalg.selection import factors_of
+from rodfem.linalg.chain import factors_of
 from rodfem.stability.inertia import inertia_factors
 
 
@@ -43,7 +43,7 @@ class Bordered:
         sizes = along, system.fields.dense_rows + borders
         natural = None if system.natural_sizes is None else self._sizes
         if constraints is None:
-            self.factors = factors_of("lu", self.comm, *sizes, {8: 0}, sizes=natural)
+            self.factors = factors_of("lu", self.comm, *sizes, natural)
         else:
             self.factors = inertia_factors(self.comm, *sizes, natural)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))

@@ -25,11 +25,10 @@ from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
-from rodfem.linalg.chain import Chain
+from rodfem.linalg.chain import Chain, factors_of
 from rodfem.linalg.factorization import Factors, Sizes
 from rodfem.linalg.matrices import local_rows, places_in, rounding, shared
 from rodfem.linalg.orthogonal import generic
-from rodfem.linalg.selection import factors_of
 from rodfem.tolerances import TINY
 
 EPS = float(np.finfo(float).eps)
@@ -50,8 +49,6 @@ FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
 FAR = 0.1
 """Shift of the factors, over the lowest bending eigenvalue, above which they lead to others than those near zero."""
-PIVOT = 1e-3
-"""Threshold of MUMPS's pivots, relative to the largest entry of a column."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +76,7 @@ def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | 
     the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the hundred thousand, to
     the few rows of the scalars, which cost several times the factorisation itself.
     """
-    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 8: 0}, {3: -TINY, 1: PIVOT}, sizes=sizes)
+    return factors_of("cholesky", comm, unknowns, scalars, sizes)
 
 
 class Inertia:

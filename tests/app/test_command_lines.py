@@ -21,7 +21,7 @@ HOME = Path(__file__).parents[2]
 
 LINES = {
     # numbers out of their range
-    "--elements 1000000000": "too large: choose at most",
+    "--elements 1000000000": "too large: give 1 to",
     "--elements 99999999999999999999999": "too large",
     "--elements nan": "invalid int value",
     "--degree 99999999999999999999": "is not available",

@@ -171,13 +171,3 @@ def test_complex_petsc_gives_one_sentence(
     out, err = capfd.readouterr()
     if COMM.rank == 0:
         assert (out, err.count("\n"), err[:7]) == ("", 1, "error: ")
-
-
-@pytest.mark.alone
-def test_locked_cache_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    def locked(*_: object, **__: object) -> None:
-        raise TimeoutError("JIT compilation timed out")
-
-    monkeypatch.setattr(compat.fem, "form", locked)
-    with pytest.raises(SetupError, match="delete the folder"):
-        form_compiler.compile_forms([None])

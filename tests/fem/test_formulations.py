@@ -11,8 +11,7 @@ from problem.test_remedies import parser
 
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, Fields
-from rodfem.fem.formulations import AUTO, FORMULATIONS, names
-from rodfem.fem.formulations.pointwise import Pointwise
+from rodfem.fem.formulations import AUTO, FORMULATIONS, Pointwise, names
 from rodfem.problem.scene import Scene
 
 pytestmark = pytest.mark.alone

@@ -13,8 +13,7 @@ from small_states import plain
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.fields import Discretization
-from rodfem.fem.parameters import line
-from rodfem.fem.state import State
+from rodfem.fem.state import State, line
 from rodfem.fem.system import System
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.ends import clamped

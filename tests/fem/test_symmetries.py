@@ -16,8 +16,8 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
-from rodfem.fem.link import link
 from rodfem.fem.newton import relax
+from rodfem.fem.shape import link
 from rodfem.fem.system import FEW, System
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.ends import Constants, End, Ring, clamped, free, pinned

@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -152,22 +151,17 @@ from rodfem.fem import form_compiler
 def endless(*_, **__):
     print("compiling", flush=True)
     time.sleep(600.0)
-endless.__signature__ = form_compiler.inspect.signature(form_compiler._COMPILE)
 form_compiler._COMPILE = endless
 jit.compile_forms([form()], cache_dir=Path({folder!r}))
 """
 
 
 @pytest.mark.long
-def test_what_a_killed_process_was_compiling_is_compiled_at_once(tmp_path: Path) -> None:
-    """Nobody touches the module of a process that lives; FFCx by itself waits for one of a dead process, too."""
+def test_nobody_awaits_what_another_process_compiles(tmp_path: Path) -> None:
+    """FFCx by itself waits for the module of a process, even if that is dead."""
     script = KILLED.format(tests=str(Path(__file__).parents[1]), folder=str(tmp_path))
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None and other.stdout.readline() == "compiling\n"
-        (code,) = tmp_path.glob("libffcx_forms_*.c")
-        assert not form_compiler._claim(tmp_path, code.stem) and code.is_file()
+        objects, *_ = jit.compile_forms([form()], cache_dir=tmp_path)
+        assert len(objects) == 1
         other.kill()
-    start = time.monotonic()
-    objects, *_ = jit.compile_forms([form()], cache_dir=tmp_path)
-    assert len(objects) == 1 and not list(tmp_path.glob("*.compiling"))
-    assert time.monotonic() - start < 9.0  # FFCx's own patience is 10 s

@@ -22,9 +22,7 @@ CIRCLES = [{"rodfem.diagram.diagram", "rodfem.diagram.trace"}]
 MATRICES = {
     "rodfem.linalg.chain",
     "rodfem.linalg.compiled",
-    "rodfem.linalg.compiler",
     "rodfem.linalg.factorization",
-    "rodfem.linalg.selection",
     "rodfem.linalg.matrices",
     "rodfem.linalg.orthogonal",
 }

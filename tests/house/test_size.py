@@ -14,14 +14,14 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 36518,
+    "lines of Python": 36115,
     "files of Python": 233,
     "lines of C": 957,
-    "module constants with a number": 447,
-    "functions of a complexity above 10": 65,
-    "functions of six parameters or more": 48,
+    "module constants with a number": 451,
+    "functions of a complexity above 10": 62,
+    "functions of six parameters or more": 34,
     "places that warn": 36,
-    "files that import internals of UFL and FFCx": 11,
+    "files that import internals of UFL and FFCx": 2,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
 INTERNALS = ("ufl.", "ffcx.")

@@ -36,7 +36,7 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
 
 def symmetric(sizes: Sizes | None = None) -> Mumps:
     """LDL^t factors of matrices for unknowns of these natural sizes."""
-    return Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}, sizes=sizes)
+    return Mumps("cholesky", sizes)
 
 
 def whole(vector: PETSc.Vec) -> np.ndarray:
@@ -116,7 +116,7 @@ def test_matrix_without_symmetry(formulation: str, name: str, load: float) -> No
     if name == "follower":
         formulation = "pointwise"
     system, x = at(name, "plain", formulation, load)
-    factors = Mumps("lu", {8: 0})
+    factors = Mumps("lu")
     row = system.metric * x
     system.set_load(row, 1.0)
     matrix = system.at(x).jacobian(row)

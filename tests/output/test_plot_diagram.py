@@ -16,7 +16,7 @@ from scipy.special import ellipe, ellipk
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
-from rodfem.fem.link import link
+from rodfem.fem.shape import link
 from rodfem.file_format import LOCUS
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
 from rodfem.output.plot_diagram import (

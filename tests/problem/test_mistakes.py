@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
-import time
 from collections.abc import Callable
 from fractions import Fraction
 from logging import getLogger
@@ -26,7 +24,6 @@ from rodfem import (
     Ordinate,
     Parameter,
     Plan,
-    Ring,
     Scene,
     StepControl,
     at,
@@ -100,30 +97,31 @@ def stiff(b: Any, k: Any) -> Any:
 
 SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     # names, numbers, pairs
-    ({"name": "\ud800"}, "has the name"),
     ({"title": 3}, "title is 3"),
-    *(({"interval": x}, "interval is") for x in (None, (1.0,), "01", (False, True), {0.0, 1.0}, (0, 1j), (0, 10**400))),
+    *(
+        ({"interval": x}, r"interval(\[\d\])? is")
+        for x in (None, (1.0,), "01", (False, True), {0.0, 1.0}, (0, 1j), (0, 10**400))
+    ),
     ({"interval": (0.0, 1e200)}, "A rod from 0 to 1e.200"),
-    ({"interval": (1e16, 1e16 + 2), "ordinate": Ordinate("tip", 1e16, lambda r, q: 0.0)}, "short beside"),
-    *(({"span": x}, "span is") for x in (None, (1.0,), "03", (True, False), (0, 1j), {0: 1, 1: 2}, (0, 10**400))),
+    ({"interval": (1e16, 1e16 + 2), "ordinate": Ordinate("tip", 1e16, lambda r, q: 0.0)}, "short for its arclengths"),
+    *(
+        ({"span": x}, r"span(\[\d\])? is")
+        for x in (None, (1.0,), "03", (True, False), (0, 1j), {0: 1, 1: 2}, (0, 10**400))
+    ),
     *(
         ({"span": x}, "range of P from .* round-off")
         for x in ((0, TINY), (1.0, 1.0 + 3e-16), (0, 1e300), (-HUGE, HUGE))
     ),
     ({"rod": ["unshearable"]}, "kind of rod"),
     ({"load": ["P"]}, "is not a parameter"),
-    ({"load": None}, "is not a parameter"),
     *((numbers(**{name: 1.0}), "cannot have the name") for name in ("lambda", "__class__", "a/b")),
-    *(
-        (numbers(B=x), "parameter B is")
-        for x in (True, 10**400, 1j, "1", Parameter(1.0, label=3), Parameter(1.0, "", None), Parameter(1.0, "", (0,)))  # type: ignore[arg-type]
-    ),
-    (numbers(B=HUGE) | {"energy": lambda v, k, c: stiff(c.B, k)}, "stiffness of 1e.308"),
+    *((numbers(B=x), "B is") for x in (True, 10**400, 1j, "1")),
+    (lambda: numbers(B=Parameter(1.0, label=3)), "label is 3"),  # type: ignore[arg-type]
+    (lambda: numbers(B=Parameter(1.0, "", (0,))), "admissible is"),  # type: ignore[arg-type]
     (numbers(B=TINY) | {"energy": lambda v, k, c: stiff(c.B, k)}, "stiffness of"),
     ({"ends": iter(())}, "not two of the kind End"),
-    ({"breaks": (True,)}, "break is at s = True"),
-    ({"attachments": (Attachment(True, mass=lambda c: 1.0),)}, "attachment is at s = True"),  # type: ignore[arg-type]
-    ({"inertia": Inertia}, "inertia is"),
+    ({"breaks": ("0.5",)}, "One of the breaks is"),
+    (lambda: {"attachments": (Attachment(True, mass=lambda c: 1.0),)}, "s is True"),
     # what functions of the constants return
     *(
         ({"ends": left((x, 0, 0))}, "component 1 of the position")
@@ -131,12 +129,10 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ),
     *(({"ends": left(x)}, "position of the left end") for x in ("abc", {0: 0, 1: 0, 2: 0}, {1, 2, 3}, 3)),
     *(({"ends": left(rotation=x)}, "rotation of the left end") for x in ("1000", (1j, 0, 0, 0), (INF, 0, 0, 0))),
-    ({"ends": left(rotation=(1e200, 0, 0, 0))}, "rotation of the left end"),
     ({"ends": left(rotation=lambda c: (1j, 0, 0, 0))}, "component 1 of the rotation"),
     *(({"ends": right(force=lambda c, x=x: (0, 0, x))}, "component 3 of the force") for x in (NAN, INF, 1j, None, "1")),
     ({"ends": right(force=lambda c: (0, 0, 1 / (c.P - 3)))}, "force on the right end fails with ZeroDivision"),
     ({"ends": right(force=lambda c: exit(3))}, "force on the right end fails with SystemExit"),
-    ({"ends": right(force=lambda c: (0, 0, -c.P * random.random()))}, "returns other values each time"),
     # what is a number here is an expression in the equations
     ({"ends": right(force=lambda c: (0, 0, math.cos(c.P)))}, "force on the right end fails with TypeError.*with UFL"),
     (
@@ -151,53 +147,35 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
         )
         for x in ("abc", (INF, 0, 0), (1j, 0, 0))
     ),
-    ({"distributed": lambda c: (0, 0, 1 / (c.s - 1e-6))}, "distributed force fails"),
     ({"inertia": Inertia(rho_A=lambda c: c.s - 0.2)}, "is negative"),
     ({"inertia": Inertia(rho_A=lambda c: TINY)}, "no floats"),
     # what functions of a place return
     *(({"potential": lambda x, c, z=z: z * x.r[0]}, "potential along the rod has .* in it") for z in (NAN, INF, 1j)),
     ({"potential": lambda x, c: x.r[0] > 0}, "is true or false"),
-    ({"ends": right(energy=lambda x, c: x.r[0] * time.perf_counter_ns())}, "returns other values each time"),
-    ({"constraints": (at(0.5, lambda x, c: 1.0),)}, "constraint is 1 whatever the state"),
-    ({"constraints": (at(0.5, lambda x, c: c.P),)}, "constraint is 0 whatever the state"),
-    ({"constraints": (integral(lambda x, c: 0 * x.k[2]),)}, "constraint is 0 whatever the state"),
-    ({"constraints": (everywhere(lambda x, c: 0.0, strain=True),)}, "constraint is 0 whatever the state"),
     ({"constraints": (at(0.5, lambda x, c: NAN * x.r[0]),)}, "has nan in it"),
     (lambda: {"constraints": (everywhere(lambda x, c: x.k[0], strain="no"),)}, "strain is 'no'"),  # type: ignore[arg-type]
-    (lambda: {"ends": Ring("no")}, "odd is 'no'"),  # type: ignore[arg-type]
     # energies
-    ({"energy": lambda v, k, c: stiff(1 + random.random(), k)}, "stored energy returns other values"),
     ({"energy": lambda v, k, c: ufl.sqrt(ufl.dot(k, k))}, "not finite"),
-    ({"energy": dict}, "no function of 3 argument"),
     ({"energy": lambda v, k, c: bending_and_twist(k, (1, 1))}, "three stiffnesses, not 2"),
     ({"energy": lambda v, k, c: bending_and_twist(k, (1, 1e-13, 1))}, "convex, but for round-off"),
     ({"potential": lambda x, c: loads.spring(x.r, (1, 2))}, "one number or three, not 2"),
     # ordinate, start, springs
     *((tip(lambda r, q, x=x: x), "ordinate fails with TypeError") for x in ("a", "1", True, None, 1j, np.zeros(1))),
-    (tip(lambda r, q: random.random()), "ordinate returns other values"),
-    (tip(lambda r, q: r[0], name=3), "name of the ordinate is 3"),
-    (tip(lambda r, q: r[0], label=None), "label of the ordinate is None"),
-    (tip(lambda r, q: r[0], s=True), "ordinate is at s = True"),
-    (tip(lambda x, c: NAN * x.k[0], s=None), "has nan in it"),
+    (lambda: tip(lambda r, q: r[0], name=3), "name is 3"),
+    (lambda: tip(lambda r, q: r[0], label=None), "label is None"),
+    (lambda: tip(lambda r, q: r[0], s=True), "s is True"),
     *(({"start": lambda s, x=x: x}, "start fails with") for x in ("a", [[1, 0], [1]], np.full((5, 4), 1j))),
-    ({"start": lambda s: np.random.rand(len(s), 4)}, "start returns other values"),
-    (lambda: {"ends": (clamped(), elastic(3.0))}, "translation is 3.0: give a function"),  # type: ignore[arg-type]
     (lambda: {"ends": (clamped(), elastic(lambda c: 1.0, anchor=(0, 0)))}, "anchor is"),  # type: ignore[arg-type]
     (lambda: {"ends": (clamped(), elastic(None, lambda c: 1.0, directors=(0, 0, 0, 0)))}, "zero quaternion"),
-    ({"ends": (clamped(), elastic(lambda c: (1, 2, 3, 4)))}, "one number or three, not 4"),
     ({"ends": (clamped(), elastic(lambda c: (1.0, -2.0, 0.0), force=lambda c: (0, 0, -c.P)))}, "of -2 pushes away"),
     ({"energy": lambda v, k, c: 1.0}, "stored energy is flat"),
-    ({"energy": lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) ** 2}, "stored energy is flat"),
-    ({"ends": (clamped(), elastic(lambda c: NAN, force=lambda c: (0, 0, -c.P)))}, "nan in it"),
-    ({"potential": lambda x, c: ufl.atan3(x.d1[0], x.d1[1])}, r"no attribute 'atan3'.: choose ufl.atan"),
     # a value, a cross-section or a text where a function or a number belongs
-    (lambda: {"ends": (clamped((0, 0, 1)), TIP)}, r"f.c., as in lambda c: \(0, 0, 1\)\."),  # type: ignore[arg-type]
-    (lambda: {"inertia": Inertia(2.0)}, r"f.c., as in lambda c: 2.0\."),  # type: ignore[arg-type]
+    ({"ends": (clamped((0, 1)), TIP)}, "position of the left end has 2 components: give 3"),
+    ({"ends": (clamped(3.0), TIP)}, "position of the left end is 3.0: give a function"),
     ({"energy": section.circle(1.0, E=1.0, nu=0.3)}, r"is Section.*: give a function W.*, as section.energy\(rod\) is"),
     ({"ends": right(force=Parameter(1.0))}, r"force on the right end is Parameter.*: give a function f\(c\)\."),
-    (lambda: numbers(B=Parameter("B", 1.0)), "value of the parameter B is 'B': give a number first"),  # type: ignore[arg-type]
+    (lambda: numbers(B=Parameter("B", 1.0)), "value is 'B': give a number"),  # type: ignore[arg-type]
     (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (NAN, 0, 1)))}, "direction in which a hinge slides"),
-    (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (0, 0, 1), force=3))}, "force is 3: give a function"),  # type: ignore[arg-type]
 ]
 
 
@@ -218,33 +196,25 @@ def control(**named: Any) -> Plan:
 
 PLANS: list[tuple[Callable[[], Any], str]] = [
     (lambda: Plan((0, TINY)), "as narrow as round-off"),
-    (lambda: Plan((0, 1e300)), "beyond the range of floats"),
     (lambda: Plan(error_bars="no"), "error_bars is 'no'"),  # type: ignore[arg-type]
     (lambda: Plan(spectrum=10**10), "no more than 147 eigenvalues"),
-    (lambda: Plan(modes=10**10, at=(1.0,)), "no more than 147 eigenvalues"),
     *((lambda x=x: Plan(events=x), "events is") for x in (None, Event("a", lambda s: 1.0), {1})),
     (lambda: event(lambda s: 1.0, 3), "name is 3"),
     (lambda: event(lambda s: 1.0, ""), "event has no name"),
     *((lambda x=x: event(x), "of is .*: give a function of 1") for x in (3, lambda: 1.0, lambda s, c: 1.0)),
     *((lambda x=x: event(lambda s: x), "event 'ends meet' fails") for x in (None, "1", True, 1j, np.zeros(3))),
-    (lambda: event(lambda s: random.random()), "numbers out"),
     (lambda: control(first=INF), "first = inf lead"),
     (lambda: control(first=1e-7), "first step of 1e-07 is out of bounds"),
-    (lambda: control(aim=INF), "aim = inf lead"),
     *((lambda x=x: Plan(steps=IndexStepControl(resolved=x)), "resolved is") for x in (NAN, INF, -1.0, "a")),
     (lambda: Discretization(elements=10**9), "too large"),
     (lambda: Discretization(8, 6), "formulation 8: choose .*, and give numbers by name, as in elements=8, degree=6"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=2, vertices=(0.0, 1e-300, 1.0)), "must ascend"),
-    (lambda: Discretization(elements=2, vertices={0.0, 0.5, 1.0}), "vertices is"),  # type: ignore[arg-type]
-    (lambda: Discretization(["reduced"]), "Unknown formulation"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=2, vertices=(0.0, 0.5, 2.0)), "must begin and end at 0 and 1"),
 ]
 
 
 @pytest.mark.parametrize(("make", "words"), PLANS)
-def test_plans(make: Callable[[], Any], words: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    if "half-waves" in words:
-        monkeypatch.undo()
+def test_plans(make: Callable[[], Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         found = make()
         rodfem.trace(scene(), *((None, found) if isinstance(found, Plan) else (found,)))
@@ -290,6 +260,23 @@ def test_ufl_prints_nothing_besides(capfd: pytest.CaptureFixture[str]) -> None:
         scene(energy=lambda v, k, c: stiff(1.0, k) if k[0] > 0 else stiff(2.0, k))
     assert capfd.readouterr() == ("", "")
     assert not getLogger("UFL").disabled
+
+
+def test_a_constant_is_a_function_of_the_constants() -> None:
+    """Wherever a scene takes a function of ``c`` alone."""
+    given = scene(
+        ends=(clamped((0, 0, 0), (1, 0, 0, 0)), elastic(3.0, (1.0, 2.0, 3.0), force=(0, 0, 1.0))),
+        inertia=Inertia(2.0, (1.0, 1.0, 2.0)),
+        distributed=(0.0, 0.0, 1.0),
+        attachments=(Attachment(0.5, mass=2.0, force=(0, 0, -1)),),
+        constraints=(integral(lambda x, c: x.k[2], 0.1),),
+    )
+    c = given.constants()
+    assert given.sides[0].held(c) == [0, 0, 0] and given.sides[1].force(c) == (0, 0, 1.0)
+    assert given.inertia.rho_A(c) == given.attachments[0].mass(c) == 2.0 and given.has_inertia
+    assert given.distributed(c) == (0.0, 0.0, 1.0) and given.constraints[0].equals(c) == 0.1
+    slides = sliding_hinge((1, 0, 0), (0, 0, 2.0), force=3.0)
+    assert scene(ends=(clamped(), slides)).sides[1].force(c) == (0.0, 0.0, 3.0)
 
 
 @pytest.mark.few(5)

@@ -22,7 +22,7 @@ from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import INVERSES, Reduction
-from rodfem.linalg.selection import factors_of
+from rodfem.linalg.chain import factors_of
 from rodfem.problem.scene import Inertia
 from rodfem.stability.assessment import Assessor, assess
 from rodfem.stability.blocks import Blocks, Pencil
@@ -213,7 +213,7 @@ def test_deflation_alone(formulation: str) -> None:
     shift = float(expected[0]) - 1.0
     shifted = matrix.copy()
     shifted.axpy(-shift, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    factors = factors_of("lu", system.comm, 0, 0, {})
+    factors = factors_of("lu", system.comm, 0, 0)
     factors(shifted)
     assert assessor.inertia is not None
     for deflated, zeros in (((), 1), ([mode], 0)):

@@ -1,0 +1,58 @@
+"""All that rodfem takes of UFL beyond its documented names: classes of expressions, and what walks through them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import ufl
+from ufl.algorithms.analysis import extract_coefficients, extract_type
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
+from ufl.algorithms.map_integrands import map_integrand_dags
+from ufl.classes import EQ, NE, ComplexValue, Condition, Indexed, Label, PositiveRestricted, ScalarValue, Sum, Variable
+from ufl.constantvalue import FloatValue
+from ufl.core.expr import Expr
+from ufl.corealg.multifunction import MultiFunction
+from ufl.corealg.traversal import unique_pre_traversal
+from ufl.utils.stacks import StackDict
+
+import rodfem.forms  # noqa: F401, before UFL: see rodfem.forms.importing
+
+__all__ = [
+    "EQ",
+    "NE",
+    "ComplexValue",
+    "Condition",
+    "Expr",
+    "FloatValue",
+    "Indexed",
+    "Label",
+    "MultiFunction",
+    "PositiveRestricted",
+    "ScalarValue",
+    "Sum",
+    "Variable",
+    "apply_algebra_lowering",
+    "differentiated",
+    "evaluated",
+    "extract_coefficients",
+    "extract_type",
+    "map_integrand_dags",
+    "parts",
+]
+
+
+def differentiated(expression: Any) -> Any:
+    """An expression, or a form, without derivatives that are left to take."""
+    return apply_derivatives(apply_algebra_lowering(expression))
+
+
+def evaluated(expression: Any, component: tuple[int, ...] = ()) -> Any:
+    """Value of a component of an expression without unknowns; unlike a call of it this does not differentiate first."""
+    return expression.evaluate((), {}, component, StackDict())
+
+
+def parts(expression: Any) -> Iterator[Any]:
+    """All expressions that an expression is made of, itself among them, each once."""
+    return unique_pre_traversal(ufl.as_ufl(expression))
