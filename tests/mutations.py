@@ -103,13 +103,13 @@ FAULTS = {
         "tests/continuation/test_unfolding.py",
     ),
     "known-row": Fault(
-        "rodfem/deflation/known.py",
+        "rodfem/deflation/search.py",
         "if a.load == load:",
         "if a.load == load and b is not None:",
         "tests/diagram/test_load_at_an_end.py",
     ),
     "known-singular": Fault(
-        "rodfem/deflation/known.py",
+        "rodfem/deflation/search.py",
         "if a.load == load and id(a.x) in singular:",
         "if a.load == load and id(a) in singular:",
         AT_SPECIAL,
@@ -163,7 +163,7 @@ FAULTS = {
         AT_SPECIAL,
     ),
     "known-twice": Fault(
-        "rodfem/deflation/known.py",
+        "rodfem/deflation/search.py",
         "if all(apart >= APART for apart, _ in known.nearest(point.x)):",
         "if all(apart >= 0 for apart, _ in known.nearest(point.x)):",
         "tests/diagram/test_load_at_an_end.py",
@@ -233,7 +233,7 @@ FAULTS = {
         "tests/modes/test_modes.py",
     ),
     "zeros-beside-the-fastest-motions": Fault(
-        "rodfem/stability/frequencies.py",
+        "rodfem/stability/nonsymmetric.py",
         "return greatest if self.floating else",
         "return greatest if True else",
         "tests/diagram/test_sweep.py",
@@ -311,7 +311,7 @@ FAULTS = {
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "differences-along-a-locus-by-the-bounds-alone": Fault(
-        "rodfem/codim2/collision.py",
+        "rodfem/codim2/criteria.py",
         "np.minimum(DIFFERENCE, INSIDE * self.plane.room(p) / width)",
         "np.full(2, DIFFERENCE)",
         "tests/codim2/test_locus.py",
@@ -359,7 +359,7 @@ FAULTS = {
         "tests/adaptivity/test_accuracy_control.py",
     ),
     "loci-count-what-is-nearest": Fault(
-        "rodfem/codim2/unstable.py",
+        "rodfem/codim2/criteria.py",
         "[: len(own) - size]",
         "[: len(own) - size]\n    chosen = np.intersect1d(chosen, np.argsort(abs(spectrum.values))[:10])",
         "tests/diagram/test_slow_and_far_frequencies.py",
@@ -488,7 +488,7 @@ FAULTS = {
         "tests/codim2/test_places.py",
     ),
     "places-of-one-mesh": Fault(
-        "rodfem/codim2/errors.py",
+        "rodfem/codim2/follow.py",
         "there, located_to = sought.p, sought.dp",
         "there, located_to = node.p, sought.dp",
         "tests/codim2/test_places.py",
@@ -533,7 +533,7 @@ FAULTS = {
         "tests/deflation/test_deflation.py",
     ),
     "deflated-steps-in-newtons": Fault(
-        "rodfem/deflation/deflated_newton.py",
+        "rodfem/deflation/search.py",
         "relative_size(system, x, step)",
         "step.norm() / (1.0 + x.norm())",
         "tests/deflation/test_deflation.py",
@@ -1015,13 +1015,13 @@ FAULTS = {
     ),
     # error bars
     "bound-without-what-is-left": Fault(
-        "rodfem/adaptivity/ordinate_bound.py", "change + rho / (1 - rho) * max(change, about) + left", "change", ERRORS
+        "rodfem/adaptivity/error_estimate.py", "change + rho / (1 - rho) * max(change, about) + left", "change", ERRORS
     ),
     "bound-of-a-place-by-itself": Fault(
-        "rodfem/adaptivity/ordinate_bound.py", "max(change, about) + left", "change + left", ERRORS
+        "rodfem/adaptivity/error_estimate.py", "max(change, about) + left", "change + left", ERRORS
     ),
     "bound-is-a-tenth": Fault(
-        "rodfem/adaptivity/ordinate_bound.py",
+        "rodfem/adaptivity/error_estimate.py",
         "change + rho / (1 - rho) * max(change, about) + left",
         "0.1 * change + left",
         ERRORS,
@@ -1175,7 +1175,7 @@ FAULTS = {
         "tests/diagram/test_kinks.py tests/fem/test_quadrature_check.py",
     ),
     "loci-have-bars-at-kinks": Fault(
-        "rodfem/codim2/errors.py",
+        "rodfem/codim2/follow.py",
         "            error[row] = np.nan\n            said",
         "            said",
         "tests/diagram/test_sharp_in_state.py",
@@ -1280,13 +1280,13 @@ FAULTS = {
         "tests/literature/test_free_rods.py",
     ),
     "double-eigenvalue-of-flutter-twice": Fault(
-        "rodfem/modes/eigenmotions.py",
+        "rodfem/modes/finder.py",
         "for i in upper(values, len(values)) if i not in left_out]",
         "for i in upper(values, len(values))]",
         RECORDED,
     ),
     "recorded-modes-without-those-of-special-points": Fault(
-        "rodfem/modes/typical.py", "    for special in branch.special:\n", "    for special in ():\n", RECORDED
+        "rodfem/modes/finder.py", "    for special in branch.special:\n", "    for special in ():\n", RECORDED
     ),
     "terminal-left-without-its-cursor": Fault(
         "rodfem/app/screen.py", "            self._progress.stop()\n", "", "tests/app/test_screen.py"
@@ -1295,9 +1295,9 @@ FAULTS = {
         "rodfem/codim2/criteria.py", "split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI
     ),
     "flutter-locus-of-a-mean-with-the-bar-of-one": Fault(
-        "rodfem/codim2/collision.py", "+ SPLIT * here.split", "+ 0.0 * here.split", LOCI
+        "rodfem/codim2/criteria.py", "+ SPLIT * here.split", "+ 0.0 * here.split", LOCI
     ),
-    "flutter-locus-of-a-mean": Fault("rodfem/codim2/collision.py", "if here.split > FEWER", "if False and here", LOCI),
+    "flutter-locus-of-a-mean": Fault("rodfem/codim2/criteria.py", "if here.split > FEWER", "if False and here", LOCI),
     "locus-across-a-gap": Fault(
         "rodfem/codim2/curve.py", "if node.orientation != last.orientation and not", "if False and not", LOCI
     ),
@@ -1351,7 +1351,7 @@ FAULTS = {
         LOCI,
     ),
     "rows-of-loci-are-resolved": Fault(
-        "rodfem/codim2/errors.py",
+        "rodfem/codim2/follow.py",
         "<= RESOLVED_TO",
         "<= 1e9",
         IN_WORDS,
@@ -1384,11 +1384,11 @@ FAULTS = {
         f"{CONTINUATION}singular.py", "at.Z.T @ at.b[0]\n        (w,)", "0.0 * at.Z.T @ at.b[0]\n        (w,)", LOCI
     ),
     "flutter-locus-by-eigenvalues-alone": Fault(
-        "rodfem/codim2/collision.py", "step = -noise.two_sided / slope", "step = 0.0", LOCI
+        "rodfem/codim2/criteria.py", "step = -noise.two_sided / slope", "step = 0.0", LOCI
     ),
     "closed-locus-goes-round-again": Fault("rodfem/codim2/curve.py", "CLOSED = 0.1", "CLOSED = 1e-4", LOCI),
     "bar-of-a-locus-without-what-is-left": Fault(
-        "rodfem/codim2/errors.py", "[bound(*pair, self.rho)", "[bound(*pair, 0.0)", "tests/codim2/test_places.py"
+        "rodfem/codim2/follow.py", "[bound(*pair, self.rho)", "[bound(*pair, 0.0)", "tests/codim2/test_places.py"
     ),
     "modes-that-meet-without-round-off": Fault(
         "rodfem/modes/finder.py",

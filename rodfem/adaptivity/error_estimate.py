@@ -1,4 +1,11 @@
-r"""Error bars: every special point is computed again on a richer discretisation, started from the first.
+r"""Bounds of the errors of ordinates, from two meshes: at a vertex, inside of an element, or of an integral.
+
+A centreline misses ``h^(2d)`` at vertices, and inside of elements of degree d far more: ``h^(d+2)`` times an
+oscillating polynomial, a combination of ``P_d`` and its neighbours.  Near a zero of it two meshes agree by accident,
+and the richer one, whose polynomial has other zeros, may miss as much as the first.  What the polynomial amounts to on
+the whole element does not cancel.
+
+Error bars: every special point is computed again on a richer discretisation, started from the first.
 
 Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
 difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
@@ -12,7 +19,7 @@ small, and a single value may agree on two meshes by accident, where what it has
 cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
 :data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
 may well exceed.  Of an ordinate that is taken inside of an element ``rho`` is of the largest change over that element,
-in which its error oscillates (:mod:`rodfem.adaptivity.ordinate_bound`).  Of an event it is at least what a sum over
+in which its error oscillates (:mod:`rodfem.adaptivity.error_estimate`).  Of an event it is at least what a sum over
 nodes has: half of it.
 
 The state, its tangent and the null vector are interpolated, so that this costs a few solves.
@@ -27,7 +34,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
-from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
@@ -37,10 +43,65 @@ from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordin
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
+from rodfem.fem.shape import Shape
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event
-from rodfem.tolerances import ROUND_OFF, round_off
+from rodfem.tolerances import ROUND_OFF, round_off, same_place
+
+
+def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
+    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
+
+    Both results ``value`` and ``richer`` are loads, ordinates or coefficients, and ``left`` is in their unit, as is the
+    largest change ``about`` such a value: by accident the value itself may change by less.
+    """
+    change = abs(richer - value)
+    return change + rho / (1 - rho) * max(change, about) + left
+
+
+class OrdinateBound:
+    """Bounds the errors of ordinates of states on the mesh of a ``coarse`` shape by those of a ``richer`` one."""
+
+    def __init__(self, coarse: Shape, richer: Shape) -> None:
+        """Tabulate the weights of positions on the element."""
+        self.coarse, self.richer = coarse, richer
+        scene, fields = coarse.system.scene, coarse.system.fields
+        vertices = fields.all_vertices()
+        places = [p for p in scene.ordinate.places if not any(same_place(p, v, scene.length) for v in vertices)]
+        tried = np.empty(0)
+        for p in places:
+            i = int(np.searchsorted(vertices, p))
+            # three places for each zero of the polynomial
+            tried = np.linspace(vertices[i - 1], vertices[i], 3 * fields.discretization.degree + 2)[1:-1]
+        self._tried = [(float(s), coarse.weights(float(s)), richer.weights(float(s))) for s in tried]
+
+    def __call__(self, x: PETSc.Vec, again: PETSc.Vec, left: float, rho: float) -> float:
+        """Return a bound of the error of the ordinate of a state, ``x`` on the first mesh and ``again`` on the richer.
+
+        ``left`` is the uncertainty of the ordinate of the richer one, by location and round-off, in its unit, and
+        ``rho`` the part of the error that is left in it.
+        """
+        return bound(self.coarse.ordinate(x), self.richer.ordinate(again), left, rho, self._change(x, again))
+
+    def _change(self, x: PETSc.Vec, again: PETSc.Vec) -> float:
+        """Largest change of the ordinate over the element in which it is taken; none at a vertex, or of an integral.
+
+        The ordinate is evaluated at its own place, with the changes of position and rotation of all others.
+        """
+        if not self._tried:
+            return 0.0
+        first, second = self.coarse.system.at(x), self.richer.system.at(again)
+        of = self.richer.system.scene.ordinate
+        r, q = self.richer.place(second, of.s or 0.0)
+        value, largest = float(of.of(r, q)), 0.0
+        for s, weights, richer in self._tried:
+            before, after = self.coarse.place(first, s, weights), self.richer.place(second, s, richer)
+            turned = q + after[1] - before[1]
+            beside = of.of(r + after[0] - before[0], turned / np.sqrt(turned @ turned))
+            largest = max(largest, abs(float(beside) - value))
+        return largest
+
 
 AMPLE, MOST = 2.0, 0.75
 """Safety factor on the ratio of the last coefficients, which may be small by coincidence; and the largest ratio of

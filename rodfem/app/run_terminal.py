@@ -16,7 +16,7 @@ from rodfem.app.terminal import Report
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.fem.system import System
-from rodfem.modes.typical import typical_modes
+from rodfem.modes.finder import typical_modes
 from rodfem.output.files import save_run
 from rodfem.output.folder import remove_earlier
 from rodfem.ranks import on_first

@@ -52,7 +52,7 @@ class LocusPoint:
     the left null vectors where they are others.
     ``orientation`` is the side of the tangent, -1 or 1, on which the defining function grows: it changes only where two
     curves cross.  ``ended`` says why the curve ends here, empty where it does not.  A turning point or an end is
-    ``sought`` along the curve, and was found in ``windows`` of these half widths (:mod:`rodfem.codim2.place`).
+    ``sought`` along the curve, and was found in ``windows`` of these half widths (:mod:`rodfem.codim2.points`).
     """
 
     p: np.ndarray

@@ -27,7 +27,7 @@ from rodfem.linalg.factorization import Factors
 from rodfem.problem.units import Units
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.near_zero import decide
-from rodfem.stability.out_of_plane import InSpace
+from rodfem.stability.in_space import InSpace
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.symmetric import SymmetricSolver
 

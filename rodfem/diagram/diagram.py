@@ -14,13 +14,13 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import EVENT, KINDS
 from rodfem.continuation.step_control import StepControl
-from rodfem.deflation.known import equilibria_at
+from rodfem.deflation.search import equilibria_at
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
+from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
-from rodfem.modes.typical import typical_modes
 from rodfem.output.files import as_data, save_run
 from rodfem.output.folder import PICTURES, locked, picture_at
 from rodfem.output.origin import origin

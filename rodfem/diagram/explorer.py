@@ -10,7 +10,7 @@ from math import isfinite
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.gaps import Gap, arms
+from rodfem.adaptivity.mesh_sequence import Gap, arms
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
@@ -18,8 +18,7 @@ from rodfem.continuation.reduced import lines
 from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
-from rodfem.deflation.known import equilibria_at
-from rodfem.deflation.search import find_equilibria
+from rodfem.deflation.search import equilibria_at, find_equilibria
 from rodfem.diagram.equivalence import are_images, equivalent, near
 from rodfem.diagram.first_state import ahead, first_state, name_of_first
 from rodfem.diagram.images import other_ordinates

@@ -10,9 +10,8 @@ from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.fem.newton import TOLERANCE
-from rodfem.stability.frequencies import Frequencies
 from rodfem.stability.near_zero import resolve
-from rodfem.stability.nonsymmetric import NonsymmetricPencil
+from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
 from rodfem.tolerances import DRIFT
 
 ROWS = 4

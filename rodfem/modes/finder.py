@@ -1,25 +1,320 @@
-"""Finds the modes of a state from the eigenvectors of its assessment: see :mod:`rodfem.modes.modes`."""
+"""Two-sided eigenproblem of a rod under loads without a potential: biorthonormal right and left eigenvectors.
+
+Motions of the rod in the eigenvectors of a state: signed, turned within equal eigenvalues, and named.
+
+Modes at a few typical states of each branch, which every run records: its ends, evenly between, special points.
+
+Finds the modes of a state from the eigenvectors of its assessment: see :mod:`rodfem.modes.modes`.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.ordinate_bound import bound
+from rodfem.adaptivity.error_estimate import bound
+from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.errors import InputError
+from rodfem.errors import ConvergenceError, InputError
+from rodfem.faults import as_failure
 from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.transfer import Transfer, halved, richer_system
-from rodfem.linalg.matrices import rounding
-from rodfem.modes.eigenmotions import Eigenmotions, stack
+from rodfem.linalg.matrices import local_rows, rounding, rounding_of
+from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
+from rodfem.modes.perturbation import Motion, Motions
+from rodfem.modes.recorded import Few, Typical
+from rodfem.stability import motion_names
 from rodfem.stability.assessment import Assessor, Verdict
-from rodfem.stability.cluster import DRAWN
+from rodfem.stability.cluster import DRAWN, as_vectors
 from rodfem.stability.inertia import NOISE
-from rodfem.stability.left_right import moving, two_sided
-from rodfem.stability.symmetric import SymmetricPencil
+from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
+from rodfem.stability.pencil import symmetry_modes, weighed_modes
+from rodfem.stability.symmetric import CONVERGED, SymmetricPencil
+from rodfem.tolerances import SAME_EIGENVALUE
+
+SAME = 1e-6
+"""Relative difference below which a left and a right eigenvalue are paired."""
+
+
+@dataclass(frozen=True)
+class TwoSided:
+    """Eigenvalues ``values`` (k,) nearest zero of non-negative imaginary part, backward ``errors``, motions ``kinds``.
+
+    ``right`` X and ``left`` Z (n, k) on this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and
+    positive, ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.  The ``noise`` (k,) of the eigenvalues is what
+    round-off of the matrix may make of them, to first order, and what the eigensolver left: near a double one, where
+    left and right vectors are nearly orthogonal, it is as much more as they are.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    kinds: tuple[str, ...]
+    right: np.ndarray
+    left: np.ndarray
+    weighed: np.ndarray
+    noise: np.ndarray
+
+
+def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
+    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero, those of rigid motions left out.
+
+    These have a zero eigenvalue, and under a thrust that follows the rod no vectors of their own: turning it
+    accelerates it.
+
+    Raises :class:`ConvergenceError` if a right eigenvalue has no left partner, or the mesh has fewer of them.
+    """
+    right, left = (pencil.near_zero(2 * number, left=left) for left in (False, True))
+    chosen = sorted(moving(right, number), key=lambda i: right.values[i].real)
+    partners: list[int] = []
+    for value in right.values[chosen]:
+        distance = abs(left.values - value)
+        distance[partners] = np.inf
+        partners.append(int(np.argmin(distance)))
+        if distance[partners[-1]] > SAME * abs(value):
+            raise ConvergenceError(
+                f"The left mode of the eigenvalue {value:.6g} was not found: ask for fewer modes, or change the load."
+            )
+    comm = pencil.system.comm
+    X, Z = alone(pencil, right.vectors[:, chosen]), left.vectors[:, partners]
+    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ pencil.weighed(X)).T)
+    values = right.values[chosen]
+    quotients = comm.allreduce(np.sum(Z * (local_rows(pencil.matrix) @ np.concatenate(comm.allgather(X))), axis=0))
+    rounded = np.array([rounding_of(pencil.matrix, z, x) for z, x in zip(Z.T, X.T, strict=True)])
+    return TwoSided(
+        values,
+        right.errors[chosen],
+        tuple(right.kinds[i] for i in chosen),
+        X,
+        Z,
+        pencil.weighed(Z),
+        NOISE * rounded + DRAWN * abs(quotients - values),
+    )
+
+
+def moving(found: Frequencies, number: int) -> list[int]:
+    """Places of the ``number`` eigenvalues ``found`` nearest zero, nearest first: one of each pair, no rigid motion.
+
+    Raises :class:`ConvergenceError` where there are fewer.
+    """
+    places = [i for i in upper(found.values, len(found.values)) if found.kinds[i] != motion_names.RIGID]
+    if len(places) < number:
+        raise ConvergenceError(
+            f"The mesh has {len(places)} modes, not {number}: ask for fewer, or use a richer discretisation."
+        )
+    return places[:number]
+
+
+def upper(values: np.ndarray, number: int) -> list[int]:
+    """Places of the ``number`` of ``values`` nearest zero that have no negative imaginary part: one of each pair."""
+    return [int(i) for i in np.argsort(abs(values), kind="stable") if values[i].imag >= 0.0][:number]
+
+
+def alone(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
+    """Columns ``X`` (n, k) of ``vectors`` with ``X^* M X = 1``, and ``X^t M X`` real and positive, for each."""
+    comm, X = pencil.system.comm, vectors
+    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * pencil.weighed(X), axis=0)).real)
+    return np.asarray(X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * pencil.weighed(X), axis=0)))))
+
+
+SEEN = 1e-3
+"""Response of a mode to a functional, relative to the greatest one, below which the functional does not observe it."""
+DOUBLE = 1e-3
+"""Eigenvalues nearer than this, relative, to a double one are that: round-off parts them by its square root."""
+
+
+class Turned(NamedTuple):
+    """Modes of a conservative state: ``vectors`` orthonormal in the ``mass``, their ``motions``, and names.
+
+    The symmetries come last, with ``duals``, the products of all vectors with the mass (or, of what moves no mass,
+    with the metric).
+    """
+
+    vectors: list[PETSc.Vec]
+    duals: list[PETSc.Vec]
+    motions: list[Motion]
+    names: tuple[str, ...]
+
+
+class Eigenmotions:
+    """Finds the motions of states of one :class:`~rodfem.fem.system.System`."""
+
+    def __init__(self, solver: BranchSolver) -> None:
+        """Keep the solver of the equilibria."""
+        self.assessor, self.motions, self.system = Assessor(solver), Motions(solver.system), solver.system
+        self._functionals = np.zeros((0, 0))
+
+    def few(self, x: PETSc.Vec, number: int, double: float = np.nan) -> Few:
+        """The ``number`` left-most modes (nearest zero without a potential) of ``x``, without weights and error bars.
+
+        Rigid motions, whose eigenvalue is zero, are there besides.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where the eigensolver fails.  ``double`` is the eigenvalue that
+        is known to be a double one with a single vector, at flutter.
+        """
+        if not self.assessor.conservative:
+            return self._few_nearest(x, number, double)
+        found = self.assessor.leftmost(x, number)
+        turned = self.turned(x, found.values, found.vectors, self.assessor.symmetric.mass)
+        none = np.zeros(len(turned.names) - len(found.values))
+        value, residual = np.append(found.values, none), np.append(found.errors, none * np.nan)
+        return Few(value, residual, turned.names, *stack(turned.motions))
+
+    # --- conservative ------------------------------------------------------------------------------------------
+
+    def turned(self, x: PETSc.Vec, values: np.ndarray, found: list[PETSc.Vec], mass: PETSc.Mat) -> Turned:
+        """Sign each of the vectors ``found``, and choose a basis of those of equal ``values``: the same from any one.
+
+        The first moves along e1 where it can, the next do not as far as a fixed functional tells; and so on.  ``mass``
+        is the kinetic metric at the state ``x``.
+        """
+        vectors = [v.copy() for v in found]
+        orthonormalize(vectors, mass)
+        motions = [self.motions.at(x, v) for v in vectors]
+        weights = self._weights(values, self._responses(x, motions))
+        vectors = [combine([vectors[i] for i in group], b) for group, b in weights]
+        motions = [_sum([motions[i] for i in group], b) for group, b in weights]
+        duals = [mass * v for v in vectors]
+        names = [self._name(x, v) for v in vectors]
+        symmetries = symmetry_modes(self.system, x)
+        for vector, dual in weighed_modes(self.system, symmetries, mass).values():
+            vectors.append(vector)
+            duals.append(dual)
+            motions.append(self.motions.at(x, vector))
+        return Turned(vectors, duals, motions, (*names, *[SYMMETRY] * len(symmetries)))
+
+    def _name(self, x: PETSc.Vec, v: PETSc.Vec) -> str:
+        """Name of the motion."""
+        return motion_names.name_of(motion_names.turning_shares(self.system, self.system.at(x).turned, [v.array_r]))
+
+    def _weights(self, values: np.ndarray, responses: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
+        """Each new mode as a combination: places of those combined, and weights; ``responses`` are (K, 36)."""
+        out = []
+        for group in equal(values):
+            mine = responses[group]
+            basis: list[np.ndarray] = []
+            for response in mine.T:
+                rest = response - sum((b * (b @ response) for b in basis), np.zeros(len(group)))
+                if np.linalg.norm(rest) > SEEN * abs(mine).max():
+                    basis.append(rest / np.linalg.norm(rest))
+                if len(basis) == len(group):
+                    break
+            out += [(group, b) for b in (basis if len(basis) == len(group) else np.eye(len(group)))]
+        return out
+
+    def _responses(self, x: PETSc.Vec, motions: list[Motion]) -> np.ndarray:
+        """Responses (K, 36) to fixed functionals of the motions along e1, e2, e3 and about them."""
+        if not len(self._functionals):
+            s = self.motions.sample(x)["s"]  # the same in all states
+            t = (s - s[0]) / (s[-1] - s[0])
+            self._functionals = self.motions.node_weights() * [1 + t + np.cos(3.1 * t + 0.7 * j) for j in range(6)]
+        return np.array([(self._functionals @ np.hstack([m.r, m.w])).ravel() for m in motions])
+
+    # --- loads without a potential -----------------------------------------------------------------------------
+
+    def _few_nearest(self, x: PETSc.Vec, number: int, double: float) -> Few:
+        pencil = self.assessor.nonsymmetric.at(x)
+        found = pencil.near_zero(2 * number)
+        values, same = found.values, np.flatnonzero(abs(found.values - double) <= DOUBLE * abs(double))
+        left_out = same[np.lexsort((values[same].real, -values[same].imag))][(len(same) + 1) // 2 :]
+        nearest = [i for i in upper(values, len(values)) if i not in left_out]
+        rigid = [i for i in nearest if found.kinds[i] == motion_names.RIGID]
+        moving = [i for i in nearest if i not in rigid][:number]
+        chosen = [*sorted(moving, key=lambda i: values[i].real), *rigid]
+        if len(chosen) and (worst := found.errors[chosen].max()) > CONVERGED:
+            raise ConvergenceError(f"Eigenvalues have a backward error of {worst:.0e}: use another discretisation.")
+        columns, value = alone(pencil, found.vectors[:, chosen]), values[chosen]
+        coalesced = np.isin(chosen, same)
+        value = np.where(coalesced, double, np.where(np.isin(chosen, rigid), 0.0, value))
+        columns = np.where(coalesced, columns.real, columns)
+        moved = self.signed([self.complex(x, column) for column in columns.T])[0]
+        return Few(value, found.errors[chosen], tuple(found.kinds[i] for i in chosen), *stack(moved))
+
+    def signed(self, right: list[Motion]) -> tuple[list[Motion], np.ndarray]:
+        """Motions of a fixed sign, and what each was multiplied by."""
+        sign = np.sign([np.real(m.r.sum() + 0.01 * m.w.sum()) or 1.0 for m in right])
+        return [Motion(k * m.r, k * m.w, k * m.q) for k, m in zip(sign, right, strict=True)], sign
+
+    def complex(self, x: PETSc.Vec, values: np.ndarray, *, dual: bool = False) -> Motion:
+        """Motion of a complex perturbation, or weights of a complex functional, by its values on this rank (n,)."""
+        evaluate = self.motions.dual if dual else self.motions.at
+        parts = as_vectors(self.system, np.stack([values.real, values.imag], axis=1))
+        re, im = (evaluate(x, part) for part in parts)
+        return Motion(re.r + 1j * im.r, re.w + 1j * im.w, re.q + 1j * im.q)
+
+
+def equal(values: np.ndarray) -> list[list[int]]:
+    """Positions of ascending ``values`` in groups of equal ones."""
+    groups: list[list[int]] = []
+    for i, value in enumerate(values):
+        if groups and value - values[i - 1] <= SAME_EIGENVALUE * abs(values).max():
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    return groups
+
+
+def stack(motions: list[Motion]) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements and rotations of several motions, (K, m, 3) each."""
+    return np.array([m.r for m in motions]), np.array([m.w for m in motions])
+
+
+def _sum(motions: list[Motion], weights: np.ndarray) -> Motion:
+    """Linear combination of motions."""
+    parts = ((m.r, m.w, m.q) for m in motions)
+    return Motion(*(np.tensordot(weights, np.array(each), 1) for each in zip(*parts, strict=True)))
+
+
+EVENLY = 5
+"""States of a branch, evenly along it."""
+FEWEST, MOST = 4, 8
+"""Modes of a state: those of negative eigenvalues are among them up to the latter."""
+
+
+def typical_rows(branch: Branch) -> dict[int, int]:
+    """Rows of the typical states of a branch, and how many modes of each are wanted."""
+    along = np.array([point.arclength for point in branch.points])
+    rows = [int(np.argmin(abs(along - place))) for place in np.linspace(along[0], along[-1], EVENLY)]
+    wanted = {row: branch.points[row].negative for row in rows}
+    for special in branch.special:
+        beside = special.negative_before, special.negative_after
+        wanted[special.row] = max(wanted.get(special.row, 0), *beside)
+    return {row: min(max(FEWEST, wanted[row]), MOST) for row in sorted(wanted)}
+
+
+def typical_modes(branches: Sequence[Branch], solvers: Sequence[BranchSolver]) -> list[list[Typical]]:
+    """Modes at the typical states of each of the ``branches``: see :func:`of_branch`, also for the ``solvers``."""
+    with solvers[0].system.clock.scope("modes"):
+        return [of_branch(branch, solvers) for branch in branches]
+
+
+def of_branch(branch: Branch, solvers: Sequence[BranchSolver]) -> list[Typical]:
+    """Modes at the typical states of a ``branch``, each on the mesh of its point; collective.
+
+    They depend on nothing but the branch.  None of a rod without inertia.  ``solvers`` are those of the meshes by
+    number.
+    """
+    if solvers[0].system.equations.massless:
+        return []
+    finders: dict[int, Eigenmotions] = {}
+    double = {special.row: special.omega2 for special in branch.special}
+    out = []
+    for row, number in typical_rows(branch).items():
+        point = branch.points[row]
+        if point.mesh not in finders:
+            finders[point.mesh] = Eigenmotions(solvers[point.mesh])
+        try:
+            with as_failure(solvers[point.mesh].system.comm):
+                found = finders[point.mesh].few(point.x, number, double.get(row, np.nan))
+            out.append(Typical(row, found))
+        except (ConvergenceError, InputError) as trouble:
+            out.append(Typical(row, None, str(trouble)))
+    return out
+
 
 FLOOR = 5e-12
 """Least uncertainty of an eigenvalue by round-off, relative to the greatest one (rings of 32 elements: 2e-12)."""

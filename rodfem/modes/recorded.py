@@ -1,6 +1,6 @@
 """Modes at a few states of each branch as ``states.h5`` records them, in the group ``modes`` of the branch.
 
-One state is a row of each array.  See :mod:`rodfem.modes.typical` for which states, and :mod:`rodfem.modes.modes` for
+One state is a row of each array.  See :mod:`rodfem.modes.finder` for which states, and :mod:`rodfem.modes.modes` for
 what modes are.
 """
 

@@ -15,10 +15,10 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
-from rodfem.stability.blocks import Blocks
 from rodfem.stability.dependence import rank_of
 from rodfem.stability.methods import Found, Method, Workspace
 from rodfem.stability.near_zero import Decision, decide
+from rodfem.stability.pencil import Blocks
 from rodfem.stability.registry import AUTO, METHODS, find
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 

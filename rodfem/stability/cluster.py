@@ -36,9 +36,8 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import local_rows
-from rodfem.stability.frequencies import REAL, STILL, Frequencies
 from rodfem.stability.inertia import EPS, NOISE
-from rodfem.stability.nonsymmetric import NonsymmetricPencil
+from rodfem.stability.nonsymmetric import REAL, STILL, Frequencies, NonsymmetricPencil
 from rodfem.tolerances import TINY
 
 BESIDE = 1e-3

@@ -39,7 +39,7 @@ from rodfem.errors import SceneError
 from rodfem.fem.newton import STALLED
 from rodfem.fem.shape import Shape
 from rodfem.linalg.orthogonal import generic
-from rodfem.stability.blocks import Blocks, Pencil
+from rodfem.stability.pencil import Blocks, Pencil
 from rodfem.tolerances import NEGLIGIBLE
 
 DIRECTION = 1e-6

@@ -20,11 +20,9 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.deflation.deflated_newton import DeflatedNewton
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
-from rodfem.deflation.known import equilibria_at
-from rodfem.deflation.search import NEW, Deflation, find_equilibria, turned_state
+from rodfem.deflation.search import NEW, DeflatedNewton, Deflation, equilibria_at, find_equilibria, turned_state
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver

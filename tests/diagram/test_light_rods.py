@@ -16,8 +16,7 @@ from mpi4py import MPI
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, trace
 from rodfem.continuation.kinds import END
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.frequencies import orthonormal
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.nonsymmetric import NonsymmetricSolver, orthonormal
 from rodfem.stability.spectrum import SHIFT
 
 pytestmark = pytest.mark.alone

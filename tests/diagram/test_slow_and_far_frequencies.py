@@ -13,7 +13,7 @@ from hard.thrusts import THIN, on_soft_springs
 from scipy.linalg import eigvals
 
 from rodfem import Diagram, Discretization, End, Inertia, Plan, Scene, clamped, free, trace
-from rodfem.codim2.unstable import NEAREST
+from rodfem.codim2.criteria import NEAREST
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 

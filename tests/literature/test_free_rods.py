@@ -28,7 +28,7 @@ from rodfem import (
 )
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.modes.eigenmotions import Eigenmotions
+from rodfem.modes.finder import Eigenmotions
 from rodfem.modes.modes import RIGID
 
 pytestmark = pytest.mark.alone

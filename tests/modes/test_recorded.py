@@ -19,10 +19,9 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError
 from rodfem.faults import in_words
 from rodfem.fem.fields import Discretization
-from rodfem.modes.eigenmotions import Eigenmotions
+from rodfem.modes.finder import EVENLY, FEWEST, Eigenmotions, typical_rows
 from rodfem.modes.modes import SYMMETRY
 from rodfem.modes.recorded import Typical, read
-from rodfem.modes.typical import EVENLY, FEWEST, typical_rows
 from rodfem.problem.scene import Inertia, Scene
 from rodfem.report.payload import payload_of
 

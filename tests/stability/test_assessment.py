@@ -21,17 +21,24 @@ from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.kumar_healey.coordinates import Coordinates
-from rodfem.kumar_healey.reduction import INVERSES, Reduction
+from rodfem.kumar_healey.reduction import INVERSES, ReducedPencil
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Inertia
 from rodfem.stability.assessment import Assessor, assess
-from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.dependence import rank_of, smallest_singular
 from rodfem.stability.inertia import Factored
 from rodfem.stability.inertia import Inertia as Count
 from rodfem.stability.methods import Method
 from rodfem.stability.near_zero import decide
-from rodfem.stability.pencil import Inverse, assemble_pencil, symmetry_modes, weighed_modes, with_factors
+from rodfem.stability.pencil import (
+    Blocks,
+    Inverse,
+    Pencil,
+    assemble_pencil,
+    symmetry_modes,
+    weighed_modes,
+    with_factors,
+)
 from rodfem.stability.registry import METHODS, find
 
 pytestmark = pytest.mark.alone
@@ -245,7 +252,7 @@ def test_shift_of_the_reduction_on_an_eigenvalue() -> None:
     system, x = plain("cord", "reduced", *SMALL, 20.0)
     expected = at("cord", "reduced", 20.0, False)[0](x, "dense", 3).values
     for inverse in INVERSES:
-        reduction = Reduction(Coordinates(system).assemble(x), inverse)
+        reduction = ReducedPencil(Coordinates(system).assemble(x), inverse)
         for value in expected:
             try:
                 found = reduction.near(3, value)
@@ -339,7 +346,7 @@ def test_more_constraints_than_half_the_unknowns() -> None:
     assert p > m / 2
     expected = assess(system, x, number=3)
     assert expected.certified
-    found = Reduction(pencil).near(3, expected.values[0] - 10.0)
+    found = ReducedPencil(pencil).near(3, expected.values[0] - 10.0)
     np.testing.assert_allclose(found.values, expected.values, rtol=1e-9)
 
 

@@ -18,9 +18,8 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
-from rodfem.kumar_healey.methods import cayley_shift
 from rodfem.kumar_healey.null_space import kernel
-from rodfem.kumar_healey.reduction import INVERSES, Reduction
+from rodfem.kumar_healey.reduction import INVERSES, ReducedPencil, cayley_shift
 from rodfem.problem.scene import Inertia
 from rodfem.stability.inertia import Inertia as Index
 
@@ -243,7 +242,7 @@ def test_eigenvalues_are_those_of_dense_matrices(
     p = pencil(name, formulation, load, bent, coordinates)
     target, number = below(p), 4
     expected = null_space_values(p, target, number)
-    reduction = Reduction(p)
+    reduction = ReducedPencil(p)
     modes = reduction.near(number, target)
     scale = abs(expected).max()
     np.testing.assert_allclose(modes.values, expected, rtol=1e-9, atol=1e-11 * scale)
@@ -255,7 +254,7 @@ def test_eigenvalues_are_those_of_dense_matrices(
 @pytest.mark.parametrize(("name", "load", "bent"), [s for s in STATES if s[0] != "follower"])
 def test_elimination_is_the_same_inverse(name: str, load: float, bent: bool) -> None:
     p = pencil(name, "reduced", load, bent)
-    one, other = (Reduction(p, inverse).near(4, below(p)) for inverse in INVERSES)
+    one, other = (ReducedPencil(p, inverse).near(4, below(p)) for inverse in INVERSES)
     np.testing.assert_allclose(one.values, other.values, rtol=1e-9, atol=1e-10 * abs(one.values).max())
 
 
@@ -264,7 +263,7 @@ def test_all_eigenvalues_of_a_small_rod() -> None:
     solver = Solver(scene("hemitropic"), Discretization("reduced", 4, 1)).equilibria
     system = solver.system
     p = Coordinates(system).assemble(solver.at_load(solver.start(0.1), 0.1)[0])
-    reduction = Reduction(p)
+    reduction = ReducedPencil(p)
     n = reduction.kernel.dimension
     rank = np.linalg.matrix_rank(reduction.kernel.project(reduction.M @ reduction.kernel.expand(np.eye(n))))
     assert rank < n
@@ -277,7 +276,7 @@ def test_all_eigenvalues_of_a_small_rod() -> None:
 def test_elimination_fails_where_the_centreline_has_no_mass() -> None:
     p = pencil("cord", "pointwise", 20.0, False)
     with pytest.raises(ConvergenceError, match="use the inverse 'saddle'"):
-        Reduction(p, "elimination").near(3, -10.0)
+        ReducedPencil(p, "elimination").near(3, -10.0)
 
 
 def test_negative_eigenvalues_are_those_of_the_index() -> None:
@@ -285,7 +284,7 @@ def test_negative_eigenvalues_are_those_of_the_index() -> None:
         system, x = (buckled if bent else plain)(name, "pointwise", *SMALL, load)
         system.set_phase(x)
         index = Index(system).at(x).count()
-        values = Reduction(Coordinates(system).assemble(x)).near(5, -10.0).values
+        values = ReducedPencil(Coordinates(system).assemble(x)).near(5, -10.0).values
         assert (values < -1e-6).sum() == index.negative
         assert (abs(values) < 1e-6).sum() == index.zero == (1 if name == "hemitropic" and bent else 0)
 
@@ -309,9 +308,9 @@ def test_reference_values(coordinates: str, inverse: str) -> None:
         with pytest.raises(
             ConvergenceError, match="use the inverse 'saddle'"
         ):  # q at rest has no stiffness along itself
-            Reduction(reference_pencil(coordinates), inverse).near(3, -400.0)
+            ReducedPencil(reference_pencil(coordinates), inverse).near(3, -400.0)
         return
-    reduction = Reduction(reference_pencil(coordinates), inverse)
+    reduction = ReducedPencil(reference_pencil(coordinates), inverse)
     np.testing.assert_allclose(reduction.near(3, -400.0).values, REFERENCE, rtol=1e-9)
     shift = cayley_shift(np.array([-300.0, 500.0]))
     np.testing.assert_allclose(reduction.near(3, shift).values, REFERENCE, rtol=1e-9)
@@ -329,7 +328,7 @@ def test_parameters_of_the_cayley_transform() -> None:
 def test_impossible_requests() -> None:
     p = pencil("cord", "reduced", 20.0, False)
     with pytest.raises(InputError, match="choose one of saddle, elimination"):
-        Reduction(p, "magic")
-    reduction = Reduction(p)
+        ReducedPencil(p, "magic")
+    reduction = ReducedPencil(p)
     with pytest.raises(InputError, match="ask for at most 49"):
         reduction.near(50, -1.0)

@@ -12,7 +12,7 @@ from small_states import plain
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
-from rodfem.kumar_healey.reduction import Reduction
+from rodfem.kumar_healey.reduction import ReducedPencil
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.pencil import in_interval, with_factors
@@ -81,7 +81,7 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
 
 def test_reduced_pencil(options: PETSc.Options) -> None:
     system, x = cord()
-    reduction = Reduction(Coordinates(system).assemble(x))
+    reduction = ReducedPencil(Coordinates(system).assemble(x))
     expected = reduction.near(3, -30.0).values
     options["rodfem_eps_tol"] = 1e-11
     np.testing.assert_allclose(reduction.near(3, -30.0).values, expected, rtol=1e-9)

@@ -31,8 +31,7 @@ from rodfem import (
     pinned,
     trace,
 )
-from rodfem.adaptivity.soft_rows import _is_of_the_mesh
-from rodfem.adaptivity.soft_states import SoftStates
+from rodfem.adaptivity.soft_states import SoftStates, _is_of_the_mesh
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Point
 from rodfem.continuation.kinds import BRANCH_POINT
