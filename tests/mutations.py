@@ -228,7 +228,7 @@ FAULTS = {
     ),
     "bars-of-modes-by-the-nearest": Fault(
         "rodfem/modes/finder.py",
-        'others[np.argsort(abs(values), kind="stable")] = found.values[moving(found, number)]',
+        'others[np.argsort(abs(values), kind="stable")] = found.values[_moving(found, number)]',
         "others[:] = [found.values[np.argmin(abs(found.values - v))] for v in values]",
         "tests/modes/test_modes.py",
     ),
@@ -870,7 +870,7 @@ FAULTS = {
         "tests/linalg/test_chain.py",
     ),
     "index-in-space-of-the-plane": Fault(
-        f"{STABILITY}out_of_plane.py",
+        f"{STABILITY}in_space.py",
         "return self.inertia.at(state)",
         "return Inertia(self.planar).at(x)",
         "tests/literature/test_rods.py tests/literature/test_ruler.py tests/literature/test_classics.py",
@@ -960,7 +960,7 @@ FAULTS = {
         "tests/literature/test_free_rods.py",
     ),
     "falls-out-of-the-plane-slowly": Fault(
-        f"{STABILITY}out_of_plane.py",
+        f"{STABILITY}in_space.py",
         "int(sum(falling))",
         "0 * sum(falling)",
         "tests/literature/test_postbuckling.py",
@@ -1281,7 +1281,7 @@ FAULTS = {
     ),
     "double-eigenvalue-of-flutter-twice": Fault(
         "rodfem/modes/finder.py",
-        "for i in upper(values, len(values)) if i not in left_out]",
+        "for i in _upper(values) if i not in left_out]",
         "for i in upper(values, len(values))]",
         RECORDED,
     ),

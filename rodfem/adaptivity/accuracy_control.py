@@ -1,9 +1,8 @@
 """Control of the accuracy of a branch while it is traced.
 
-The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients
-tells how it has changed since (:mod:`rodfem.adaptivity.grading`), which costs next to nothing.  Where it is too large,
-:class:`TooCoarse` is raised: the explorer then has a mesh made for that very state, carries the last points over, and
-goes on there (:mod:`rodfem.adaptivity.mesh_sequence`).
+The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients tells
+how it has changed (:mod:`rodfem.adaptivity.grading`).  If it is too large, :class:`TooCoarse` is raised: the explorer
+has a mesh made for that state, carries the last points over, and goes on (:mod:`rodfem.adaptivity.mesh_sequence`).
 """
 
 from __future__ import annotations
@@ -183,9 +182,9 @@ class AccuracyControl:
 
     @staticmethod
     def _index(point: Point, richer: Enriched, again: Again) -> int:
-        """Index on the richer mesh; the point's own where eigenvalues that are zero on one of the two make up for it.
+        """Index on the richer mesh; the point's own if eigenvalues that are zero on one of the two make up for it.
 
-        One factorisation suffices where it is the same; otherwise a second one separates zero eigenvalues from others.
+        One factorisation suffices if it is the same; else a second one separates zero eigenvalues from others.
         """
         inertia = richer.solver.inertia
         found = inertia.at(again.x)

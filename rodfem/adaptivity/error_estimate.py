@@ -1,28 +1,19 @@
-r"""Bounds of the errors of ordinates, from two meshes: at a vertex, inside of an element, or of an integral.
-
-A centreline misses ``h^(2d)`` at vertices, and inside of elements of degree d far more: ``h^(d+2)`` times an
-oscillating polynomial, a combination of ``P_d`` and its neighbours.  Near a zero of it two meshes agree by accident,
-and the richer one, whose polynomial has other zeros, may miss as much as the first.  What the polynomial amounts to on
-the whole element does not cancel.
-
-Error bars: every special point is computed again on a richer discretisation, started from the first.
+"""Error bars: every special point is computed again on a richer discretisation, started from the first.
 
 Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
 difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
 ``2^-(degree+1)`` of what elements miss of a smooth state, and about the square of that of loads, and of positions at
-vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
-the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
-open of the richer result.
+vertices.  How smooth it is the last Legendre coefficients of the strains on the two meshes tell, whose ratio bounds
+that of loads and positions amply.  To that comes what location and arithmetic leave open of the richer result.
 
-All of this is asymptotic.  Errors of loads and positions are of second order in those of strains only while these are
-small, and a single value may agree on two meshes by accident, where what it has of either sign cancels; norms do not
-cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
-:data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
-may well exceed.  Of an ordinate that is taken inside of an element ``rho`` is of the largest change over that element,
-in which its error oscillates (:mod:`rodfem.adaptivity.error_estimate`).  Of an event it is at least what a sum over
-nodes has: half of it.
+All of this is asymptotic, and a single value may agree on two meshes by accident; norms do not.  If the strains of the
+state, or of its null vector, differ between the two meshes by more than :data:`RESOLVED_TO` of themselves, the first
+mesh does not resolve the state, and ``d`` is no bound.  Of an event ``rho`` is at least what a sum over nodes has: half
+of it.
 
-The state, its tangent and the null vector are interpolated, so that this costs a few solves.
+A centreline misses ``h^(2d)`` at vertices, and inside of elements of degree d far more: ``h^(d+2)`` times an
+oscillating polynomial, a combination of ``P_d`` and its neighbours.  Near a zero of it two meshes agree by accident.
+Of an ordinate that is taken inside of an element ``rho`` is therefore of the largest change over that element.
 """
 
 from __future__ import annotations
@@ -51,10 +42,9 @@ from rodfem.tolerances import ROUND_OFF, round_off, same_place
 
 
 def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
-    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
+    """Bound of the error of a ``value`` of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
 
-    Both results ``value`` and ``richer`` are loads, ordinates or coefficients, and ``left`` is in their unit, as is the
-    largest change ``about`` such a value: by accident the value itself may change by less.
+    ``about`` is the largest change of such a value near by: by accident the value itself may change by less.
     """
     change = abs(richer - value)
     return change + rho / (1 - rho) * max(change, about) + left
@@ -64,7 +54,6 @@ class OrdinateBound:
     """Bounds the errors of ordinates of states on the mesh of a ``coarse`` shape by those of a ``richer`` one."""
 
     def __init__(self, coarse: Shape, richer: Shape) -> None:
-        """Tabulate the weights of positions on the element."""
         self.coarse, self.richer = coarse, richer
         scene, fields = coarse.system.scene, coarse.system.fields
         vertices = fields.all_vertices()
@@ -79,8 +68,7 @@ class OrdinateBound:
     def __call__(self, x: PETSc.Vec, again: PETSc.Vec, left: float, rho: float) -> float:
         """Return a bound of the error of the ordinate of a state, ``x`` on the first mesh and ``again`` on the richer.
 
-        ``left`` is the uncertainty of the ordinate of the richer one, by location and round-off, in its unit, and
-        ``rho`` the part of the error that is left in it.
+        The ordinate of the latter is uncertain by ``left``, and has ``rho`` of the error.
         """
         return bound(self.coarse.ordinate(x), self.richer.ordinate(again), left, rho, self._change(x, again))
 
@@ -117,11 +105,10 @@ LEFT = 0.5
 
 @dataclass(frozen=True)
 class Again:
-    """A point computed again: state ``x``, ``load``, ``ordinate``, and uncertainties of the two by location, round-off.
+    """A point computed again: ``x``, ``load``, ``ordinate``, and ``load_left``, ``ordinate_left``, their uncertainties.
 
-    These are ``load_left`` and ``ordinate_left``.  ``ordinate_error`` bounds the error of the first ordinate, ``rho``
-    is the part of the first errors that is left, and ``changed`` the relative change of the strains of the state or of
-    its null vector, the larger one.
+    ``ordinate_error`` bounds the error of the first ordinate, ``rho`` is the part of the first errors that is left, and
+    ``changed`` the relative change of the strains of the state or of its null vector, the larger one.
     """
 
     x: PETSc.Vec
@@ -146,12 +133,11 @@ class Again:
 class Enriched:
     """A second, richer discretisation of the system of a solver, and its estimates.
 
-    ``origins`` are branch points that were located there: each with the special point of the first discretisation, and
+    ``origins`` are branch points that were located there, each with the special point of the first discretisation, and
     the part of the error that is left.
     """
 
     def __init__(self, solver: BranchSolver) -> None:
-        """Compile and allocate the richer system."""
         self.coarse, self.system = solver, richer_system(solver.system)
         self.solver = BranchSolver(self.system)
         self.transfer = Transfer(solver.system, self.system)
@@ -170,10 +156,10 @@ class Enriched:
         return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
 
     def estimate(self, special: SpecialPoint) -> None:
-        """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of its errors in load and ordinate.
+        """Set ``error_estimate`` and ``ordinate_error`` of a special point, and whether it is ``resolved``.
 
-        They are infinite where the richer discretisation does not find the point, and no bounds where the point is not
-        ``resolved``, which is set, too.
+        They are infinite if the richer discretisation does not find the point, and no bounds if the point is not
+        resolved.
         """
         if special.test_function == "stretch":
             return  # it has its own estimate: see :mod:`rodfem.adaptivity.zero_stretch`
@@ -196,8 +182,8 @@ class Enriched:
     def again(self, point: Point, *, fixed_load: bool) -> Again:
         """Solve for a point on the richer discretisation, at its load, once, or across its tangent.
 
-        One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` where
-        there is no such point.
+        One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` if there
+        is none.
         """
         key = id(point), self.system.damping
         if fixed_load and key in self._at_loads:

@@ -1,11 +1,11 @@
-r"""Graded meshes: how smooth a state is along the rod, and the cheapest elements that resolve it to an accuracy.
+"""Graded meshes: how smooth a state is along the rod, and the cheapest elements that resolve it to an accuracy.
 
 On each element the Legendre coefficients of the strains (curvature and stretch, weighted as in the stored energy) decay
 like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
-Approximation Theory and Approximation Practice, chapter 8).  With elements of degree d the strains are missed by
-``A rho^-d``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
-in front is measured by a computation on a richer mesh.  On an element of another size the distance stays, and ``rho``
-follows: how large an element may be at each place is had in closed form.
+Approximation Theory and Approximation Practice, chapter 8).  Elements of degree d miss ``A rho^-d`` of the strains, and
+the *square* of that, integrated along the rod, of loads and positions, which are stationary; the factor in front is
+measured on a richer mesh.  On an element of another size the distance stays, and ``rho`` follows: how large an element
+may be at each place is had in closed form.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
-"""The discretisations of one run: one, or with an accuracy asked for as many as its branches need.
+"""The discretisations of one run: one, or with an accuracy asked for as many as its branches need; and gaps.
 
 Every point knows the number of its mesh.  Here meshes are made, and points carried from one to another.
 
-Gaps: branch points that an imperfection has taken apart, and how continuation resolves them.
-
-Near such a point two branches, that would cross without the imperfection, bend away from each other.  The state and the
-load at which they would cross are known from :mod:`rodfem.continuation.singular`.  Steps in proportion to the distance
-from there follow the bend of either branch, however sharp it is.
+At a gap an imperfection has taken a branch point apart: two branches, that would cross without it, bend away from each
+other.  The state and the load at which they would cross are known from :mod:`rodfem.continuation.singular`.  Steps in
+proportion to the distance from there follow the bend of either branch, however sharp it is.
 """
 
 from __future__ import annotations
@@ -56,9 +54,8 @@ def internal_accuracy(scene: Scene, accuracy: float) -> float:
 def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
     """Discretisation to start with: few elements of nearly equal size, of a degree that grows with the digits.
 
-    The ``accuracy`` is that of loads and ordinates, relative to values greater than one.  The ``scene`` and the
-    ``formulation`` are kept, and breaks of the scene are vertices; on the ranks of ``comm`` no rank is without an
-    element.
+    The ``accuracy`` is that of loads and ordinates, relative to values greater than one.  The ``formulation`` is kept,
+    and breaks of the ``scene`` are vertices; each rank of ``comm`` has an element.
     """
     degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
     pieces = pieces_of(scene)
@@ -69,19 +66,15 @@ def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) 
 
 
 class TooCoarse(Exception):
-    """The mesh does not resolve a state to the accuracy: its ``error`` is too large, infinite where it is not known.
+    """The mesh does not resolve a ``point`` to the accuracy: its ``error`` is too large, infinite if it is not known.
 
-    ``directions`` are null vectors to be resolved besides; the error falls as the indicator to the power ``order``.
+    ``directions`` are null vectors to be resolved, too; the error falls as the indicator to the power ``order``;
+    ``why`` is a sentence.
     """
 
     def __init__(
         self, point: Point, error: float, directions: Sequence[PETSc.Vec] = (), order: float = 1.0, why: str = ""
     ) -> None:
-        """Keep the data from which a new mesh is chosen, and the finding in words.
-
-        ``point`` is the state with the ``error``; ``directions`` and ``order`` are those above, and ``why`` is a
-        sentence.
-        """
         super().__init__(why or f"estimated error {error:.0e}")
         self.point, self.error, self.directions, self.order = point, error, list(directions), order
 
@@ -90,7 +83,6 @@ class Meshes:
     """The solvers of one run, by the number of their mesh, and their richer companions, made when needed."""
 
     def __init__(self, solver: BranchSolver, accuracy: float | None) -> None:
-        """Begin with one mesh; None as accuracy: no other is made."""
         self.solvers = [solver]
         self.accuracy = None if accuracy is None else internal_accuracy(solver.system.scene, accuracy)
         self._companions: dict[int, Enriched] = {}
@@ -149,10 +141,7 @@ class Meshes:
         return target.shape.restore(self.solvers[source].shape.sample(x))
 
     def direction(self, d: PETSc.Vec, x: PETSc.Vec, source: int, target: BranchSolver) -> PETSc.Vec:
-        """Change of the state ``x`` of one mesh interpolated on another: the difference of two states.
-
-        ``d`` is the change, ``source`` the number of its mesh, ``target`` the solver of the other one.
-        """
+        """Change ``d`` of the state ``x`` on mesh number ``source``, on that of a ``target``."""
         return self.state(x + d, source, target) - self.state(x, source, target)
 
     def here(self, point: Point, target: BranchSolver) -> Point:
@@ -185,7 +174,7 @@ class Meshes:
 
         Points whose index is another there are left out, so that an eigenvalue that passes zero is met again.  The
         start of a branch keeps its load; a branch point from which one leaves is not carried.  Raises
-        :class:`ConvergenceError` where no point is left.
+        :class:`ConvergenceError` if no point is left.
         """
         starts = history[0].arclength == 0.0
         first = 1 if starts and from_branch_point else 0
@@ -218,7 +207,6 @@ class Gap(Exception):
     """A step of continuation has jumped from one branch to another, across the gap at this special point."""
 
     def __init__(self, special: SpecialPoint, unfolded: SingularState) -> None:
-        """Keep what was found."""
         super().__init__(f"imperfect, unfolding {unfolded.size:.0e}")
         self.special, self.unfolded = special, unfolded
         self.point = replace(special.point, x=unfolded.x, load=unfolded.load)
@@ -228,7 +216,6 @@ class Gaps:
     """The gaps of one run: which special points are taken apart, and the steps that resolve them."""
 
     def __init__(self, meshes: Meshes) -> None:
-        """Begin with none."""
         self.meshes = meshes
         self.known: list[Gap] = []
 

@@ -1,22 +1,19 @@
-r"""Soft modes of states, with what the mesh adds to their uncertainty, and refined until their sign is decided.
+"""Soft modes of states and branches, with what the mesh adds to their uncertainty.
 
-The state is solved for again on a mesh of half the elements' length and one degree more.  With eigenvalues ``mu`` on
-the mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - mu| / (1 - rho)``
+A mesh may make an eigenvalue of its own of one that is exponentially small: it pins what slides along the rod.  The
+state is solved for again on a mesh of half the elements' length and one degree more.  With eigenvalues ``mu`` on the
+mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - mu| / (1 - rho)``
 (:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh, unless
-it is within round-off on every one.  Where an eigenvalue changes by more than itself on the mesh that bound is none of
-what the mesh says of its sign: all of the change is added.  One whose sign is another one than on the mesh itself is
-undecided there, whatever richer meshes say, and so is one where the richer mesh has another state than the mesh, by the
+it is within round-off on every one.  If an eigenvalue changes by more than itself all of the change is added.  One of
+another sign than on the mesh itself is undecided there, and so is one if the richer mesh has another state, by the
 strains of the two.
 
 What vanishes at a special point is zero there by construction, and undecided.  The special point of a richer mesh is at
 another load, so that its other eigenvalues are compared across the branch.
 
-Soft modes along a branch that has been traced: at which of its points the index is not decided, and by what.
-
-Rows that one factorisation decided have none.  A mesh may make an eigenvalue of its own of one that is exponentially
-small: it pins what slides along the rod.  With error bars the eigenvalue nearest zero is therefore compared with that
-of a richer mesh, at the loads asked for and at the ends of branches; all along a branch if one of these is undecided,
-or a special point is not on the richer mesh.
+Rows that one factorisation decided have no soft modes.  With error bars the eigenvalue nearest zero is compared at the
+loads asked for and at the ends of branches; all along a branch if one of these is undecided, or a special point is not
+on the richer mesh.
 """
 
 from __future__ import annotations
@@ -58,7 +55,6 @@ class SoftStates:
     """
 
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
-        """Nothing is computed before a state is given."""
         self.solver, self.names = solver, MotionNames(solver.system, solver.inertia.metric)
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
@@ -76,10 +72,10 @@ class SoftStates:
         """Record the soft modes of a ``point``, and its index as far as they are decided; whether there are any.
 
         On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
-        ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Along a ``family``
-        of equilibria at one load that of the branch itself is zero.  At a special point the eigenvalues of its null
-        vectors, which are ``vanishing``, are zero.  Raises :class:`ConvergenceError` where constraints that depend on
-        each other leave less than no negative eigenvalue.
+        ``compare`` the index there is asked for; eigenvalues of another sign are soft, too.  Along a ``family`` of
+        equilibria at one load that of the branch itself is zero, at a special point those of its ``vanishing`` null
+        vectors.  Raises :class:`ConvergenceError` if constraints that depend on each other leave less than no negative
+        eigenvalue.
         """
         inertia = self.solver.inertia
         least = self._doubtful(point, fixed_load, compare=compare)
@@ -151,8 +147,7 @@ class SoftStates:
         """Decide on eigenvalues ``near`` zero of a ``point`` as far as can be.
 
         ``fixed_load``, ``family`` and ``vanishing`` are those of :meth:`examine`.  Without a richer mesh those within
-        the tolerance of a count are undecided, beyond round-off too: they are zero in every count, and round-off alone
-        does not tell what is zero for the rod.
+        the tolerance of a count are undecided: round-off alone does not tell what is zero for the rod.
         """
         every, near = len(near.values), self._across_the_branch(point, near) if family else near
         names, tolerance = self.names(point.x, near.vectors), self.solver.inertia.tolerance
@@ -172,7 +167,6 @@ class SoftStates:
         return judge(near, modes, tolerance)
 
     def _zero(self, near: NearZero, vanishing: Sequence[PETSc.Vec]) -> list[bool]:
-        """Whether each of some eigenvalues is one of the null vectors that are ``vanishing``."""
         return [not across(self.solver.system.metric, [v], vanishing) for v in near.vectors]
 
     def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
@@ -191,7 +185,7 @@ class SoftStates:
     def _refined(
         self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int, vanishing: Sequence[PETSc.Vec]
     ) -> list[SoftMode]:
-        """The ``modes`` with values of richer meshes; of infinite uncertainty where those have no such state.
+        """The ``modes`` with values of richer meshes; of infinite uncertainty if those have no such state.
 
         ``own`` eigenvalues nearest zero are those of the branch itself.  Those of the ``vanishing`` null vectors are
         left out, too, by their vectors: on a richer mesh others may be nearer to zero.
@@ -231,19 +225,9 @@ class SoftStates:
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
     """Point on a richer mesh, and what was found when it was computed there.
 
-    Beside a soft mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere where it fails.
-    Raises :class:`ConvergenceError` where the mesh has no such point, with a soft mode also where it has another state.
-
-    Parameters
-    ----------
-    richer
-        Companion of the mesh.
-    point
-        Point on the mesh itself.
-    fixed_load
-        As in :meth:`SoftStates.examine`.
-    soft
-        Whether the point is known to have a soft mode.
+    Beside a ``soft`` mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere if it
+    fails. Raises :class:`ConvergenceError` if the mesh has no such point, with a soft mode also if it has another
+    state.
     """
     system = richer.system
     given = system.damping
@@ -277,7 +261,7 @@ def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
 
 
 def _within_round_off(values: np.ndarray, of_mesh: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-    """Whether eigenvalues are within round-off wherever the error of the mesh may move them: no richer mesh decides."""
+    """Whether eigenvalues are within round-off wherever the error of the mesh may move them."""
     return np.asarray(abs(values) + of_mesh <= rounding)
 
 
@@ -286,8 +270,8 @@ def _nearest(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
-    The first ``left_out`` of them at the ``point``, and those of the vectors ``still``, are no part of that number.
-    What arithmetic leaves open of the state, one more step of Newton's method tells.
+    The first ``left_out`` at the ``point``, and those of the vectors ``still``, are no part of that number.  What
+    arithmetic leaves open of the state, one more step of Newton's method tells.
     """
     found = solver.inertia.at(point.x)
     found.count()
@@ -312,7 +296,6 @@ class SoftRows:
     """Examines branches of one run; with ``error_bars`` the error of its meshes is part of every uncertainty."""
 
     def __init__(self, meshes: Meshes, *, error_bars: bool) -> None:
-        """Nothing is computed before a branch is given."""
         self.meshes, self.error_bars = meshes, error_bars
         self._states: dict[int, SoftStates] = {}
         self._uncompared: dict[str, tuple[float, str]] = {}
@@ -393,7 +376,6 @@ class SoftRows:
                 yield f"{branch.name}: {where} the index is {words} ({worst}): {remedy}."
 
     def _of(self, point: Point) -> SoftStates:
-        """Soft states of the mesh of a point."""
         if point.mesh not in self._states:
             richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
             self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
@@ -414,8 +396,8 @@ def _doubt_between(branch: Branch) -> None:
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
     """Whether a ``special`` point is the mesh's, by the ``rows``: on one side the next two are undecided.
 
-    One is enough if the richer mesh has no such point; a single one may be next to a special point by chance.  Not if
-    the decided indices on both sides differ by its own change, and as much is undecided: that is another mode.
+    One is enough if the richer mesh has no such point.  Not if the decided indices on both sides differ by its own
+    change, and as much is undecided: that is another mode.
     """
     first = sum(p.arclength < special.point.arclength for p in rows)
     before, after, number = rows[:first][::-1], rows[first:], 2 if isfinite(special.error_estimate) else 1

@@ -1,26 +1,19 @@
-r"""How many eigenvalues other than those that meet or vanish on a locus are unstable, under loads without a potential.
-
-The index of a symmetric tangent matrix comes with its factors (:mod:`rodfem.continuation.singular`).  Without symmetry
-stability is decided by the eigenvalues ``omega^2``: those that are negative or complex count, of all that the mesh has
-(:mod:`rodfem.stability.spectrum`).
-
-What the points of a locus fulfil: its defining equations, as a corrector onto the curve.
+"""What the points of a locus fulfil: its defining equations, as a corrector onto the curve.
 
 Folds, branch points and divergence loads are where the second variation is singular: the equations of one of them
 (:mod:`rodfem.continuation.singular`) on a plane across the curve.  A branch point is one as long as its symmetry lasts:
-where the unfolding parameters do not vanish, or the equations change along the null vectors as the parameters follow
-the curve, a parameter is an imperfection.  Null vectors that a symmetry relates vanish together, or the curve ends.
-Flutter has equations of its own (:mod:`rodfem.codim2.criteria`).
+if the unfolding parameters do not vanish, or the equations change along the null vectors as the parameters follow the
+curve, a parameter is an imperfection.  Null vectors that a symmetry relates vanish together, or the curve ends.
 
-Where two frequencies of a rod under a load without a potential collide, in the plane of two parameters.
+At flutter two eigenvalues ``mu1``, ``mu2`` collide: ``D = ((mu1 - mu2)/2)^2`` vanishes
+(:mod:`rodfem.stability.cluster`; two pairs of equal ones if the rod bends alike in all planes).  The eigenvalues have a
+square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve unless the gradient
+of ``D`` vanishes (Seyranian & Mailybaev, *Multiparameter Stability Theory with Mechanical Applications*, World
+Scientific 2003, chapters 2 and 5).  A point of it is found on a line of the plane by the secant method for ``D``, its
+tangent from central differences.  Pairs that are equal by a symmetry have one ``D``; where they part, the curve ends.
 
-Two eigenvalues ``mu1``, ``mu2`` of the pencil ``S x = mu M x`` collide where ``D = ((mu1 - mu2)/2)^2`` vanishes (see
-:mod:`rodfem.stability.cluster`: two pairs of equal ones where the rod bends alike in all planes).  The eigenvalues have
-a square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve as long as the
-gradient of ``D`` does not vanish: the boundary of flutter (Seyranian & Mailybaev, *Multiparameter
-Stability Theory with Mechanical Applications*, World Scientific 2003, chapters 2 and 5).  A point of it is found on a
-given line of the plane by the secant method for ``D``, its tangent from central differences.  Pairs that are equal by
-a symmetry have one ``D``; where they part, their mean is no boundary, and the curve ends.
+Other unstable eigenvalues are counted by the factors of a symmetric tangent matrix, and without a potential among all
+that the mesh has: those that are negative or complex.
 """
 
 from __future__ import annotations
@@ -85,14 +78,12 @@ class _Frame:
 
 
 class Singular:
-    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
+    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence.
+
+    It is bordered with the null vectors of a point ``near`` the curve in a ``plane``; ``solver`` has the mesh.
+    """
 
     def __init__(self, solver: BranchSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
-        """Border with the null vectors of a point ``near`` the curve, and the left ones where there are such.
-
-        ``solver`` has the mesh, ``plane`` the two parameters.  At a ``fold`` the single null vector is coupled to the
-        load; otherwise the points are branch points.
-        """
         self.solver, self.plane, self.fold = solver, plane, fold
         self.states = SingularSystem(solver, near.modes, np.eye(len(near.modes))[:, : near.multiplicity], fold=fold)
         self.inertia, self.metric = self.states.inertia, self.states.inertia.metric
@@ -147,7 +138,6 @@ class Singular:
         return np.asarray(np.maximum(abs(last), ROUND_OFF * np.maximum(self.plane.sizes, abs(p))))
 
     def _require(self, found: SingularState) -> None:
-        """Raise :class:`Destroyed` where an imperfection has taken the branch point apart, or null vectors part."""
         if not self.fold and found.size > IMPERFECT * self.inertia.scale:
             raise Destroyed(self._broken)
         if found.spread > FEWER * self.inertia.scale:
@@ -190,9 +180,8 @@ class Singular:
 def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
     """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
 
-    By borders that are arbitrary at first: each solution is a step of inverse iteration, and the better border.  Of
-    several the left ones are turned such that each is along the right one of the same number as far as it can be:
-    where a symmetry relates them ``G`` is a multiple of one.
+    By inverse iteration, of borders that are arbitrary at first.  Of several the left ones are turned to be along the
+    right ones of the same number: if a symmetry relates them ``G`` is a multiple of one.
     """
     states = SingularSystem(solver, [], np.eye(number), fold=False)
     metric = states.inertia.metric
@@ -227,7 +216,6 @@ class Collision:
     others = UNSTABLE
 
     def __init__(self, solver: BranchSolver, plane: Plane) -> None:
-        """Allocate the pencil."""
         self.solver, self.plane = solver, plane
         self.eigensolver = NonsymmetricSolver(solver.system)
 
@@ -238,7 +226,7 @@ class Collision:
     def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
         """As :class:`~rodfem.codim2.plane.Criterion` says; the direction of the state plays no part.
 
-        Raises :class:`ConvergenceError`, and :class:`Destroyed` where pairs that met at once do not any more.
+        Raises :class:`ConvergenceError`, and :class:`Destroyed` if pairs that met at once do not any more.
         """
         node, here = self._onto(guess, near, reach)
         width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
@@ -288,10 +276,10 @@ class Collision:
         return LocusPoint(p, x, forward * width, still, located, ordinate=ordinate, omega2=here.cluster.mean), here
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
-        """Zero of ``D`` on the system's line of parameters.
+        """Zero of ``D`` on the system's line of parameters, by secants.
 
-        Secants take ``D`` from the eigenvalues, whose round-off is that of an eigensolver: they end near the zero, or
-        where they no longer shrink.  The last digits are by ``D`` of both subspaces, right and left.
+        These take ``D`` from the eigenvalues, and end near the zero, or where they no longer shrink.  The last digits
+        are by ``D`` of both subspaces, right and left.
         """
         t, other = 0.0, FIRST
         now, x = self._measured(t, x, cluster)
@@ -316,8 +304,8 @@ class Collision:
     def _by_both_sides(self, found: Zero, slope: float) -> Zero:
         """Correct a zero of ``D`` that was ``found`` twice, by its ``slope``.
 
-        The uncertainty is the last change and the round-off of ``D``.  Where left vectors are not found, as beside a
-        double zero at times, the zero stays that of the eigenvalues, uncertain by the last change of the secants.
+        The uncertainty is the last change and the round-off of ``D``.  If left vectors are not found, as beside a
+        double zero, the zero stays that of the eigenvalues.
         """
         t, _, now, x = found
         with suppress(ConvergenceError):

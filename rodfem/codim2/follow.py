@@ -1,15 +1,13 @@
-r"""Errors of the rows of a locus: how far the curve of a richer discretisation is away.
-
-Loci of special points in the plane of two parameters: the boundary of stability.
+"""Loci of special points in the plane of two parameters: the boundary of stability.
 
 A fold, a branch point, a flutter or a divergence load ``lam`` of a scene moves as another of its parameters does.  Its
-curve in the plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of
-the state and *both* parameters (see :mod:`rodfem.codim2.criteria` and :mod:`rodfem.codim2.criteria`): neither is the
-independent one, so that the curve may turn back with respect to either, and a fold's curve goes through cusps, where it
-is smooth but for its projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the
-special point changes its kind.
+curve in the plane of both is followed by pseudo-arclength continuation of the equations that define it
+(:mod:`rodfem.codim2.criteria`), in the space of the state and *both* parameters: neither is the independent one, so
+that the curve may turn back with respect to either, and goes through cusps.  Both directions are followed, to the
+bounds, exactly, or to where the special point changes its kind.  Arclength is measured with the parameters relative to
+the widths of their bounds, and the state in its metric.
 
-Arclength is measured with the parameters relative to the widths of their bounds, and the state in its metric.
+Errors of rows are how far the curve of a richer discretisation is away.
 """
 
 from __future__ import annotations
@@ -42,9 +40,9 @@ from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 
 class Errors(NamedTuple):
-    """Bounds (n, 2) of the errors of rows, nan where they are not estimated, inf where the richer mesh finds no point.
+    """Bounds (n, 2) of the errors of rows, nan where they are not estimated, inf if the richer mesh finds no point.
 
-    Of ``unresolved`` rows the mesh does not resolve the state, or its null vectors: there errors may exceed them.
+    ``unresolved`` rows are those whose state, or null vectors, the mesh does not resolve.
     """
 
     error: np.ndarray
@@ -52,10 +50,7 @@ class Errors(NamedTuple):
 
 
 def criterion_of(solver: BranchSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
-    """Defining equations of the locus of a ``kind`` of special points in a ``plane``, one of which is ``near``.
-
-    ``solver`` has the mesh.
-    """
+    """Defining equations in a ``plane`` of a ``kind`` of special points, ``near`` one; ``solver`` has the mesh."""
     return Collision(solver, plane) if kind == FLUTTER else Singular(solver, plane, near, fold=kind == FOLD)
 
 
@@ -91,16 +86,12 @@ class RicherMesh:
         return [bound(*pair, self.rho) for pair in each], resolved
 
     def _transferred(self, node: LocusPoint) -> LocusPoint:
-        """A point of the first mesh on this one."""
         x, dx = self.transfer(node.x, state=True), self.transfer(node.dx, state=False)
         modes, left = ([self.transfer(v, state=False) for v in side] for side in (node.modes, node.left))
         return replace(node, x=x, dx=dx, modes=modes, left=left)
 
     def _changed(self, near: LocusPoint, found: LocusPoint) -> float:
-        """Relative change of the strains of a state, or of one of its null vectors.
-
-        Vectors of the invariant subspace of a double eigenvalue have no counterparts on another mesh.
-        """
+        """Relative change of the strains of a state, or of one of its null vectors."""
         norm, modes = self.solver.system.norm, near.modes[: near.multiplicity]
         changes = [self.indicator.changed(near.x, found.x, state=True)]
         for first, last in zip(modes, found.modes, strict=False):
@@ -111,10 +102,10 @@ class RicherMesh:
 def errors_of(
     solver: BranchSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: Iterable[int]
 ) -> Errors:
-    """Estimate errors at some ``rows``: the distance to the curve of a richer discretisation.
+    """Estimate errors at some ``rows`` of ``nodes``: the distance to the curve of a richer discretisation.
 
     It is measured across the curve, but for turning points and ends to those of the other curve.  ``solver``, ``kind``
-    and ``plane`` are those of a locus of special points, and ``nodes`` all its rows.
+    and ``plane`` are those of the locus.
     """
     error, rows, unresolved = np.full((len(nodes), 2), np.nan), sorted(rows), set[int]()
     if not rows:
@@ -132,9 +123,9 @@ def errors_of(
 
 
 def not_integrated(solver: BranchSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> str:
-    """Take the errors away of points at which the mesh does not integrate the equations; a clause on the first.
+    """Take the errors away of ``nodes`` at which the mesh does not integrate the equations; a clause on the first.
 
-    ``solver`` has found the locus of these ``nodes`` in a ``plane``; ``error`` (n, 2) is changed.
+    ``solver`` has found the locus in a ``plane``; ``error`` (n, 2) is changed.
     """
     check, said = QuadratureCheck(solver.system), ""
     for row in np.flatnonzero(np.isfinite(error[:, 0])):

@@ -1,22 +1,18 @@
-r"""Where along a locus a turning point or an end is: by a polynomial through points of the curve near by.
-
-Points of a locus are known to the last digits *across* it.  Where along it a parameter has its extremum, or a double
-eigenvalue vanishes, is known less well; tangents by differences would displace it.  Points on both sides are therefore
-corrected to the curve at Chebyshev's points of a window of the tangent, and what is sought is read from the polynomials
-through them, with its uncertainty: the last two coefficients, which hold both the round-off of the points and what the
-polynomial leaves out (L. N. Trefethen, *Approximation Theory and Approximation Practice*, SIAM 2013, chapters 3 and 8),
-and the difference between two windows.  Too narrow windows amplify round-off, too wide ones leave out more: the best of
-several is taken.
-
-Points of codimension two between two nodes of a locus: cusps, and ends of folds and of flutter; and turning points.
+"""Points of codimension two between two nodes of a locus: cusps, and ends of folds and of flutter; and turning points.
 
 At a *cusp* of a fold its curvature vanishes and both parameters turn back, while the coupling of its null vector with
-the parameters does not vanish.  Where it does, in both of them at one place, the fold *ends on a branch point*: beyond
-it the curve is its own mirror image.  It may also *pass a branch point*, to other parameters.  A double eigenvalue that
+the parameters does not vanish.  If it does, in both of them at one place, the fold *ends on a branch point*: beyond it
+the curve is its own mirror image; or it *passes a branch point*, to other parameters.  A double eigenvalue that
 vanishes ends a curve of flutter.
 
-What changes sign between two nodes is located.  What changes it twice is looked for where a parabola or cubic through
-the nodes has its extremum: such a step is parted there.
+What changes sign between two nodes is located.  What changes it twice is looked for at the extremum of a parabola or
+cubic through the nodes: such a step is parted there.
+
+Points of a locus are known to the last digits *across* it, tangents by differences displace places along it.  Points
+on both sides are corrected to the curve at Chebyshev's points of a window of the tangent, and what is sought is read
+from the polynomials through them, with its uncertainty: the last two coefficients, which hold the round-off of the
+points and what the polynomial leaves out (L. N. Trefethen, *Approximation Theory and Approximation Practice*, SIAM
+2013, chapters 3 and 8), and the difference between the best two of several windows.
 """
 
 from __future__ import annotations
@@ -176,13 +172,12 @@ class Codim2Points:
     """Finds what lies between two nodes of a locus of a ``criterion`` in a ``plane``."""
 
     def __init__(self, criterion: Criterion, plane: Plane) -> None:
-        """Keep what solves for points, and the plane."""
         self.criterion, self.plane = criterion, plane
 
     def between(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> tuple[list[Row], str]:
         """Rows between two nodes, in their order, and why the curve ends there; empty where it does not.
 
-        ``a`` and ``b`` are one after the other, and ``before`` is the node before them, None where there is none.
+        ``a`` and ``b`` are one after the other, and ``before`` is the node before them, None if there is none.
         """
         if self._reverses(a, b):
             coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
@@ -198,11 +193,7 @@ class Codim2Points:
         return self._rows(a, b, before, TRIES), ""
 
     def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
-        """Point between two neighbours at which a parameter has a value; none where it cannot be located.
-
-        The neighbours are ``a`` and ``b``; parameter number ``which`` (0 or 1) has the given ``value`` there, but where
-        the curve turns back next to it.
-        """
+        """Point between neighbours ``a``, ``b`` where parameter ``which`` has a ``value``; none if not located."""
         node, axis = self.located(a, b, lambda n: float(n.p[which]) - value), self.plane.axis(which)
         if node is None:
             return []
@@ -315,8 +306,7 @@ class Codim2Points:
     def _reverses(self, a: LocusPoint, b: LocusPoint) -> bool:
         """Whether coupling and tangent change their signs between two nodes, in each parameter that has some.
 
-        Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.  Where it
-        goes on to others it passes the branch point.
+        Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.
         """
         coupled = _coupled(a, b)
         moves = np.minimum(abs(a.dp), abs(b.dp)) > NONE * self.plane.width
@@ -331,8 +321,7 @@ class Codim2Points:
     def _end_of_fold(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
         """The end near ``node`` of a fold on a branch point, by interpolation between its two sides.
 
-        No point can be corrected to it: there the curve of branch points passes, on which corrections may slide along.
-        Nor has the fold a tangent of its own there, but for the cubic between ``a`` and ``b``.
+        No point can be corrected to it: the curve of branch points passes there, on which corrections may slide along.
         """
         node, sought = replace(self._on_cubic(a, b, node.s), p=node.p, x=node.x), _reversal(self.plane, a, b)
         try:
@@ -349,10 +338,9 @@ class Codim2Points:
         return replace(end, rest=end.rest + len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0)))
 
     def _end(self, a: LocusPoint, b: LocusPoint, share: float, end: LocusPoint | None) -> tuple[LocusPoint, str]:
-        """The last row and words for its place: ``end``, or else, or if that is not between the nodes, on their cubic.
+        """The last row and words for its place: ``end``, or if that is not between the nodes, on their cubic.
 
-        There the line through both values of what vanishes is zero, at a ``share`` of the step: it is off by no more
-        than it is from either of them.
+        There the line through both values of what vanishes is zero, at a ``share`` of the step.
         """
         if end is None or self.criterion.length(end.p - a.p, end.x - a.x) > b.s - a.s:
             end = _within(self._on_cubic(a, b, a.s + share * (b.s - a.s)), a, b)

@@ -117,7 +117,6 @@ class Orbits:
     """
 
     def __init__(self, system: System) -> None:
-        """Start with none; translations, whose generators are the same at all states, are told from rotations."""
         self.system = system
         self.states: list[PETSc.Vec] = []
         self.orbits: list[dict[int, Orbit]] = []

@@ -1,34 +1,23 @@
-r"""Equilibria of traced branches at a load: at rows there and between rows, each once.
+r"""Deflation: further equilibria at one load, whether or not a branch connects them to those that are known.
 
-Newton's method on deflated equations, preceded by a few steps of gradient flow.
+Each try starts from a smooth seeded guess, a known state that is turned.  A few steps of gradient flow (backward Euler:
+Newton's method with ``K + alpha M`` for ``K``) fit its multipliers, which far from equilibrium matter more than all
+else: of guesses turned by 0.8 from a straight hemitropic rod 4 of 20 led to a buckled state without them, 20 with them.
+Then it iterates by Newton's method on equations from which the known equilibria are divided out (Farrell, Birkisson &
+Funke, SIAM J. Sci. Comput. 37 (2015) A2026-A2045) ::
 
-Multiplied by the deflation operator (Farrell, Birkisson & Funke, SIAM J. Sci. Comput. 37 (2015) A2026-A2045) ::
+    G(x) = M(x) F(x),    M(x) = prod_i (1 / d_i(x)^2 + 1),    d_i(x) = distance of x from the known equilibrium i.
 
-    G(x) = M(x) F(x),    M(x) = prod_i (1 / d_i(x)^2 + 1),    d_i(x) = distance of x from the known equilibrium i,
-
-the equations ``F`` keep all their solutions but the known ones, and Newton's method on ``G`` from the same guess must
-go elsewhere, or fail.  No matrix of ``G`` is formed: it differs from ``M F'`` by a matrix of rank one, so that its
-Newton step is the plain one ``p = -F'^-1 F``, rescaled (Sherman & Morrison) ::
+They keep all their solutions but those.  ``G'`` differs from ``M F'`` by a matrix of rank one, so that its Newton step
+is the plain one ``p = -F'^-1 F``, rescaled (Sherman & Morrison) ::
 
     step = p / (1 - grad log M . p),    grad log M . p = -sum_i 2 <x - x_i, p> / (d_i^2 (1 + d_i^2)).
 
-The distance is that of the system's metric (root mean square rotation, with the centreline where it is an unknown):
-at a given load the rotation determines the strains and multipliers of a rod with a convex energy, and these have no
-common unit.  A known equilibrium stands for its orbit (:mod:`rodfem.deflation.group_orbit`), and ``d_i`` is the
-distance from the nearest point of that, where the gradient of ``d_i^2`` is still ``2 (x - x_i)``.
-
-Far from equilibrium, multipliers that fit the guess matter more than anything else.  A few steps of gradient flow
-(backward Euler: Newton's method with ``K + alpha M`` for ``K``) find them, and lead to where branches are.  Of guesses
-turned by 0.8 from a straight hemitropic rod 4 of 20 led to a buckled state without these steps, and 20 of 20 with them.
-
-Deflation: further equilibria at one load, whether or not a branch connects them to those that are known.
-
-Each try starts from a smooth seeded guess, a known state that is turned, and iterates by Newton's method on equations
-from which the known equilibria are divided out (:mod:`rodfem.deflation.search`).  What a symmetry makes of a
-known equilibrium is known too: a continuous symmetry makes it a circle (:mod:`rodfem.deflation.group_orbit`), discrete
-ones a few isolated images (:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain
-Newton method, and kept if it is new and admissible.  States of known branches are found by
-:mod:`rodfem.deflation.search`.
+The distance is that of the system's metric: at a given load the rotation determines the strains and multipliers of a
+rod with a convex energy.  What a symmetry makes of a known equilibrium is known too: ``d_i`` is the distance from the
+nearest point of its orbit (:mod:`rodfem.deflation.group_orbit`), and discrete symmetries add isolated images
+(:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
+new and admissible.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
@@ -54,52 +43,6 @@ from rodfem.fem.system import System
 from rodfem.problem.end import TURNS
 from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD, TINY
 
-
-def equilibria_at(
-    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
-) -> list[Point]:
-    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
-
-    A row at that load is one; none counts twice, as where branches begin and end at one state, or what the symmetries
-    carry into each other.  Raises :class:`ConvergenceError` where there is none between two points on either side of
-    the load.  ``here`` brings points of ``branches`` to the mesh of ``solver``, where they are on others.
-    """
-    found, known = list[Point](), Orbits(solver.system)
-    for branch in branches:
-        for point in _along(solver, [here(p) for p in branch.points], load, singular_states(branch)):
-            if all(apart >= APART for apart, _ in known.nearest(point.x)):
-                found.append(point)
-                known.add(point.x)
-    return found
-
-
-def singular_states(branch: Branch) -> set[int]:
-    """Ids of the states of a branch that are those of folds and branch points."""
-    first = {id(branch.points[0].x)} if branch.parent else set()
-    return first | {id(s.point.x) for s in branch.special if s.kind.singular}
-
-
-def _along(solver: BranchSolver, points: Sequence[Point], load: float, singular: set[int]) -> Iterator[Point]:
-    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh.
-
-    At those whose states are ``singular``, by their ids, Newton's method at the load itself has nothing to go by: they
-    are what was located.
-    """
-    for a, b in zip(points, [*points[1:], None], strict=True):
-        if a.load == load and id(a.x) in singular:
-            yield solver.point(a.x, a.arclength, a.tangent)
-        elif a.load == load:
-            x, outcome = solver.at_load(a.x, load, reach=1.0)
-            if not outcome.converged:
-                raise ConvergenceError(
-                    f"No equilibrium was found at {solver.system.scene.load} = {load:g} beside a row there: use more "
-                    "elements, or another load."
-                )
-            yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)
-        if b is not None and (a.load - load) * (b.load - load) < 0:
-            yield Arc(solver, a, b).at_load(load)
-
-
 MOST = 60
 """Deflated Newton steps of one try."""
 NEAR = 1e-4
@@ -107,15 +50,93 @@ NEAR = 1e-4
 takes over."""
 FLOW = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 """Reciprocal time steps of the gradient flow, over the rod's lowest bending eigenvalue."""
+LEAST, GREATEST = 0.3, 3.0
+"""Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
+SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
+"""Equilibria that slide are one if their energies agree to the first, or to the second of their natural size."""
+
+NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not admissible"
 
 
-class DeflatedNewton:
-    """Iterates towards equilibria at a fixed load that are not among the ``known`` ones."""
+@dataclass
+class SearchLog:
+    """What a search did: its ``load`` in words, how its ``tries`` ended, and the ``mirrors`` (symmetries) of the scene.
 
-    def __init__(self, solver: BranchSolver) -> None:
-        """Start with nothing known."""
-        self.solver, self.system = solver, solver.system
-        self.known = Orbits(self.system)
+    ``tries`` are the outcomes above, in order.  ``nearly`` counts equilibria that are nearly mirror images of others,
+    which an imperfection makes different ones.
+    """
+
+    load: str
+    tries: list[str] = field(default_factory=list)
+    mirrors: list[str] = field(default_factory=list)
+    nearly: int = 0
+
+    def __str__(self) -> str:
+        """Return the counts, and what they do not prove, in a few lines."""
+        words = ", ".join(f"{self.tries.count(outcome)} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
+        images = "; ".join(self.mirrors) or "none"
+        nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
+        return (
+            f"Further equilibria at {self.load} by deflation, {len(self.tries)} tries: {words}\n{nearly}"
+            f"  states that a symmetry carries into each other count as one (mirror images: {images})\n"
+            "  no proof that there are no others: more tries or another seed may find some"
+        )
+
+
+class Deflation:
+    """Search for equilibria at one ``load``, on the mesh of a ``solver``, beside the ``known`` ones at that load.
+
+    New ones are ``found``, one of each set that the symmetries carry into each other; the ``tally`` says how tries
+    ended, ``mirrors`` are the discrete symmetries.  ``seed`` is that of the random guesses.  Raises :class:`InputError`
+    for a known equilibrium at another load.
+    """
+
+    def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
+        self.solver, self.system, self.known = solver, solver.system, Orbits(solver.system)
+        self.load, self.seed = load, seed
+        scene = self.system.scene
+        scene.parameters[scene.load].check(scene.load, load)
+        for point in known:
+            if abs(point.load - load) > SAME_LOAD * abs(scene.span[1] - scene.span[0]):
+                raise InputError(
+                    f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
+                    "give equilibria at the load of the search (diagram.at(load) computes them)."
+                )
+        self.start = solver.start(load)
+        self.mirrors = mirrors(self.system, self.start)
+        self.bases: list[PETSc.Vec] = []
+        self.found: list[Point] = []
+        self.energies: list[float] = []
+        # states shifted along the rod are one, and known by their energy
+        self.slides = any(s.along for s in self.system.symmetries)
+        self.tally = SearchLog(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
+        for point in known:
+            self._deflate(point.x)
+
+    def run(self, tries: int) -> list[Point]:
+        """Make ``tries`` tries, the first from the scene's start if nothing is known; all that was found so far.
+
+        Guesses start in turn from the known and the found states, and grow from ``LEAST`` to ``GREATEST``; half of them
+        flow twice as long.  The tries of a second call are others.  The first ones of a rod whose ends turn freely are
+        the first state turned over.
+        """
+        before = len(self.tally.tries)
+        over = turned_over(self.system, self.bases[0]) if self.bases else []
+        for number in range(before, before + tries):
+            x = self.start.copy()
+            if number < len(over):
+                x = over[number]
+            elif number or self.known.states:
+                amplitude = LEAST * (GREATEST / LEAST) ** ((number - before) / max(tries - 1, 1))
+                base = self.bases[number % len(self.bases)] if self.bases else self.start
+                x = turned_state(self.system, base, amplitude, [self.seed, number])
+                self.flow(x, FLOW * (1 + number // 2 % 2))
+            point, outcome = self._judge(x) if self.approach(x).converged else (None, FAILED)
+            self.tally.tries.append(outcome)
+            if point is not None:
+                self.found.append(point)
+                self._deflate(point.x)
+        return self.found
 
     def flow(self, x: PETSc.Vec, alphas: Sequence[float] = FLOW) -> None:
         """Steps of gradient flow from ``x``, in place: towards constraints, lower energy, and multipliers that fit."""
@@ -182,105 +203,6 @@ class DeflatedNewton:
         normalised = {f.turning.name: f.turning.normalised(state.turned)}
         self.system.vector(f.filled(state.named | normalised), state.drifts).copy(x)
 
-
-LEAST, GREATEST = 0.3, 3.0
-"""Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
-SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
-"""Equilibria that slide are one if their energies agree to the first, or to the second of their natural size."""
-
-NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not admissible"
-
-
-@dataclass
-class SearchLog:
-    """What a search did: its ``load`` in words, how its ``tries`` ended, and the ``mirrors`` (symmetries) of the scene.
-
-    ``tries`` are the outcomes above, in order.  ``nearly`` counts equilibria that are nearly mirror images of others,
-    which an imperfection makes different ones.
-    """
-
-    load: str
-    tries: list[str] = field(default_factory=list)
-    mirrors: list[str] = field(default_factory=list)
-    nearly: int = 0
-
-    def __str__(self) -> str:
-        """Return the counts, and what they do not prove, in a few lines."""
-        words = ", ".join(f"{self.tries.count(outcome)} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
-        images = "; ".join(self.mirrors) or "none"
-        nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
-        return (
-            f"Further equilibria at {self.load} by deflation, {len(self.tries)} tries: {words}\n{nearly}"
-            f"  states that a symmetry carries into each other count as one (mirror images: {images})\n"
-            "  no proof that there are no others: more tries or another seed may find some"
-        )
-
-
-class Deflation(DeflatedNewton):
-    """Search for equilibria of a :class:`~rodfem.continuation.branch_solver.BranchSolver`'s scene at one load.
-
-    Attributes
-    ----------
-    found
-        New equilibria, one of each set that the symmetries carry into each other.
-    tally
-        How the tries ended.
-    mirrors
-        Discrete symmetries of the scene at this load.
-    """
-
-    def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
-        """Deflate the known equilibria and their images; :class:`InputError` where one is at another load.
-
-        ``solver`` has the mesh, ``load`` is that of all ``known`` points, and ``seed`` that of the random guesses.
-        """
-        super().__init__(solver)
-        self.load, self.seed = load, seed
-        scene = self.system.scene
-        scene.parameters[scene.load].check(scene.load, load)
-        for point in known:
-            if abs(point.load - load) > SAME_LOAD * abs(scene.span[1] - scene.span[0]):
-                raise InputError(
-                    f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
-                    "give equilibria at the load of the search (diagram.at(load) computes them)."
-                )
-        self.start = solver.start(load)
-        self.mirrors = mirrors(self.system, self.start)
-        self.bases: list[PETSc.Vec] = []
-        self.found: list[Point] = []
-        self.energies: list[float] = []
-        self.slides = any(
-            s.along for s in self.system.symmetries
-        )  # then states shifted along the rod are one, and known by their energy
-        self.tally = SearchLog(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
-        for point in known:
-            self._deflate(point.x)
-
-    def run(self, tries: int) -> list[Point]:
-        """Make ``tries`` tries, the first from the scene's start if nothing is known; all that was found so far.
-
-        Guesses start in turn from the known and the found states, and grow from ``LEAST`` to ``GREATEST``; half of them
-        flow twice as long.  The tries of a second call are others.  The first ones of a rod whose ends turn freely are
-        the first state turned over.
-        """
-        before = len(self.tally.tries)
-        over = turned_over(self.system, self.bases[0]) if self.bases else []
-        for number in range(before, before + tries):
-            x = self.start.copy()
-            if number < len(over):
-                x = over[number]
-            elif number or self.known.states:
-                amplitude = LEAST * (GREATEST / LEAST) ** ((number - before) / max(tries - 1, 1))
-                base = self.bases[number % len(self.bases)] if self.bases else self.start
-                x = turned_state(self.system, base, amplitude, [self.seed, number])
-                self.flow(x, FLOW * (1 + number // 2 % 2))
-            point, outcome = self._judge(x) if self.approach(x).converged else (None, FAILED)
-            self.tally.tries.append(outcome)
-            if point is not None:
-                self.found.append(point)
-                self._deflate(point.x)
-        return self.found
-
     def nearest_known(self, x: PETSc.Vec) -> float:
         """Distance of a state from all that is known, images by symmetries included; infinite if that is nothing."""
         return min((d for d, _ in self.known.nearest(x)), default=float("inf"))
@@ -339,9 +261,8 @@ class Deflation(DeflatedNewton):
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
     """Known state turned by a smooth rotation that respects clamps, its vector of that root mean square size.
 
-    The vector is a random combination of the lowest four waves along the rod that vanish where directors are clamped.
-    It depends on the nodes and the seed only, not on how the rod is shared among ranks.  ``base`` is the known state of
-    the ``system``, ``amplitude`` the size in radian, ``seed`` that of the random numbers.
+    The vector, of this ``amplitude``, is a random combination of the lowest four waves along the rod that vanish where
+    directors are clamped; it depends on the nodes and the ``seed`` only.  ``base`` is a state of the ``system``.
     """
     f = system.fields
     rng = np.random.default_rng(seed)
@@ -358,10 +279,9 @@ def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[i
 
 
 def turned_over(system: System, base: PETSc.Vec) -> list[PETSc.Vec]:
-    """Known state turned as a whole by half a turn about d1, and about d2, where both ends turn freely; else none.
+    """Known state ``base`` turned over, half a turn about d1, and about d2, where both ends turn freely; else none.
 
-    Waves along the rod never get there: a rod between two pins may hang below the one that it stands on.  Newton's
-    method moves the ends to where they are held.  ``base`` is the known state of the ``system``.
+    Waves along the rod never get there: a rod between two pins may hang below the one that it stands on.
     """
     if system.scene.closed or any(end.turning != TURNS for end in system.scene.sides):
         return []
@@ -394,13 +314,57 @@ def find_equilibria(
 ) -> list[Point]:
     """Equilibria at ``load`` beside the ``known`` ones, from ``tries`` deflated Newton iterations.
 
-    Each stands for all that the scene's symmetries make of it, and carries its index, energy, ordinate and a tangent in
-    the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
-    Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one.  ``solver`` has
-    the mesh, and ``seed`` is that of the random guesses.
+    Each stands for all that the scene's symmetries make of it, and has index, energy, ordinate and a tangent in the
+    direction of increasing load.  How the tries ended goes to the ``observer``.  Raises :class:`InputError` for a load
+    that is not admissible.  ``solver`` and ``seed`` are those of :class:`Deflation`.
     """
     search = Deflation(solver, load, known, seed)
     found = search.run(tries)
     if observer is not None:
         observer.note(str(search.tally))
     return found
+
+
+def equilibria_at(
+    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
+) -> list[Point]:
+    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
+
+    A row at that load is one; none counts twice, as where branches begin and end at one state, or what the symmetries
+    carry into each other.  Raises :class:`ConvergenceError` where there is none between two points on either side of
+    the load.  ``here`` brings points of ``branches`` to the mesh of ``solver``, where they are on others.
+    """
+    found, known = list[Point](), Orbits(solver.system)
+    for branch in branches:
+        for point in _along(solver, [here(p) for p in branch.points], load, singular_states(branch)):
+            if all(apart >= APART for apart, _ in known.nearest(point.x)):
+                found.append(point)
+                known.add(point.x)
+    return found
+
+
+def singular_states(branch: Branch) -> set[int]:
+    """Ids of the states of a branch that are those of folds and branch points."""
+    first = {id(branch.points[0].x)} if branch.parent else set()
+    return first | {id(s.point.x) for s in branch.special if s.kind.singular}
+
+
+def _along(solver: BranchSolver, points: Sequence[Point], load: float, singular: set[int]) -> Iterator[Point]:
+    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh.
+
+    At those whose states are ``singular``, by their ids, Newton's method at the load itself has nothing to go by: they
+    are what was located.
+    """
+    for a, b in zip(points, [*points[1:], None], strict=True):
+        if a.load == load and id(a.x) in singular:
+            yield solver.point(a.x, a.arclength, a.tangent)
+        elif a.load == load:
+            x, outcome = solver.at_load(a.x, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(
+                    f"No equilibrium was found at {solver.system.scene.load} = {load:g} beside a row there: use more "
+                    "elements, or another load."
+                )
+            yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)
+        if b is not None and (a.load - load) * (b.load - load) < 0:
+            yield Arc(solver, a, b).at_load(load)

@@ -52,9 +52,9 @@ COORDINATES = ("full", "tangent", "compatible")
 
 @dataclass(frozen=True)
 class MappedPencil(Pencil):
-    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones.
+    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones; ``symmetric`` but under a follower load.
 
-    It is ``symmetric`` but under a follower load.  The rows of spins are ``where["theta"]``.
+    The rows of spins are ``where["theta"]``.
     """
 
     T: sp.csr_matrix

@@ -1,9 +1,9 @@
-r"""Eigenvalues by reduction: the pencil of a state on the null space of its constraints.
+"""Eigenvalues by reduction: the pencil of a state on the null space of its constraints, and by the Cayley transform.
 
 With ``C = (Q1 Q2) (R; 0)`` from :mod:`rodfem.kumar_healey.null_space`, the perturbations that fulfil the constraints
 are ``x = Q2 z``, and the singular pencil ``(K C; C^t 0), (M 0; 0 0)`` of size m + p becomes
 
-    Q2^t K Q2 z = mu Q2^t M Q2 z,        of size m - p,
+    Q2^t K Q2 z = mu Q2^t M Q2,        of size m - p,
 
 whose finite eigenvalues are those of the former, without its 2p infinite ones (Kumar & Healey 2010, (21)-(32)).
 
@@ -11,31 +11,28 @@ A Krylov space of the inverse of the shifted matrix, ``A = K - sigma M``, finds 
 
     T = (Q2^t A Q2)^-1 Q2^t M Q2,        T z = z / (mu - sigma).
 
-The inverse is a block of that of a sparse saddle point matrix:
+The inverse is a block of that of a sparse saddle point matrix (``inverse="saddle"``):
 
     ( A    C ) ( x )   ( Q2 b )
     ( C^t  0 ) ( y ) = (  0   ),        (Q2^t A Q2)^-1 b = Q2^t x:
 
-the second row puts x in the kernel, Q2^t times the first is Q2^t A Q2 z = b (``inverse="saddle"``).  It holds whenever
-C has full rank and sigma is no eigenvalue, also where A itself is singular.  Elimination of x, (32),
+the second row puts x in the kernel, Q2^t times the first is Q2^t A Q2 z = b.  It holds if C has full rank and sigma is
+no eigenvalue, also if A itself is singular.  Elimination of x, (32) (``inverse="elimination"``),
 
-    (Q2^t A Q2)^-1 = Q2^t [A^-1 - A^-1 C (C^t A^-1 C)^-1 C^t A^-1] Q2        (``inverse="elimination"``),
+    (Q2^t A Q2)^-1 = Q2^t [A^-1 - A^-1 C (C^t A^-1 C)^-1 C^t A^-1] Q2,
 
-factors A alone and needs p solves and a dense p x p matrix more: for a few integral constraints.  It fails where A is
-singular although the reduced matrix is not.  So it is in the pointwise formulation without mass (``rho_A = 0``) or with
-sigma = 0, where A has no entry for the centreline at all, and where sigma is an eigenvalue of the unconstrained pencil.
+factors A alone and needs p solves and a dense p x p matrix more: for a few integral constraints.  It fails if A is
+singular although the reduced matrix is not: in the pointwise formulation without mass (``rho_A = 0``) or with
+sigma = 0, where A has no entry for the centreline, and if sigma is an eigenvalue of the unconstrained pencil.
 
-Every rank has the whole matrices and computes the same.
-
-The paper's method for the left-most eigenvalues: reduction with a shift, and with that of its Cayley transform.
-
-The transform ``(mu - a2) / (mu - a1)`` with ``a1 = (mu1 + mu2) / 2`` and ``a2 = 2 mu2 - a1`` is 3 at the first
+The Cayley transform ``(mu - a2) / (mu - a1)`` with ``a1 = (mu1 + mu2) / 2`` and ``a2 = 2 mu2 - a1`` is 3 at the first
 eigenvalue, -1 at the second, and less than one in size beyond: the first dominates.  Along a branch the two are
 estimated by those of the point before.  It belongs to the matrix
 
     (K - a1 M)^-1 (K - a2 M) = 1 + (a1 - a2) (K - a1 M)^-1 M,
 
 whose Krylov spaces are those of ``(K - a1 M)^-1 M`` for any ``a2``: shift-invert with the shift ``a1``.
+Every rank has the whole matrices and computes the same.
 """
 
 from __future__ import annotations
@@ -94,8 +91,8 @@ class ReducedPencil:
     def near(self, number: int, target: float) -> Reduced:
         """Return the ``number`` eigenvalues nearest to ``target``, of equally near ones the left.
 
-        With a target below the spectrum they are the left-most ones.  Raises :class:`InputError` for more eigenvalues
-        than there are rows, :class:`ConvergenceError` where fewer are found, or where the shifted matrix is singular.
+        Raises :class:`InputError` for more eigenvalues than there are rows, :class:`ConvergenceError` if fewer are
+        found, or the shifted matrix is singular.
         """
         n = self.kernel.dimension
         if number > n:
@@ -185,7 +182,6 @@ class Reduction(Method):
     """A Krylov space of the reduced pencil."""
 
     def __init__(self, work: Workspace) -> None:
-        """Work in tangent coordinates."""
         super().__init__(work)
         self.coordinates = Coordinates(work.system)
 
@@ -205,9 +201,9 @@ class Reduction(Method):
         return ReducedPencil(self.coordinates.without_modes(x, self.work.sizes))
 
     def lifted(self, found: Reduced, certified: bool, factorisations: int, note: str = "") -> Found:
-        """What was ``found``, as vectors of the system and in its units, with ``factorisations`` and a ``note``.
+        """What was ``found``, as vectors of the system in its units; ``certified``: a count finds no more.
 
-        It is ``certified`` where a count finds no more.
+        It cost so many ``factorisations``, and a ``note`` goes after the reason.
         """
         vectors = self.coordinates.lift(found.vectors, self.work.sizes)
         return Found(self.work.one * found.values, vectors, found.errors, certified, factorisations, note)
@@ -217,7 +213,6 @@ class Cayley(Reduction, SymmetricMethod):
     """Its shift is from estimates of the two left-most eigenvalues, or from those of the last state."""
 
     def __init__(self, work: Workspace) -> None:
-        """There is no last state."""
         super().__init__(work)
         self._shift: float | None = None
 

@@ -1,16 +1,12 @@
-"""Two-sided eigenproblem of a rod under loads without a potential: biorthonormal right and left eigenvectors.
+"""Finds the modes of states: signed, turned within equal eigenvalues, named; see :mod:`rodfem.modes.modes`.
 
-Motions of the rod in the eigenvectors of a state: signed, turned within equal eigenvalues, and named.
-
-Modes at a few typical states of each branch, which every run records: its ends, evenly between, special points.
-
-Finds the modes of a state from the eigenvectors of its assessment: see :mod:`rodfem.modes.modes`.
+Under loads without a potential right and left eigenvectors are biorthonormal in the mass.  Every run records a few
+modes at typical states of each branch: its ends, evenly between, special points.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,99 +35,22 @@ from rodfem.tolerances import SAME_EIGENVALUE
 
 SAME = 1e-6
 """Relative difference below which a left and a right eigenvalue are paired."""
-
-
-@dataclass(frozen=True)
-class TwoSided:
-    """Eigenvalues ``values`` (k,) nearest zero of non-negative imaginary part, backward ``errors``, motions ``kinds``.
-
-    ``right`` X and ``left`` Z (n, k) on this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and
-    positive, ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.  The ``noise`` (k,) of the eigenvalues is what
-    round-off of the matrix may make of them, to first order, and what the eigensolver left: near a double one, where
-    left and right vectors are nearly orthogonal, it is as much more as they are.
-    """
-
-    values: np.ndarray
-    errors: np.ndarray
-    kinds: tuple[str, ...]
-    right: np.ndarray
-    left: np.ndarray
-    weighed: np.ndarray
-    noise: np.ndarray
-
-
-def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
-    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero, those of rigid motions left out.
-
-    These have a zero eigenvalue, and under a thrust that follows the rod no vectors of their own: turning it
-    accelerates it.
-
-    Raises :class:`ConvergenceError` if a right eigenvalue has no left partner, or the mesh has fewer of them.
-    """
-    right, left = (pencil.near_zero(2 * number, left=left) for left in (False, True))
-    chosen = sorted(moving(right, number), key=lambda i: right.values[i].real)
-    partners: list[int] = []
-    for value in right.values[chosen]:
-        distance = abs(left.values - value)
-        distance[partners] = np.inf
-        partners.append(int(np.argmin(distance)))
-        if distance[partners[-1]] > SAME * abs(value):
-            raise ConvergenceError(
-                f"The left mode of the eigenvalue {value:.6g} was not found: ask for fewer modes, or change the load."
-            )
-    comm = pencil.system.comm
-    X, Z = alone(pencil, right.vectors[:, chosen]), left.vectors[:, partners]
-    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ pencil.weighed(X)).T)
-    values = right.values[chosen]
-    quotients = comm.allreduce(np.sum(Z * (local_rows(pencil.matrix) @ np.concatenate(comm.allgather(X))), axis=0))
-    rounded = np.array([rounding_of(pencil.matrix, z, x) for z, x in zip(Z.T, X.T, strict=True)])
-    return TwoSided(
-        values,
-        right.errors[chosen],
-        tuple(right.kinds[i] for i in chosen),
-        X,
-        Z,
-        pencil.weighed(Z),
-        NOISE * rounded + DRAWN * abs(quotients - values),
-    )
-
-
-def moving(found: Frequencies, number: int) -> list[int]:
-    """Places of the ``number`` eigenvalues ``found`` nearest zero, nearest first: one of each pair, no rigid motion.
-
-    Raises :class:`ConvergenceError` where there are fewer.
-    """
-    places = [i for i in upper(found.values, len(found.values)) if found.kinds[i] != motion_names.RIGID]
-    if len(places) < number:
-        raise ConvergenceError(
-            f"The mesh has {len(places)} modes, not {number}: ask for fewer, or use a richer discretisation."
-        )
-    return places[:number]
-
-
-def upper(values: np.ndarray, number: int) -> list[int]:
-    """Places of the ``number`` of ``values`` nearest zero that have no negative imaginary part: one of each pair."""
-    return [int(i) for i in np.argsort(abs(values), kind="stable") if values[i].imag >= 0.0][:number]
-
-
-def alone(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
-    """Columns ``X`` (n, k) of ``vectors`` with ``X^* M X = 1``, and ``X^t M X`` real and positive, for each."""
-    comm, X = pencil.system.comm, vectors
-    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * pencil.weighed(X), axis=0)).real)
-    return np.asarray(X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * pencil.weighed(X), axis=0)))))
-
-
 SEEN = 1e-3
 """Response of a mode to a functional, relative to the greatest one, below which the functional does not observe it."""
 DOUBLE = 1e-3
 """Eigenvalues nearer than this, relative, to a double one are that: round-off parts them by its square root."""
+EVENLY = 5
+"""States of a branch, evenly along it."""
+FEWEST, MOST = 4, 8
+"""Modes of a state: those of negative eigenvalues are among them up to the latter."""
+FLOOR = 5e-12
+"""Least uncertainty of an eigenvalue by round-off, relative to the greatest one (rings of 32 elements: 2e-12)."""
 
 
 class Turned(NamedTuple):
-    """Modes of a conservative state: ``vectors`` orthonormal in the ``mass``, their ``motions``, and names.
+    """Modes of a conservative state: ``vectors`` orthonormal in the mass, ``motions``, ``names``; symmetries come last.
 
-    The symmetries come last, with ``duals``, the products of all vectors with the mass (or, of what moves no mass,
-    with the metric).
+    ``duals`` are the products of the vectors with the mass or, of what moves no mass, with the metric.
     """
 
     vectors: list[PETSc.Vec]
@@ -140,21 +59,112 @@ class Turned(NamedTuple):
     names: tuple[str, ...]
 
 
-class Eigenmotions:
-    """Finds the motions of states of one :class:`~rodfem.fem.system.System`."""
+class ModeFinder:
+    """Finds the modes of states of one system; ``error_bars`` are from a second, richer discretisation."""
 
-    def __init__(self, solver: BranchSolver) -> None:
-        """Keep the solver of the equilibria."""
+    def __init__(self, solver: BranchSolver, error_bars: bool = True) -> None:
         self.assessor, self.motions, self.system = Assessor(solver), Motions(solver.system), solver.system
-        self._functionals = np.zeros((0, 0))
+        self.error_bars, self._functionals = error_bars, np.zeros((0, 0))
+        self._richer: tuple[BranchSolver, Assessor, Transfer] | None = None
+
+    def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
+        """Assess the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
+        verdict = self.assessor(x, method, number)
+        sample = self.motions.sample(x)
+        found, noise = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
+        errors = np.full(len(found["value"]), np.nan)
+        values = found["value"][: len(found["value"]) - found["motion"].count(SYMMETRY)]
+        note = QuadratureCheck(self.system)(x) if self.error_bars else ""
+        if self.error_bars and not note:
+            errors[: len(values)] = self._errors(x, values, noise)
+        unit = sample["q"] / np.linalg.norm(sample["q"], axis=1, keepdims=True)
+        state = {"load": self.system.scalar(x), "s": sample["s"], "r": sample["r"], "q": unit}
+        return verdict, Modes(**state, error=errors, note=note, **found)
+
+    def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> tuple[dict[str, Any], np.ndarray]:
+        """Modes from the vectors of a verdict, orthonormal in the mass, the symmetries', and round-off of those."""
+        if not verdict.vectors:
+            raise InputError("Counting alone finds no modes: choose another method than 'count'.")
+        pencil = self.assessor.symmetric.at(x)
+        turned = self.turned(x, verdict.values, verdict.vectors, pencil.mass)
+        noise = _rounded(pencil, turned.vectors[: len(verdict.values)], verdict.values)
+        weights = [self.motions.dual(x, y) for y in turned.duals]
+        none = np.zeros(len(turned.vectors) - len(verdict.values))
+        right = stack(turned.motions)
+        found = {
+            "value": np.append(verdict.values, none),
+            "residual": np.append(verdict.errors, none * np.nan),
+            "motion": turned.names,
+            **dict(zip(("displacement", "rotation"), right, strict=True)),
+            **dict(zip(LEFT, (*right, *stack(weights)), strict=True)),
+        }
+        return found, noise
+
+    def _pairs(self, x: PETSc.Vec, number: int) -> tuple[dict[str, Any], np.ndarray]:
+        """Right modes X and left ones Z of the eigenvalues nearest zero, ``Z^t M X = 1``, and round-off of these.
+
+        Rigid motions are left out: of eigenvalue zero, they have no left vectors of their own under a thrust that
+        follows the rod, which accelerates as it turns.  Near a double eigenvalue, where left and right vectors are
+        nearly orthogonal, the round-off is as much more as they are.
+        """
+        pencil, comm = self.assessor.nonsymmetric.at(x), self.system.comm
+        right, left = (pencil.near_zero(2 * number, left=side) for side in (False, True))
+        chosen = sorted(_moving(right, number), key=lambda i: right.values[i].real)
+        values, partners = right.values[chosen], list[int]()
+        for value in values:
+            distance = abs(left.values - value)
+            distance[partners] = np.inf
+            partners.append(int(np.argmin(distance)))
+            if distance[partners[-1]] > SAME * abs(value):
+                raise ConvergenceError(
+                    f"The left mode of the eigenvalue {value:.6g} was not found: ask for fewer modes, or change the "
+                    "load."
+                )
+        X, Z = _alone(pencil, right.vectors[:, chosen]), left.vectors[:, partners]
+        Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ pencil.weighed(X)).T)
+        quotients = comm.allreduce(np.sum(Z * (local_rows(pencil.matrix) @ np.concatenate(comm.allgather(X))), axis=0))
+        rounded = np.array([rounding_of(pencil.matrix, z, x) for z, x in zip(Z.T, X.T, strict=True)])
+        moved, sign = self.signed([self.complex(x, column) for column in X.T])
+        duals = [self.complex(x, k * column) for k, column in zip(sign, Z.T, strict=True)]
+        weights = [self.complex(x, k * column, dual=True) for k, column in zip(sign, pencil.weighed(Z).T, strict=True)]
+        modes = {
+            "value": values,
+            "residual": right.errors[chosen],
+            "motion": tuple(right.kinds[i] for i in chosen),
+            **dict(zip(("displacement", "rotation"), stack(moved), strict=True)),
+            **dict(zip(LEFT, (*stack(duals), *stack(weights)), strict=True)),
+        }
+        return modes, NOISE * rounded + DRAWN * abs(quotients - values)
+
+    def _errors(self, x: PETSc.Vec, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """Bounds by the eigenvalues of the same state on a richer mesh, and their ``noise``; inf where it has none."""
+        if self._richer is None:
+            richer = richer_system(self.system)
+            solver = BranchSolver(richer)
+            self._richer = solver, Assessor(solver), Transfer(self.system, richer)
+        solver, assessor, transfer = self._richer
+        guess = transfer(x, state=True)
+        y, outcome = solver.at_load(guess, self.system.scalar(x), reach=1.0)
+        if not outcome.converged:
+            return np.full(len(values), np.inf)
+        number = len(values)
+        if assessor.conservative:
+            verdict = assessor(y, number=number)
+            others = verdict.values
+            noise = noise + _rounded(assessor.symmetric.at(y), verdict.vectors, others)
+        else:  # each with that of the same rank: what is nearest to a value may be another mode, the more so far off
+            found = assessor.nonsymmetric.at(y).near_zero(2 * number)
+            others = np.empty(number, dtype=complex)
+            others[np.argsort(abs(values), kind="stable")] = found.values[_moving(found, number)]
+        left = np.maximum(noise, FLOOR * max(self.system.scene.units.omega2, float(abs(values).max())))
+        rho = halved(self.system.fields.discretization.degree)
+        return np.array([bound(*each, rho) for each in zip(values, others, left, strict=True)])
 
     def few(self, x: PETSc.Vec, number: int, double: float = np.nan) -> Few:
-        """The ``number`` left-most modes (nearest zero without a potential) of ``x``, without weights and error bars.
+        """The ``number`` left-most modes (nearest zero without a potential) of ``x``, and rigid motions.
 
-        Rigid motions, whose eigenvalue is zero, are there besides.
-
-        Raises :class:`~rodfem.errors.ConvergenceError` where the eigensolver fails.  ``double`` is the eigenvalue that
-        is known to be a double one with a single vector, at flutter.
+        They have no weights and error bars.  ``double`` is an eigenvalue that has a single vector, at flutter.
+        Raises :class:`~rodfem.errors.ConvergenceError` if the eigensolver fails.
         """
         if not self.assessor.conservative:
             return self._few_nearest(x, number, double)
@@ -188,7 +198,6 @@ class Eigenmotions:
         return Turned(vectors, duals, motions, (*names, *[SYMMETRY] * len(symmetries)))
 
     def _name(self, x: PETSc.Vec, v: PETSc.Vec) -> str:
-        """Name of the motion."""
         return motion_names.name_of(motion_names.turning_shares(self.system, self.system.at(x).turned, [v.array_r]))
 
     def _weights(self, values: np.ndarray, responses: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
@@ -221,13 +230,13 @@ class Eigenmotions:
         found = pencil.near_zero(2 * number)
         values, same = found.values, np.flatnonzero(abs(found.values - double) <= DOUBLE * abs(double))
         left_out = same[np.lexsort((values[same].real, -values[same].imag))][(len(same) + 1) // 2 :]
-        nearest = [i for i in upper(values, len(values)) if i not in left_out]
+        nearest = [i for i in _upper(values) if i not in left_out]
         rigid = [i for i in nearest if found.kinds[i] == motion_names.RIGID]
         moving = [i for i in nearest if i not in rigid][:number]
         chosen = [*sorted(moving, key=lambda i: values[i].real), *rigid]
         if len(chosen) and (worst := found.errors[chosen].max()) > CONVERGED:
             raise ConvergenceError(f"Eigenvalues have a backward error of {worst:.0e}: use another discretisation.")
-        columns, value = alone(pencil, found.vectors[:, chosen]), values[chosen]
+        columns, value = _alone(pencil, found.vectors[:, chosen]), values[chosen]
         coalesced = np.isin(chosen, same)
         value = np.where(coalesced, double, np.where(np.isin(chosen, rigid), 0.0, value))
         columns = np.where(coalesced, columns.real, columns)
@@ -245,6 +254,31 @@ class Eigenmotions:
         parts = as_vectors(self.system, np.stack([values.real, values.imag], axis=1))
         re, im = (evaluate(x, part) for part in parts)
         return Motion(re.r + 1j * im.r, re.w + 1j * im.w, re.q + 1j * im.q)
+
+
+def _moving(found: Frequencies, number: int) -> list[int]:
+    """Places of the ``number`` eigenvalues ``found`` nearest zero, nearest first: one of each pair, no rigid motion.
+
+    Raises :class:`ConvergenceError` where there are fewer.
+    """
+    places = [i for i in _upper(found.values) if found.kinds[i] != motion_names.RIGID]
+    if len(places) < number:
+        raise ConvergenceError(
+            f"The mesh has {len(places)} modes, not {number}: ask for fewer, or use a richer discretisation."
+        )
+    return places[:number]
+
+
+def _upper(values: np.ndarray) -> list[int]:
+    """Places of ``values`` without a negative imaginary part, nearest zero first: one of each pair."""
+    return [int(i) for i in np.argsort(abs(values), kind="stable") if values[i].imag >= 0.0]
+
+
+def _alone(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
+    """Columns ``X`` (n, k) of ``vectors`` with ``X^* M X = 1``, and ``X^t M X`` real and positive, for each."""
+    comm, X = pencil.system.comm, vectors
+    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * pencil.weighed(X), axis=0)).real)
+    return np.asarray(X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * pencil.weighed(X), axis=0)))))
 
 
 def equal(values: np.ndarray) -> list[list[int]]:
@@ -269,12 +303,6 @@ def _sum(motions: list[Motion], weights: np.ndarray) -> Motion:
     return Motion(*(np.tensordot(weights, np.array(each), 1) for each in zip(*parts, strict=True)))
 
 
-EVENLY = 5
-"""States of a branch, evenly along it."""
-FEWEST, MOST = 4, 8
-"""Modes of a state: those of negative eigenvalues are among them up to the latter."""
-
-
 def typical_rows(branch: Branch) -> dict[int, int]:
     """Rows of the typical states of a branch, and how many modes of each are wanted."""
     along = np.array([point.arclength for point in branch.points])
@@ -287,26 +315,22 @@ def typical_rows(branch: Branch) -> dict[int, int]:
 
 
 def typical_modes(branches: Sequence[Branch], solvers: Sequence[BranchSolver]) -> list[list[Typical]]:
-    """Modes at the typical states of each of the ``branches``: see :func:`of_branch`, also for the ``solvers``."""
+    """Modes at the typical states of each of the ``branches``, whose meshes have the ``solvers``; collective."""
     with solvers[0].system.clock.scope("modes"):
-        return [of_branch(branch, solvers) for branch in branches]
+        return [_of_branch(branch, solvers) for branch in branches]
 
 
-def of_branch(branch: Branch, solvers: Sequence[BranchSolver]) -> list[Typical]:
-    """Modes at the typical states of a ``branch``, each on the mesh of its point; collective.
-
-    They depend on nothing but the branch.  None of a rod without inertia.  ``solvers`` are those of the meshes by
-    number.
-    """
+def _of_branch(branch: Branch, solvers: Sequence[BranchSolver]) -> list[Typical]:
+    """Modes at the typical states of a branch, each on the mesh of its point; none of a rod without inertia."""
     if solvers[0].system.equations.massless:
         return []
-    finders: dict[int, Eigenmotions] = {}
+    finders: dict[int, ModeFinder] = {}
     double = {special.row: special.omega2 for special in branch.special}
     out = []
     for row, number in typical_rows(branch).items():
         point = branch.points[row]
         if point.mesh not in finders:
-            finders[point.mesh] = Eigenmotions(solvers[point.mesh])
+            finders[point.mesh] = ModeFinder(solvers[point.mesh])
         try:
             with as_failure(solvers[point.mesh].system.comm):
                 found = finders[point.mesh].few(point.x, number, double.get(row, np.nan))
@@ -314,93 +338,6 @@ def of_branch(branch: Branch, solvers: Sequence[BranchSolver]) -> list[Typical]:
         except (ConvergenceError, InputError) as trouble:
             out.append(Typical(row, None, str(trouble)))
     return out
-
-
-FLOOR = 5e-12
-"""Least uncertainty of an eigenvalue by round-off, relative to the greatest one (rings of 32 elements: 2e-12)."""
-
-
-class ModeFinder(Eigenmotions):
-    """Finds the modes of states of one :class:`~rodfem.fem.system.System`."""
-
-    def __init__(self, solver: BranchSolver, error_bars: bool = True) -> None:
-        """Keep the solver of the equilibria; ``error_bars`` are from a second, richer discretisation."""
-        super().__init__(solver)
-        self.error_bars = error_bars
-        self._quadrature = QuadratureCheck(solver.system)
-        self._richer: tuple[BranchSolver, Assessor, Transfer] | None = None
-
-    def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
-        """Assess the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
-        verdict = self.assessor(x, method, number)
-        sample = self.motions.sample(x)
-        found, noise = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
-        errors = np.full(len(found["value"]), np.nan)
-        values = found["value"][: len(found["value"]) - found["motion"].count(SYMMETRY)]
-        note = self._quadrature(x) if self.error_bars else ""
-        if self.error_bars and not note:
-            errors[: len(values)] = self._errors(x, values, noise)
-        unit = sample["q"] / np.linalg.norm(sample["q"], axis=1, keepdims=True)
-        state = {"load": self.system.scalar(x), "s": sample["s"], "r": sample["r"], "q": unit}
-        return verdict, Modes(**state, error=errors, note=note, **found)
-
-    def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> tuple[dict[str, Any], np.ndarray]:
-        """Modes from the vectors of a verdict, orthonormal in the mass, the symmetries', and round-off of those."""
-        if not verdict.vectors:
-            raise InputError("Counting alone finds no modes: choose another method than 'count'.")
-        pencil = self.assessor.symmetric.at(x)
-        turned = self.turned(x, verdict.values, verdict.vectors, pencil.mass)
-        noise = _rounded(pencil, turned.vectors[: len(verdict.values)], verdict.values)
-        weights = [self.motions.dual(x, y) for y in turned.duals]
-        none = np.zeros(len(turned.vectors) - len(verdict.values))
-        right = stack(turned.motions)
-        found = {
-            "value": np.append(verdict.values, none),
-            "residual": np.append(verdict.errors, none * np.nan),
-            "motion": turned.names,
-            **dict(zip(("displacement", "rotation"), right, strict=True)),
-            **dict(zip(LEFT, (*right, *stack(weights)), strict=True)),
-        }
-        return found, noise
-
-    def _pairs(self, x: PETSc.Vec, number: int) -> tuple[dict[str, Any], np.ndarray]:
-        """Right and left modes of the eigenvalues nearest zero, biorthonormal in the mass, and round-off of these."""
-        found = two_sided(self.assessor.nonsymmetric.at(x), number)
-        right, sign = self.signed([self.complex(x, column) for column in found.right.T])
-        left = [self.complex(x, k * column) for k, column in zip(sign, found.left.T, strict=True)]
-        weights = [self.complex(x, k * column, dual=True) for k, column in zip(sign, found.weighed.T, strict=True)]
-        modes = {
-            "value": found.values,
-            "residual": found.errors,
-            "motion": found.kinds,
-            **dict(zip(("displacement", "rotation"), stack(right), strict=True)),
-            **dict(zip(LEFT, (*stack(left), *stack(weights)), strict=True)),
-        }
-        return modes, found.noise
-
-    def _errors(self, x: PETSc.Vec, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """Bounds by the eigenvalues of the same state on a richer mesh, and their ``noise``; inf where it has none."""
-        if self._richer is None:
-            richer = richer_system(self.system)
-            solver = BranchSolver(richer)
-            self._richer = solver, Assessor(solver), Transfer(self.system, richer)
-        solver, assessor, transfer = self._richer
-        guess = transfer(x, state=True)
-        y, outcome = solver.at_load(guess, self.system.scalar(x), reach=1.0)
-        if not outcome.converged:
-            return np.full(len(values), np.inf)
-        number = len(values)
-        if assessor.conservative:
-            verdict = assessor(y, number=number)
-            others = verdict.values
-            noise = noise + _rounded(assessor.symmetric.at(y), verdict.vectors, others)
-        else:  # each with that of the same rank: what is nearest to a value may be another mode, the more so far off
-            found = assessor.nonsymmetric.at(y).near_zero(2 * number)
-            others = np.empty(number, dtype=complex)
-            others[np.argsort(abs(values), kind="stable")] = found.values[moving(found, number)]
-        left = np.maximum(noise, FLOOR * max(self.system.scene.units.omega2, float(abs(values).max())))
-        rho = halved(self.system.fields.discretization.degree)
-        return np.array([bound(*each, rho) for each in zip(values, others, left, strict=True)])
 
 
 def _rounded(pencil: SymmetricPencil, vectors: list[PETSc.Vec], values: np.ndarray) -> np.ndarray:

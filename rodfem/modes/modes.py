@@ -56,8 +56,8 @@ class Modes:
     value
         Eigenvalues ``mu = omega^2`` (K,); those of symmetries, zero, come last.  Complex under non-conservative loads.
     residual, error
-        Backward errors of the eigenpairs, and estimated errors of the discretisation (K,); nan where not estimated, and
-        for symmetries.
+        Backward errors of the eigenpairs, and estimated errors of the discretisation (K,); nan where not estimated,
+        and for symmetries.
     motion
         What each does: :data:`SYMMETRY`, bending about a director, torsion, or a mixture.
     displacement, rotation
@@ -115,13 +115,11 @@ def save_modes(
     first: bool,
     scene: Scene | None = None,
 ) -> None:
-    """Append the modes of one state to an HDF5 file (``first``: a new one), to be called on one rank.
+    """Append the ``modes`` of a ``row`` of a ``branch`` to the HDF5 file ``path`` (``first``: a new one), on one rank.
 
     ``about`` says in the file's attributes what rod it is.  Group ``/branches/<branch>/<row>``, named as in
     ``states.h5``, has the state's ``load``, ``s``, ``r``, ``q`` and the arrays of :class:`Modes`; a complex number is a
-    compound of ``r`` and ``i``.  Of a ``scene``, if given, what holds and loads it is written for pictures, as in
-    ``states.h5`` (see :func:`rodfem.problem.supports.write`).  ``modes`` are those of row ``row`` of ``branch``;
-    ``path`` is that of the file.
+    compound of ``r`` and ``i``.  What holds and loads the ``scene``, if given, is written for pictures.
     """
 
     def add(file: h5py.File) -> None:
@@ -185,7 +183,7 @@ def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path
 
 
 def rows_with_modes(path: Path) -> list[tuple[str, int]]:
-    """Branches and rows that a file has modes of, none without a file; raises :class:`InputError` where it is unfit."""
+    """Branches and rows that a file has modes of, none without a file; raises :class:`InputError` if it is unfit."""
     if not path.exists():
         return []
     try:

@@ -1,4 +1,4 @@
-"""What a method for stability offers, what all methods share, and those that need no reduction of the pencil.
+"""What a method for stability offers, and those that need no reduction of the pencil.
 
 ``count`` is the inertia of the saddle matrix alone; ``shift-invert`` a Krylov space of the singular pencil; ``slicing``
 all eigenvalues in an interval; ``dense`` all there are.  A method is a class here or in another room, and a name in
@@ -58,7 +58,6 @@ class Workspace:
     """Matrices and factorisations on one system, made when they are asked for and kept for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Keep a :class:`~rodfem.fem.system.System`, given itself or by its solver."""
         self.system: System = source if isinstance(source, System) else source.system
         self.conservative, self.one = self.system.scene.conservative, self.system.scene.units.omega2
         given = getattr(source, "inertia", None)
@@ -99,7 +98,6 @@ class Method:
     """Whether it finds eigenvalues and vectors."""
 
     def __init__(self, work: Workspace) -> None:
-        """Work with matrices that are kept from state to state."""
         self.work = work
 
     @staticmethod
@@ -161,9 +159,9 @@ class Dense(Method):
         return "" if unknowns <= LARGEST else f"is for at most {LARGEST} unknowns, not {unknowns}"
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
-        """By ``T`` of :mod:`rodfem.stability.spectrum`, which is symmetric and positive for a shift below all of them.
+        """By the symmetric ``T`` of :mod:`rodfem.stability.spectrum`, positive for a shift below all eigenvalues.
 
-        Raises :class:`InputError` where fewer than ``number`` are finite.
+        Raises :class:`InputError` if fewer than ``number`` are finite.
         """
         below = self.work.below(x)
         stiffness, mass = (gathered(A).real for A in below.scaled)
@@ -198,7 +196,7 @@ class Slicing(SymmetricMethod):
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """In the ``interval``, or in one found by counting that holds ``number`` of them and few more.
 
-        Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` where an end is an eigenvalue.
+        Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` if an end is an eigenvalue.
         """
         pencil, one = self.work.below(x), self.work.one
         low, high = (interval[0] / one, interval[1] / one) if interval else enclosed(pencil, number)
@@ -224,7 +222,7 @@ class Slicing(SymmetricMethod):
 
 
 def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None:
-    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None where they do not match the counts at these ends.
+    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None if they do not match the counts at these ends.
 
     Raises :class:`PETSc.Error` where PETSc gives up, MUMPS with the largest of :data:`ROOMS`.
     """
@@ -244,10 +242,7 @@ def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None
 
 
 def enclosed(pencil: SymmetricPencil, number: int) -> Interval:
-    """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more.
-
-    Eigenvalues of bending grow like the fourth power of their number: twice as far there are few more.
-    """
+    """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
     low, step = pencil.shift, max(abs(pencil.shift), pencil.scale) * STEP
     while pencil.below(low + step) < number:
         step *= 2

@@ -1,17 +1,12 @@
-r"""Eigenvalues ``mu = omega^2`` that were found at a state, the names of their motions, and groups of equal ones.
+"""Eigenvalues ``mu = omega^2`` of a rod under loads without a potential: a non-symmetric pencil ``S x = mu M x``.
 
-Eigenvalues ``mu = omega^2`` of a rod under loads without a potential: a non-symmetric pencil ``S x = mu M x``.
-
-A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load
-couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
-axis: flutter.
-
+A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load couples
+the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real axis: flutter.
 The finite eigenvalues are those of the pencil on its unknowns with mass: :mod:`~rodfem.stability.spectrum`.
 
-What round-off makes of an eigenvalue that is zero is bounded by 1e-7 of the natural size of bending, whatever the rod.
-Where it has motions far slower than bending, as a stiff rod on soft supports, that is too much: theirs may be as small.
-It is measured for them then, by independent relative errors of all entries of the matrix, and they are solved for to
-what a state leaves open of them.
+What round-off makes of an eigenvalue that is zero is bounded by 1e-7 of the natural size of bending.  For a rod with
+motions far slower than bending, as a stiff rod on soft supports, it is measured: independent relative errors of all
+entries of the matrix, and what a state leaves open.
 
 A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
 ``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
@@ -61,12 +56,11 @@ EPS = float(np.finfo(float).eps)
 class Frequencies:
     """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
 
-    Errors are those of ``1 / (mu - shift)`` over the greatest.  ``kinds`` names the motion of each: see
-    :mod:`rodfem.stability.motion_names`.  ``vectors`` (n, k) are complex, or real where all eigenvalues are, with the n
-    unknowns of this rank, ``weighed`` (n, k) are their products with the mass, and ``one`` is the natural size of the
-    eigenvalues.  The rod is ``floating`` where nothing holds it: it has zero eigenvalues.  Of a rod that is held and
-    has slow motions, as a stiff one on soft springs, the ``floor`` is what round-off makes of zero; it is infinite
-    elsewhere.
+    Errors are those of ``1 / (mu - shift)`` over the greatest.  ``kinds`` names the motions
+    (:mod:`rodfem.stability.motion_names`).  ``vectors`` (n, k), n unknowns of this rank, are complex, or real if all
+    eigenvalues are; ``weighed`` (n, k) are their products with the mass.  ``one`` is the natural size of the
+    eigenvalues. A ``floating`` rod, which nothing holds, has zero ones.  Of a rod that is held and has slow motions
+    ``floor`` is what round-off makes of zero; it is infinite otherwise.
     """
 
     values: np.ndarray
@@ -80,7 +74,7 @@ class Frequencies:
 
     @property
     def far(self) -> float:
-        """Size of an eigenvalue beside which others are zero: the greatest one, but for a light rod with heavy bodies.
+        """Size of an eigenvalue beside which others are zero: the greatest, but for a light rod with heavy bodies.
 
         That has a few slow motions, and others whose eigenvalues are 1e10 times as great.
         """
@@ -90,10 +84,7 @@ class Frequencies:
 
     @property
     def natural(self) -> float:
-        """Natural size of the slowest motions: that of the two slowest eigenvalues, and at least that of bending.
-
-        Where slow motions are told from round-off it is theirs alone.
-        """
+        """Natural size of the slowest motions: that of the two slowest eigenvalues, and of bending at least."""
         slowest = float(np.sort(abs(self.values))[:2].max(initial=0.0))
         return max(slowest, self.one if np.isinf(self.floor) else self.floor)
 
@@ -120,10 +111,9 @@ def in_order(found: Frequencies) -> Frequencies:
 
 
 def named(system: System, found: Frequencies, turned: np.ndarray, number: int | None = None) -> Frequencies:
-    """Frequencies ``found`` at a state of a ``system``, with names of their motions; ``turned`` is its rotation field.
+    """Frequencies ``found`` at a state of a ``system``, the first ``number`` named; ``turned`` is its rotation field.
 
-    Only the first ``number`` are named, where that is given.  A multiple eigenvalue has one name, that of its invariant
-    subspace: its vectors are any in it, bending about d1 in one state and about d2 in the next.
+    A multiple eigenvalue has one name, that of its invariant subspace: its vectors are any in it.
     """
     together = [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number]
     owner = np.repeat(np.arange(len(together)), list(map(len, together)))
@@ -141,15 +131,14 @@ def named(system: System, found: Frequencies, turned: np.ndarray, number: int | 
 
 
 def _spanning(system: System, found: Frequencies, group: list[int]) -> np.ndarray:
-    """Vectors (n, k) of a ``group`` of k equal eigenvalues, orthonormal in the mass where there are several."""
     vectors = found.vectors[:, group]
     return orthonormal(system.comm, vectors, found.weighed[:, group]) if len(group) > 1 else vectors
 
 
 def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[list[int]]:
-    """Places of eigenvalues in groups of equal ones, in the order of the first of each.
+    """Places of equal eigenvalues, which differ by less than a relative ``tolerance``, in order of the first of each.
 
-    They differ by less than the ``tolerance``, relative; those near zero are compared with what is ``far`` from it.
+    Those near zero are compared with what is ``far`` from it.
     """
     out: list[list[int]] = []
     least = NEAR_ZERO * min(abs(values).max(initial=0.0), far)
@@ -179,9 +168,9 @@ def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
-    """Basis of the span of complex vectors (n, k), orthonormal in the mass; ``weighed`` are their products with it.
+    """Basis of the span of complex ``vectors`` (n, k), orthonormal in the mass; zero for what has no mass.
 
-    Zero for what has no mass, as a light rod where a parameter takes it away.  The ranks of ``comm`` share the rows.
+    ``weighed`` are their products with the mass; the ranks of ``comm`` share the rows.
     """
     parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
     sizes = np.maximum(parts, EPS * parts[-1])
@@ -205,11 +194,10 @@ PILE = 64
 class NonsymmetricSolver(PencilMatrices):
     """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
 
-    ``slow`` says whether the rod has motions far slower than bending at its first state, whose round-off is asked for.
+    The rod is ``slow`` if it has motions far slower than bending at its first state: their round-off is measured.
     """
 
     def __init__(self, system: System) -> None:
-        """Allocate the matrices of the pencil once."""
         super().__init__(system)
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
         self._rows: sp.csr_matrix | None = None
@@ -226,10 +214,7 @@ class NonsymmetricSolver(PencilMatrices):
         return self._rows
 
     def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
-        """Assemble the pencil at the state ``x``.
-
-        Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
-        """
+        """Assemble the pencil at the state ``x``, without the motions of symmetries, which may make it singular."""
         self.filled += 1
         if self.filled % PILE == 0:
             compat.destroy_garbage(self.system.comm)
@@ -248,7 +233,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     """The pencil of one state: eigenvalues near a shift, and products in its mass."""
 
     def __init__(self, shared: NonsymmetricSolver) -> None:
-        """Be the state that the matrices were just filled for."""
         super().__init__(shared)
         self.turned, self._free, self._own, self.slow = shared.turned, shared.free, slice(None), shared.slow
         if self.system.comm.size > 1:
@@ -273,11 +257,10 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(used) else (0, 0.0)
 
     def near(self, number: int, target: float, *, left: bool = False) -> Frequencies:
-        """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
+        """Return eigenvalues nearest to ``target``: ``number``, or more where they come; fewer if there are no more.
 
-        Fewer are returned only where the discretisation has no more finite ones.  ``vectors`` are ``left`` ones where
-        these are asked for, ``z.S = mu z.M`` without conjugation.  They have no parts along free motions ``g``: of
-        ``S g = 0`` follows ``z.Mg = 0``.
+        ``left`` vectors have ``z.S = mu z.M`` without conjugation, and no parts along free motions ``g``, where ``z.Mg
+        = 0``.
         """
         with self.system.clock("stability"):
             pencil = self.condensed(target)
@@ -334,10 +317,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return inside(condensed.dual.T @ whole[condensed.heavy], condensed.pairs.right)
 
     def condensed(self, target: float) -> Condensed:
-        """The pencil on its unknowns with mass, about a shift; raises :class:`ConvergenceError` where it is singular.
-
-        On several ranks each of them has all of it.
-        """
+        """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""
         self._held()
         if target not in self._condensed:
             stiffness, mass = (gathered(A).real for A in self.in_units())
@@ -384,9 +364,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def _complete(self, values: np.ndarray, vectors: np.ndarray) -> None:
         """Add to vectors, in place, their parts along free motions ``g``: ``g . S x / mu``, of ``g . Mx = 0`` before.
 
-        From ``S (x + c g) = mu M (x + c g)``, with ``S g = 0``.  The multiplier of ``g . Mx = 0`` is ``-mu c`` as well,
-        but that of a vector which was predicted belongs to the basis ``g`` at the loads that it was predicted from.
-        Where ``mu`` is zero to round-off any part is as good, and none is taken.
+        From ``S (x + c g) = mu M (x + c g)``, with ``S g = 0``.  Where ``mu`` is zero to round-off none is taken.
         """
         begin, end = self.matrix.getOwnershipRange()
         drifts = [index - begin for index in self.system.drifts if begin <= index < end]

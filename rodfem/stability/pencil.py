@@ -1,13 +1,10 @@
-"""The pencil of a state, and SLEPc set up to find its eigenvalues.
+"""The pencil of a state, ``(K C; C^t 0) x = mu (M 0; 0 0) x``, and its blocks.
+
+``K`` (m, m) is the second derivative of the whole Lagrangian in rotation, strain and centreline, ``C`` (m, p) its
+derivative in those and the multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinetic metric.
 
 SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
 and overrule what is set here.
-
-The pencil of a state as named blocks of its unknowns and constraints.
-
-The eigenproblem of a state is the singular pencil ``(K C; C^t 0) x = mu (M 0; 0 0) x``.  ``K`` (m, m) is the second
-derivative of the whole Lagrangian in rotation, strain and centreline, ``C`` (m, p) its derivative in those and the
-multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinetic metric.  Every rank has all of them.
 """
 
 from __future__ import annotations
@@ -44,7 +41,6 @@ class PencilMatrices:
     """Matrices of a pencil, allocated once, which the states of one system share; ``filled`` counts those states."""
 
     def __init__(self, system: System) -> None:
-        """Hold no state yet."""
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         self.filled = 0
@@ -61,18 +57,12 @@ Matrices = TypeVar("Matrices", bound=PencilMatrices)
 
 
 class StatePencil(Generic[Matrices]):
-    """The pencil of one state.
-
-    Raises :class:`RuntimeError` where the matrices hold another state by now: a number of another state is never
-    returned.
-    """
+    """The pencil of one state; raises :class:`RuntimeError` where the matrices hold another state by now."""
 
     def __init__(self, shared: Matrices) -> None:
-        """Be the state that the matrices were just filled for."""
         self.system, self._shared, self._filled = shared.system, shared, shared.filled
 
     def _held(self) -> Matrices:
-        """Matrices, while they are those of this state."""
         if self._shared.filled != self._filled:
             raise RuntimeError("The matrices hold another state by now: ask for this one again, by the solver's at().")
         return self._shared
@@ -100,8 +90,8 @@ class StatePencil(Generic[Matrices]):
 def in_units(system: System, matrix: PETSc.Mat, mass: PETSc.Mat, sizes: PETSc.Vec) -> tuple[PETSc.Mat, PETSc.Mat]:
     """Matrices of a ``system``'s pencil for unknowns and eigenvalues in units of their natural ``sizes``.
 
-    Round-off makes finite eigenvalues of the infinite ones, among the others where multipliers have large units; and
-    what is near, far or zero is a number of order one.  Where all units are one they are ``matrix`` and ``mass``.
+    Round-off makes finite eigenvalues of the infinite ones if multipliers have large units; and what is near, far or
+    zero is a number of order one.  Where all units are one they are ``matrix`` and ``mass``.
     """
     units = system.scene.units
     if units.ordinary:
@@ -126,12 +116,10 @@ def least_eigenvalue(system: System) -> float:
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:
-    """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.
+    """Assemble tangent ``matrix`` and kinetic ``mass`` of a ``system`` at the state ``x``, without phase conditions.
 
     Returns the state.  Raises :class:`SceneError` for a rod without any inertia, :class:`ConvergenceError` where one
     that depends on the load is negative or vanishes.
-
-    They are written into ``matrix`` and ``mass``, both of the ``system``.
     """
     if system.equations.massless:
         raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
@@ -175,7 +163,7 @@ def weighed_modes(
 ) -> dict[int, tuple[PETSc.Vec, PETSc.Vec]]:
     """Basis ``g`` of the symmetry modes that is orthonormal in the mass, and ``M g``.
 
-    What moves nothing that has inertia is orthonormal in the metric instead, and comes with the metric's product.
+    What moves nothing that has inertia is orthonormal in the metric instead, with the metric's product.
     """
     given, scaled = list(modes.values()), mass
     if given and not system.scene.units.ordinary:  # rotations and positions have masses of different units
@@ -199,13 +187,11 @@ def weighed_modes(
 
 
 def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat, mass: PETSc.Mat) -> list[PETSc.Vec]:
-    """Add to an assembled pencil the constraints ``g.Mx = 0`` for symmetry modes ``g``, one for each drift scalar.
+    """Add to a pencil ``matrix``, ``mass`` the constraints ``g.Mx = 0`` for symmetry ``modes`` g, by drift scalars.
 
-    ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged; and
-    the inertia counts it.  Returns the modes that have mass, orthonormal in it: a Krylov space is kept off them by
-    deflation, too, or round-off adds them where ``mu`` is large beside the rest.
-
-    ``modes`` are by the number of the drift scalar of the ``system``; ``matrix`` and ``mass`` are its pencil.
+    ``g`` being an eigenvector of ``mu = 0``, the rest of the spectrum is unchanged, and the inertia counts it.  Returns
+    the modes that have mass, orthonormal in it: a Krylov space of the ``system`` is deflated by them, too, or round-off
+    adds them if ``mu`` is large.
     """
     deflated = []
     for index, (mode, image) in weighed_modes(system, modes, mass).items():
@@ -222,10 +208,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 
 
 def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
-    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite.
-
-    Its options begin with ``prefix``.
-    """
+    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite."""
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
     solver.setOperators(matrix, mass)
@@ -238,7 +221,6 @@ class Inverse:
     """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
 
     def __init__(self, factors: Factors) -> None:
-        """Keep the factors."""
         self.factors = factors
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
@@ -255,11 +237,11 @@ def with_factors(
     start: PETSc.Vec | None = None,
     deflated: Sequence[PETSc.Vec] = (),
 ) -> SLEPc.EPS:
-    """Set up shift-invert for the ``number`` eigenvalues nearest to ``target`` of a symmetric pencil.
+    """Set up shift-invert for the ``number`` eigenvalues nearest to ``target`` of a pencil ``matrix - mu mass``.
 
-    It is ``matrix - mu mass``.  The ``inverse`` of ``matrix - target mass`` is from factors made elsewhere.  Vectors
-    are right up to massless unknowns: purification corrects all of them at once.  Eigenvectors that are ``deflated``
-    are not found; ``start`` is the first vector.
+    The ``inverse`` of ``matrix - target mass`` is from factors made elsewhere.  Vectors are right up to massless
+    unknowns: purification corrects all of them at once.  Eigenvectors ``deflated`` are not found; ``start`` is the
+    first vector.
     """
     solver = eigensolver(matrix, mass, "rodfem_")
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
@@ -283,11 +265,10 @@ def with_factors(
 
 
 def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
-    """Set up spectrum slicing for all eigenvalues of a symmetric pencil between two numbers that are none themselves.
+    """Set up spectrum slicing for all eigenvalues of a pencil ``matrix - mu mass`` between ``low`` and ``high``.
 
-    Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is one.
-    The pencil is ``matrix - mu mass``, the two numbers are ``low`` and ``high``; ``room`` is what MUMPS has beyond its
-    estimate, a percentage.
+    ``room`` is what MUMPS has beyond its estimate, a percentage.  Options: ``-rodfem_slicing_eps_...``,
+    ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is an eigenvalue.
     """
     solver = eigensolver(matrix, mass, "rodfem_slicing_")
     solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
@@ -308,17 +289,12 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, roo
 
 @dataclass(frozen=True)
 class Pencil:
-    """Blocks ``K`` (m, m), ``C`` (m, p), ``M`` (m, m) of a state.
+    """Blocks ``K`` (m, m), ``C`` (m, p), ``M`` (m, m) of a state; every rank has all of them.
 
-    Attributes
-    ----------
-    where
-        For each field its rows in ``K`` and ``C`` (``q``, ``v``, ``r``, ``ends``: positions of ends that move), or
-        columns of ``C`` (``eta``, ``n``, and ``scalars``: components of a constant contact force, moments at ends,
-        multipliers of integral constraints, in the order of the fields' scalars).
-    place
-        Arclength (the middle of a cell) by which the constraints are in order along the rod, (p,); nan for one that
-        involves the whole rod.
+    For each field ``where`` has its rows in ``K`` and ``C`` (``q``, ``v``, ``r``, ``ends``: positions of ends that
+    move), or columns of ``C`` (``eta``, ``n``, and ``scalars``: a constant contact force, moments at ends, multipliers
+    of integral constraints).  ``place`` (p,) is the arclength of the middle of a constraint's cell, nan for one of the
+    whole rod.
     """
 
     K: sp.csr_matrix
@@ -329,18 +305,13 @@ class Pencil:
 
 
 class Blocks:
-    """Makes the :class:`Pencil` of states of one :class:`~rodfem.fem.system.System`.
+    """Makes the :class:`Pencil` of states of one system, with multipliers of the ``norms`` of quaternions or without.
 
-    Attributes
-    ----------
-    rows, columns
-        Global numbers of the unknowns and multipliers that are rows and columns, ascending.
-    numbers
-        Those of each field.
+    ``rows`` and ``columns`` are the global numbers of unknowns and multipliers, ascending, ``numbers`` those of each
+    field.
     """
 
     def __init__(self, system: System, *, norms: bool = True) -> None:
-        """Number rows and columns, with the multipliers of the norms of quaternions or without."""
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         self.numbers: dict[str, np.ndarray] = {}
@@ -350,10 +321,7 @@ class Blocks:
         self.place = self._places()
 
     def _numbered(self, last: str, *, multiplier: bool, left_out: str = "") -> np.ndarray:
-        """Global numbers of the unknowns, or multipliers, ascending; scalars are those of the name ``last``.
-
-        The field of the name ``left_out`` is none of them.
-        """
+        """Global numbers of the unknowns, or multipliers, but for a field ``left_out``; ``last`` names the scalars."""
         f = self.system.fields
         names = [b.name for b in f.blocks if b.multiplier == multiplier and b.name != left_out]
         numbers = {name: np.unique(self.gathered(f.number[f.dofs[name]].ravel())) for name in names}

@@ -86,9 +86,9 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
 class Eigenpairs:
     """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, and their ``right`` vectors (r, k), or those of ``T^t``.
 
-    ``noise`` (k,) is what round-off may make of ``nu``, ``error`` (k,) the residual over the size of ``T``; where two
-    meet the former is its root.  Of all eigenvalues ``left`` vectors (k, r) are known, too: both are biorthonormal, and
-    right ones have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
+    ``noise`` (k,) is what round-off may make of ``nu``, its root where two meet; ``error`` (k,) the residual over the
+    size of ``T``.  Of all eigenvalues there are ``left`` vectors (k, r), too: both are biorthonormal, and right ones
+    have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
     """
 
     nu: np.ndarray
@@ -110,9 +110,9 @@ class Condensed:
     """A pencil on its unknowns with mass, in units of natural sizes, about a ``shift``."""
 
     def __init__(self, mass: sp.csr_matrix, solve: Solve, solve_transposed: Solve, shift: float) -> None:
-        """Take the ``mass``, and what solves with ``S - shift M`` for arrays (n, k): ``solve``, ``solve_transposed``.
+        """``solve`` and ``solve_transposed`` solve with ``S - shift M`` for arrays (n, k).
 
-        Raises :class:`~rodfem.errors.ConvergenceError` where nothing has mass.
+        Raises :class:`~rodfem.errors.ConvergenceError` if nothing has ``mass``.
         """
         self.solve, self.solve_transposed, self.shift, self.rows = solve, solve_transposed, shift, mass.shape[0]
         self.heavy, self.lower, self.dual = factors_of_mass(mass)
@@ -167,9 +167,9 @@ class Condensed:
         return times(self.inverse, pairs.right) / pairs.nu if pairs.vectors is None else pairs.vectors[self.heavy]
 
     def greatest(self, number: int, *, left: bool = False) -> Eigenpairs:
-        """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones where these are fewer.
+        """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones if these are fewer.
 
-        LAPACK finds them where it costs no more, or where SLEPc gives up: at times it cannot sort equal complex ones.
+        By LAPACK where it costs no more, or SLEPc gives up: at times it cannot sort equal complex ones.
         """
         if self.rank > max(DENSE, 3 * number) and (self.rank > ALL or "pairs" not in vars(self)):
             try:
@@ -214,7 +214,7 @@ class Condensed:
 class Spectrum:
     """Eigenvalues of a ``condensed`` pencil, nearest to its shift first; ``one`` is their natural size.
 
-    What round-off makes of zero is ``floor``, where it is known (:mod:`rodfem.stability.nonsymmetric`).
+    ``floor`` is what round-off makes of zero, where it is known (:mod:`rodfem.stability.nonsymmetric`).
     """
 
     condensed: Condensed
@@ -318,9 +318,8 @@ class Operator:
 def krylov(apply: Solve, size: int, number: int, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` greatest eigenvalues, and vectors, of a real matrix (size, size) that ``apply`` multiplies with.
 
-    The Krylov space begins with the vector ``start`` (size,), or with any.
-
-    Raises :class:`~rodfem.errors.ConvergenceError` where SLEPc gives up.  Its options begin with ``rodfem_``.
+    The Krylov space begins with ``start`` (size,), or with any vector.  Raises
+    :class:`~rodfem.errors.ConvergenceError` if SLEPc gives up.  Its options begin with ``rodfem_``.
     """
     matrix = PETSc.Mat().createPython((size, size), Operator(apply), comm=PETSc.COMM_SELF)
     matrix.setUp()

@@ -2,17 +2,14 @@
 
     (K C; C^t 0) x = mu (M 0; 0 0) x
 
-with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and
-(45)).  ``M`` is singular, so that only shift-invert is free of spurious eigenvalues: its image ``(S - sigma M)^-1
-M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  A symmetry mode, whose
-eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0`` and by deflation (``EPSSetDeflationSpace``),
-and is not among those returned.
+with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and (45)).
+``M`` is singular, so that only shift-invert is free of spurious eigenvalues: ``(S - sigma M)^-1 M`` is zero on all that
+has no inertia.  A symmetry mode, of eigenvalue zero, is excluded by the constraint ``g.Mx = 0`` and by deflation.
 
-The shift is put below the spectrum: the nearest eigenvalues to it are then the left-most ones.  A count just above the
-last of them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the
-modes that are returned.  Along a branch the shift, the symbolic factorisations
-and a first vector, the sum of the modes, are those of the point before: two numeric factorisations a point, one to
-solve with and one to count.
+The shift is below the spectrum: the nearest eigenvalues to it are the left-most ones.  A count just above the last of
+them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the modes that are
+returned.  Along a branch the shift, the symbolic factorisations and a first vector, the sum of the modes, are those of
+the point before: two numeric factorisations a point, one to solve with and one to count.
 """
 
 from __future__ import annotations
@@ -56,11 +53,7 @@ NOISE = 1e-6
 
 @dataclass(frozen=True)
 class Modes:
-    """Left-most eigenvalues, symmetry modes left out.
-
-    ``values`` are ascending, ``vectors`` theirs, ``errors`` backward errors; they are ``certified`` where
-    counts prove that none is missing.
-    """
+    """Left-most ``values``, ascending, ``vectors``, backward ``errors``; ``certified``: a count finds none missing."""
 
     values: np.ndarray
     vectors: list[PETSc.Vec]
@@ -87,21 +80,12 @@ class _Shifted:
 class SymmetricSolver(PencilMatrices):
     """Matrices and factorisations of the pencil, which the states of one system share: see :meth:`at`.
 
-    Attributes
-    ----------
-    scale
-        Size of the least eigenvalue.
-    scaled
-        Matrix and mass of the state.
-    shift
-        Where the next computation starts; the first one, and one whose count finds any missing, moves it to the left
-        until no eigenvalue is below it.
-    factorisations
-        Number of numeric factorisations made so far.
+    ``scale`` is the size of the least eigenvalue, ``scaled`` matrix and mass in natural units.  The next computation
+    starts at ``shift``: the first one, and one whose count finds any missing, moves it below all eigenvalues.
+    ``factorisations`` counts the numeric ones.
     """
 
     def __init__(self, inertia: Inertia) -> None:
-        """Allocate the matrices of the pencil once."""
         super().__init__(inertia.system)
         self.inertia = inertia
         system, sizes = self.system, (self.system.fields.along, self.system.fields.dense_rows)
@@ -157,7 +141,6 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
     """The pencil of one state: its left-most eigenvalues, and counts below a number."""
 
     def __init__(self, shared: SymmetricSolver) -> None:
-        """Be the state that the matrices were just filled for."""
         super().__init__(shared)
         self.inertia, self._drifts = shared.inertia, shared.system.phase.count
 
@@ -177,10 +160,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         return self._held().scaled
 
     def leftmost(self, number: int) -> Modes:
-        """Return the ``number`` left-most eigenvalues; raises :class:`ConvergenceError` where SLEPc finds fewer.
-
-        They, and their vectors, are not in units of natural sizes.
-        """
+        """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer."""
         held = self._held()
         with self.system.clock("stability"):
             modes = self._solve(number, EXTRA[0]) if len(held.last) else NOTHING
@@ -202,14 +182,14 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         )
 
     def unscaled(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
-        """The same vectors, in units of natural sizes before and in those of the rod now."""
+        """The same vectors in the rod's units, in place."""
         if not self.system.scene.units.ordinary:
             for vector in vectors:
                 vector.pointwiseMult(vector, self.sizes)
         return vectors
 
     def go_below(self) -> None:
-        """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""
+        """Move the shift below the spectrum; raises :class:`ConvergenceError` if it has no lower end."""
         held = self._held()
         step = max(abs(held.shift), held.scale)
         for _ in range(40):
@@ -231,10 +211,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         return not self.system.norm(grown) * HIT * abs(held.shift) < 1.0
 
     def below(self, sigma: float) -> int:
-        """Number of eigenvalues below ``sigma``, symmetry modes not included.
-
-        Raises :class:`ConvergenceError` where the count breaks down: constraints depend on each other.
-        """
+        """Number of eigenvalues below ``sigma``; :class:`ConvergenceError` if the count breaks down."""
         held = self._held()
         held.factor(sigma)
         negative, zero = held.shifted.factors.inertia()
@@ -259,8 +236,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
     def _solve(self, number: int, extra: int) -> Modes:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
 
-        A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
-        asked for.
+        A Krylov method finds the second of two equal eigenvalues late, by round-off.
         """
         held = self._held()
         held.factor(held.shift)
@@ -280,9 +256,9 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 
     def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
-        """Solve by SLEPc, for ``number`` eigenvalues or all there are: with their vectors and backward errors.
+        """``number`` eigenvalues or all there are, with vectors and backward errors, without what is no eigenpair.
 
-        Where it asks for more than there are finite ones, the Krylov space breaks down, and what comes is no eigenpair.
+        More than there are finite ones break the Krylov space down.
         """
         held, start = self._held(), self.inertia.seed(1)
         if len(held.last):  # a space that is invariant already would miss all else
@@ -311,15 +287,11 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         return values[true], [vectors[i] for i in true], errors[true]
 
     def _norms(self) -> tuple[float, float]:
-        """Greatest sums of magnitudes of rows of stiffness and mass."""
         stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self._held().scaled)
         return stiffness, mass
 
     def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
-        """Purification: replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts.
-
-        All at once: the cost is that of the call, hardly of a column.
-        """
+        """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts, all at once."""
         held = self._held()
         right = np.stack([(held.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
         for value, vector, column in zip(values, vectors, held.shifted.factors.solve_all(right).T, strict=True):

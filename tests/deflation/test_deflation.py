@@ -22,7 +22,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
-from rodfem.deflation.search import NEW, DeflatedNewton, Deflation, equilibria_at, find_equilibria, turned_state
+from rodfem.deflation.search import NEW, Deflation, equilibria_at, find_equilibria, turned_state
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
@@ -224,7 +224,7 @@ def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
         counts.append([])
         for number in range(12):
             x = turned_state(solver.system, solver.start(25.0), 0.1 + 0.12 * number, [1, number])
-            newton = DeflatedNewton(solver)
+            newton = Deflation(solver, 25.0)
             newton.flow(x)
             counts[-1].append(newton.approach(x).iterations)
     assert counts[0] == counts[1] == counts[2]

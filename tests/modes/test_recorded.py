@@ -19,7 +19,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError
 from rodfem.faults import in_words
 from rodfem.fem.fields import Discretization
-from rodfem.modes.finder import EVENLY, FEWEST, Eigenmotions, typical_rows
+from rodfem.modes.finder import EVENLY, FEWEST, ModeFinder, typical_rows
 from rodfem.modes.modes import SYMMETRY
 from rodfem.modes.recorded import Typical, read
 from rodfem.problem.scene import Inertia, Scene
@@ -121,15 +121,15 @@ def test_where_they_are_not_found_the_file_says_why(
     folder: Path, monkeypatch: pytest.MonkeyPatch, fault: Callable[[], Exception], often: int
 ) -> None:
     """At one state or at all: the run goes on, and its report has the sentence."""
-    whole, failed = Eigenmotions.few, []
+    whole, failed = ModeFinder.few, []
 
-    def few(self: Eigenmotions, *what: object) -> object:
+    def few(self: ModeFinder, *what: object) -> object:
         if len(failed) < often:
             failed.append(what)
             raise fault()
         return whole(self, *what)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Eigenmotions, "few", few)
+    monkeypatch.setattr(ModeFinder, "few", few)
     found = recorded(classics.euler("clamped-free"), Plan((0.0, 2.0), depth=0, error_bars=False), folder)["straight"]
     sentence = in_words(fault()) if fault is MemoryError else str(fault())
     assert [each.trouble for each in found] == [sentence if i < often else "" for i in range(len(found))]
