@@ -15,10 +15,10 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
-from rodfem.stability.dependence import rank_of
+from rodfem.fem.shape import Shape
+from rodfem.stability.dependence import require_independent_constraints
 from rodfem.stability.methods import Found, Method, Workspace
 from rodfem.stability.near_zero import Decision, decide
-from rodfem.stability.pencil import Blocks
 from rodfem.stability.registry import AUTO, METHODS, find
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 
@@ -178,7 +178,7 @@ class Assessor(Workspace):
         try:
             return decide(self.inertia.at(x))
         except ConvergenceError:
-            rank_of(Blocks(self.system).assemble(x), length=self.system.scene.length)
+            require_independent_constraints(Shape(self.system), x)
             raise
 
 
