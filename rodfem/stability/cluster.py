@@ -37,7 +37,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import local_rows
 from rodfem.stability.inertia import EPS, NOISE
-from rodfem.stability.nonsymmetric import REAL, STILL, Frequencies, NonsymmetricPencil
+from rodfem.stability.nonsymmetric import REAL, STILL, Frequencies, NonsymmetricPencil, squares
 from rodfem.tolerances import TINY
 
 BESIDE = 1e-3
@@ -110,7 +110,7 @@ def members(
     for number, times in ((size + 2, 1.0), (3 * size + 10, FARTHER)):  # one beside the shift takes digits from others
         found = pencil.near(number, cluster.mean + times * (shift - cluster.mean), left=left)
         inside = pencil.product(basis, found.weighed)
-        energy = pencil.squares(found.vectors, found.weighed)
+        energy = squares(pencil.system.comm, found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
         if found.floating and abs(cluster.mean) > beside:
             share[abs(found.values) < STILL * found.far] = 0.0

@@ -8,7 +8,7 @@ all eigenvalues in an interval; ``dense`` all there are.  A method is a class he
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -17,17 +17,18 @@ from slepc4py import SLEPc
 from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import PETSC_ERR_LIB
+from rodfem.linalg.factorization import PETSC_ERR_LIB, ordering, preferred
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.stability.pencil import in_interval
 from rodfem.stability.spectrum import FINITE, condensed
-from rodfem.stability.symmetric import SymmetricPencil, SymmetricSolver
+from rodfem.stability.symmetric import Found, SymmetricPencil, SymmetricSolver, eigensolver
 
 Interval = tuple[float, float]
 NEAR_ZERO = 1e-3
 """Target of the eigenvalues nearest zero, relative to the scale of the stiffness."""
+SLICED = 1e-10
+"""Relative tolerance of SLEPc for all eigenvalues of an interval."""
 WIDER = (0.0, 1e-9, 1e-7, 1e-5)
 """By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
 PETSC_ERR_PLIB = 77
@@ -38,20 +39,6 @@ STEP = 1.0371
 """Factor of the ends tried, no simple number: an end on an eigenvalue is unlikely."""
 LARGEST = 3000
 """Unknowns that dense matrices may have."""
-
-
-class Found(NamedTuple):
-    """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
-
-    ``factorisations`` are those besides the workspace's own; a ``note`` goes after the reason for the method.
-    """
-
-    values: np.ndarray
-    vectors: list[PETSc.Vec]
-    errors: np.ndarray
-    certified: bool = False
-    factorisations: int = 0
-    note: str = ""
 
 
 class Workspace:
@@ -139,8 +126,7 @@ class ShiftInvert(Method):
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """By the Lanczos method, with a shift below the spectrum."""
-        modes = self.work.symmetric.at(x).leftmost(number)
-        return Found(modes.values, modes.vectors, modes.errors, modes.certified)
+        return self.work.symmetric.at(x).leftmost(number)
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """By the Arnoldi method."""
@@ -239,6 +225,29 @@ def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None
         else:
             return solver
     return None
+
+
+def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
+    """Set up spectrum slicing for all eigenvalues of a pencil ``matrix - mu mass`` between ``low`` and ``high``.
+
+    ``room`` is what MUMPS has beyond its estimate, a percentage.  Options: ``-rodfem_slicing_eps_...``,
+    ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is an eigenvalue.
+    """
+    solver = eigensolver(matrix, mass, "rodfem_slicing_")
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    solver.setInterval(low, high)
+    solver.setTolerances(tol=SLICED)
+    solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    with slepc_errors():
+        solver.setFromOptions()
+        ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
+        ksp.setType("preonly")
+        ksp.getPC().setType("cholesky")
+        ksp.getPC().setFactorSolverType("mumps")
+        controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
+        with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
+            solver.setUp()
+    return solver
 
 
 def enclosed(pencil: SymmetricPencil, number: int) -> Interval:

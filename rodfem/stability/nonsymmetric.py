@@ -117,7 +117,12 @@ def named(system: System, found: Frequencies, turned: np.ndarray, number: int | 
     """
     together = [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number]
     owner = np.repeat(np.arange(len(together)), list(map(len, together)))
-    vectors = np.concatenate([_spanning(system, found, group) for group in together], axis=1)
+    spans = (found.vectors[:, group] for group in together)
+    several = (
+        orthonormal(system.comm, span, found.weighed[:, group]) if len(group) > 1 else span
+        for span, group in zip(spans, together, strict=True)
+    )
+    vectors = np.concatenate(list(several), axis=1)
     squares, moved = np.zeros((len(together), 3)), np.zeros(len(together))
     for part in (vectors.real, vectors.imag) if np.iscomplexobj(vectors) else (vectors,):
         np.add.at(squares, owner, motion_names.squares(system, turned, part))
@@ -128,11 +133,6 @@ def named(system: System, found: Frequencies, turned: np.ndarray, number: int | 
         for j in group:
             kinds[j] = motion_names.RIGID if rigid else name
     return replace(found, kinds=tuple(kinds))
-
-
-def _spanning(system: System, found: Frequencies, group: list[int]) -> np.ndarray:
-    vectors = found.vectors[:, group]
-    return orthonormal(system.comm, vectors, found.weighed[:, group]) if len(group) > 1 else vectors
 
 
 def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[list[int]]:
@@ -289,7 +289,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if self.floating or not len(slow) or not (self.slow or several):
             return np.inf
         found = self.of(spectrum, slow)
-        energy = abs(self.squares(found.vectors, found.weighed))
+        energy = abs(squares(self.system.comm, found.vectors, found.weighed))
         columns = zip(found.vectors.T, energy.tolist(), strict=True)
         rounded = [rounding_of(self.matrix, v, v) / e for v, e in columns if e > 0]
         return max(SOLVED * one, float(spectrum.noise[slow].max()), NOISE * max(rounded, default=0.0))
@@ -352,14 +352,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """``a^* b`` of all ranks' rows."""
         return product(self.system.comm, a, b)
-
-    def squares(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Products of each column of ``a`` with the same of ``b``, real parts."""
-        return squares(self.system.comm, a, b)
-
-    def orthonormal(self, vectors: np.ndarray) -> np.ndarray:
-        """Basis of the span of complex vectors (n, k), orthonormal in the mass."""
-        return orthonormal(self.system.comm, vectors, self.weighed(vectors))
 
     def _complete(self, values: np.ndarray, vectors: np.ndarray) -> None:
         """Add to vectors, in place, their parts along free motions ``g``: ``g . S x / mu``, of ``g . Mx = 0`` before.

@@ -2,14 +2,10 @@
 
 ``K`` (m, m) is the second derivative of the whole Lagrangian in rotation, strain and centreline, ``C`` (m, p) its
 derivative in those and the multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinetic metric.
-
-SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
-and overrule what is set here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -17,24 +13,14 @@ from typing import Generic, TypeVar
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
-from slepc4py import SLEPc
 
-from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import Factors, ordering, preferred
 from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.validation import trouble_with_inertia
 from rodfem.tolerances import NEGLIGIBLE
-
-SLICED = 1e-10
-"""Relative tolerance of SLEPc for all eigenvalues of an interval."""
-OF_VECTORS = 1e-9
-"""The same for vectors of the left-most ones: the error of the eigenvalues is the square."""
-LEAST = 6
-"""How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
 
 class PencilMatrices:
@@ -205,86 +191,6 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
         matrix.setValues(own, [index], image.array_r, addv=True)
     matrix.assemble()
     return deflated
-
-
-def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
-    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite."""
-    solver = SLEPc.EPS().create(matrix.comm)
-    solver.setOptionsPrefix(prefix)
-    solver.setOperators(matrix, mass)
-    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-    solver.getST().setType(SLEPc.ST.Type.SINVERT)
-    return solver
-
-
-class Inverse:
-    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
-
-    def __init__(self, factors: Factors) -> None:
-        self.factors = factors
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
-        """Solve for ``z``."""
-        self.factors.solve(b, z)
-
-
-def with_factors(
-    matrix: PETSc.Mat,
-    mass: PETSc.Mat,
-    number: int,
-    target: complex,
-    inverse: Inverse,
-    start: PETSc.Vec | None = None,
-    deflated: Sequence[PETSc.Vec] = (),
-) -> SLEPc.EPS:
-    """Set up shift-invert for the ``number`` eigenvalues nearest to ``target`` of a pencil ``matrix - mu mass``.
-
-    The ``inverse`` of ``matrix - target mass`` is from factors made elsewhere.  Vectors are right up to massless
-    unknowns: purification corrects all of them at once.  Eigenvectors ``deflated`` are not found; ``start`` is the
-    first vector.
-    """
-    solver = eigensolver(matrix, mass, "rodfem_")
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    solver.setTarget(target)
-    solver.setDimensions(number, number + max(number, LEAST))
-    solver.setTolerances(tol=OF_VECTORS, max_it=300)
-    solver.setPurify(False)
-    if start is not None:
-        solver.setInitialSpace([start])
-    if deflated:
-        solver.setDeflationSpace(list(deflated))
-    transform = solver.getST()
-    transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
-    ksp = transform.getKSP()
-    ksp.setType("preonly")
-    ksp.getPC().setType("python")
-    ksp.getPC().setPythonContext(inverse)
-    with slepc_errors():
-        solver.setFromOptions()
-    return solver
-
-
-def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
-    """Set up spectrum slicing for all eigenvalues of a pencil ``matrix - mu mass`` between ``low`` and ``high``.
-
-    ``room`` is what MUMPS has beyond its estimate, a percentage.  Options: ``-rodfem_slicing_eps_...``,
-    ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is an eigenvalue.
-    """
-    solver = eigensolver(matrix, mass, "rodfem_slicing_")
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
-    solver.setInterval(low, high)
-    solver.setTolerances(tol=SLICED)
-    solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    with slepc_errors():
-        solver.setFromOptions()
-        ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
-        ksp.setType("preonly")
-        ksp.getPC().setType("cholesky")
-        ksp.getPC().setFactorSolverType("mumps")
-        controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
-        with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
-            solver.setUp()
-    return solver
 
 
 @dataclass(frozen=True)

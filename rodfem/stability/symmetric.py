@@ -10,14 +10,20 @@ The shift is below the spectrum: the nearest eigenvalues to it are the left-most
 them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the modes that are
 returned.  Along a branch the shift, the symbolic factorisations and a first vector, the sum of the modes, are those of
 the point before: two numeric factorisations a point, one to solve with and one to count.
+
+SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
+and overrule what is set here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
+from slepc4py import SLEPc
 
 from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
@@ -25,7 +31,6 @@ from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import places_in, shared
 from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import (
-    Inverse,
     PencilMatrices,
     StatePencil,
     assemble_pencil,
@@ -33,13 +38,16 @@ from rodfem.stability.pencil import (
     in_units,
     scale_in_units,
     symmetry_modes,
-    with_factors,
 )
 from rodfem.tolerances import SAME_EIGENVALUE
 
 HIT = 1e-8
 """A shift nearer to an eigenvalue than this, relative to the farthest one found, or to itself, is one: but for
 round-off, which spoils the others, and the count there."""
+OF_VECTORS = 1e-9
+"""Relative tolerance of SLEPc for vectors of the left-most ones: the error of the eigenvalues is the square."""
+LEAST = 6
+"""How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
@@ -51,21 +59,25 @@ NOISE = 1e-6
 """Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
 
 
-@dataclass(frozen=True)
-class Modes:
-    """Left-most ``values``, ascending, ``vectors``, backward ``errors``; ``certified``: a count finds none missing."""
+class Found(NamedTuple):
+    """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
+
+    ``factorisations`` are those besides the workspace's own; a ``note`` goes after the reason for the method.
+    """
 
     values: np.ndarray
     vectors: list[PETSc.Vec]
     errors: np.ndarray
-    certified: bool
+    certified: bool = False
+    factorisations: int = 0
+    note: str = ""
 
     def negative(self, tolerance: float) -> int:
         """Number of eigenvalues below ``-tolerance``."""
         return int((self.values < -tolerance).sum())
 
 
-NOTHING = Modes(np.zeros(0), [], np.zeros(0), False)
+NOTHING = Found(np.zeros(0), [], np.zeros(0))
 
 
 @dataclass
@@ -159,7 +171,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         """Matrix and mass."""
         return self._held().scaled
 
-    def leftmost(self, number: int) -> Modes:
+    def leftmost(self, number: int) -> Found:
         """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer."""
         held = self._held()
         with self.system.clock("stability"):
@@ -177,9 +189,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             )
         spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
         held.shift = modes.values[0] - 0.1 * spread
-        return replace(
-            modes, values=self.system.scene.units.omega2 * modes.values, vectors=self.unscaled(modes.vectors)
-        )
+        values, vectors = self.system.scene.units.omega2 * modes.values, self.unscaled(modes.vectors)
+        return modes._replace(values=values, vectors=vectors)
 
     def unscaled(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
         """The same vectors in the rod's units, in place."""
@@ -233,7 +244,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             and self.below(values[-1] + small) >= len(values)
         )
 
-    def _solve(self, number: int, extra: int) -> Modes:
+    def _solve(self, number: int, extra: int) -> Found:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
 
         A Krylov method finds the second of two equal eigenvalues late, by round-off.
@@ -249,11 +260,11 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             held.shift -= reach
             return self._solve(number, extra)
         if len(values) < number:
-            return Modes(values, vectors, errors, False)
+            return Found(values, vectors, errors)
         held.last = sum(vector.array_r for vector in vectors)
         cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), held.scale)
         known = int((values < cut).sum())
-        return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
+        return Found(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 
     def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
         """``number`` eigenvalues or all there are, with vectors and backward errors, without what is no eigenpair.
@@ -305,3 +316,60 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             residual = S * vector - M * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
         return np.array(errors)
+
+
+def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
+    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite."""
+    solver = SLEPc.EPS().create(matrix.comm)
+    solver.setOptionsPrefix(prefix)
+    solver.setOperators(matrix, mass)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.getST().setType(SLEPc.ST.Type.SINVERT)
+    return solver
+
+
+class Inverse:
+    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
+
+    def __init__(self, factors: Factors) -> None:
+        self.factors = factors
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
+        """Solve for ``z``."""
+        self.factors.solve(b, z)
+
+
+def with_factors(
+    matrix: PETSc.Mat,
+    mass: PETSc.Mat,
+    number: int,
+    target: complex,
+    inverse: Inverse,
+    start: PETSc.Vec | None = None,
+    deflated: Sequence[PETSc.Vec] = (),
+) -> SLEPc.EPS:
+    """Set up shift-invert for the ``number`` eigenvalues nearest to ``target`` of a pencil ``matrix - mu mass``.
+
+    The ``inverse`` of ``matrix - target mass`` is from factors made elsewhere.  Vectors are right up to massless
+    unknowns: purification corrects all of them at once.  Eigenvectors ``deflated`` are not found; ``start`` is the
+    first vector.
+    """
+    solver = eigensolver(matrix, mass, "rodfem_")
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    solver.setTarget(target)
+    solver.setDimensions(number, number + max(number, LEAST))
+    solver.setTolerances(tol=OF_VECTORS, max_it=300)
+    solver.setPurify(False)
+    if start is not None:
+        solver.setInitialSpace([start])
+    if deflated:
+        solver.setDeflationSpace(list(deflated))
+    transform = solver.getST()
+    transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
+    ksp = transform.getKSP()
+    ksp.setType("preonly")
+    ksp.getPC().setType("python")
+    ksp.getPC().setPythonContext(inverse)
+    with slepc_errors():
+        solver.setFromOptions()
+    return solver

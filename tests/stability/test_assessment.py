@@ -32,14 +32,13 @@ from rodfem.stability.methods import Method
 from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import (
     Blocks,
-    Inverse,
     Pencil,
     assemble_pencil,
     symmetry_modes,
     weighed_modes,
-    with_factors,
 )
 from rodfem.stability.registry import METHODS, find
+from rodfem.stability.symmetric import Inverse, with_factors
 
 pytestmark = pytest.mark.alone
 

@@ -14,8 +14,9 @@ from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import ReducedPencil
 from rodfem.stability.assessment import Assessor
+from rodfem.stability.methods import in_interval
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.stability.pencil import in_interval, with_factors
+from rodfem.stability.symmetric import with_factors
 
 pytestmark = pytest.mark.alone
 
