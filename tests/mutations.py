@@ -1282,7 +1282,7 @@ FAULTS = {
     "double-eigenvalue-of-flutter-twice": Fault(
         "rodfem/modes/finder.py",
         "for i in _upper(values) if i not in left_out]",
-        "for i in upper(values, len(values))]",
+        "for i in _upper(values)]",
         RECORDED,
     ),
     "recorded-modes-without-those-of-special-points": Fault(

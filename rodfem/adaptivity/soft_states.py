@@ -132,14 +132,14 @@ class SoftStates:
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 
     def _moved(self, point: Point, there: Factored) -> bool:
-        """Whether the eigenvalue nearest zero has another value at the same point on the richer mesh, by quotients."""
-        here, richer = self.solver.inertia.at(point.x), self._companion(0)
+        """Whether the eigenvalue nearest zero has another value at the same point on the richer mesh."""
+        here = self.solver.inertia.at(point.x)
         here.count()
-        with self.solver.inertia.afresh():
-            v = here.nearest(1, ROUGH)[1][0]
-        w = _unit(richer.system, richer.transfer(v, state=False))
-        value, other = (x.dot(found.matrix * x).real + found.shift for x, found in ((v, here), (w, there)))
-        return bool(abs(other - value) > SURE * abs(value))
+        values = []
+        for found in (here, there):
+            with found.inertia.afresh():
+                values.append(float(found.nearest(1, ROUGH)[0][0]))
+        return abs(values[1] - values[0]) > SURE * abs(values[0])
 
     def judgement(
         self, point: Point, near: NearZero, *, fixed_load: bool, family: bool, vanishing: Sequence[PETSc.Vec]
@@ -325,7 +325,6 @@ class SoftRows:
                 self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
         if self.error_bars and doubtful:
             self._leave_out_doubtful(branch, family=family)
-            _doubt_between(branch)
         for fold in (s for s in branch.special if s.kind == FOLD):
             self._change_at_fold(fold, branch.points)
 
@@ -380,17 +379,6 @@ class SoftRows:
             richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
             self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
         return self._states[point.mesh]
-
-
-def _doubt_between(branch: Branch) -> None:
-    """Let a row be undecided if both its neighbours are, by as much: there two meshes agree on a value by chance."""
-    special = {id(s.point) for s in branch.special}
-    for before, row, after in zip(branch.points, branch.points[1:], branch.points[2:], strict=False):
-        doubt = before.negative, before.undecided
-        if not row.undecided and doubt == (after.negative, after.undecided) and doubt[1] and id(row) not in special:
-            if row.negative_in_space is not None:
-                row.negative_in_space += doubt[0] - row.negative
-            row.negative, row.undecided, row.soft = *doubt, before.soft
 
 
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
