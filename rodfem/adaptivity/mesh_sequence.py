@@ -184,9 +184,7 @@ class Meshes:
             new = self.carried(old, target, fixed_load=starts and number == 0)
             if new is not None and (pairs or number == first or new.negative == old.negative):
                 pairs.insert(0, (old, new))
-            elif pairs:
-                break
-            if len(pairs) == 4:
+            if pairs and (pairs[0][0] is not old or len(pairs) == 4):
                 break
         if not pairs:
             raise ConvergenceError(

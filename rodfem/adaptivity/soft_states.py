@@ -302,31 +302,35 @@ class SoftRows:
 
     def examine(self, branch: Branch) -> None:
         """Record soft modes, and undecided eigenvalues, at the points of a branch."""
-        special = {id(s.point): s for s in branch.special}
+        family, special = self._is_family(branch), {id(s.point) for s in branch.special}
+        doubtful = self._examine_given(branch, family)
+        rows = branch.points[1:] if branch.parent else branch.points  # without the branch point that it leaves
+        compare = self.error_bars and doubtful
+        for point in rows:
+            if id(point) not in special:
+                self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
+        if compare:
+            self._leave_out_doubtful(branch, family=family)
+        for fold in branch.special:
+            if fold.kind == FOLD and fold.multiplicity == 1 and fold.negative_before == fold.negative_after:
+                _change_at_fold(fold, branch.points)
+
+    def _examine_given(self, branch: Branch, family: bool) -> bool:
+        """The same at loads asked for, at ends and events; whether one is undecided, or not on the richer mesh."""
         singular = {id(s.point) for s in branch.special if s.kind.counted or s.test_function == "stretch"}
         given = [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
-        first = {id(branch.points[0])} if branch.parent else set()  # the branch point that it leaves
         doubtful = any(s.kind.singular and s.error_estimate == inf for s in branch.special)
-        family = self._is_family(branch)
         counted = {id(s.point): s.point.negative for s in given}
         for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
-            fixed = s.kind.given
             states = self._of(s.point)
-            states.examine(s.point, fixed_load=fixed, compare=self.error_bars, family=family)
+            states.examine(s.point, fixed_load=s.kind.given, compare=self.error_bars, family=family)
             if states.uncompared and isfinite(s.error_estimate) and s.resolved:  # else the special point says so
                 self._uncompared.setdefault(branch.name, (s.point.load, states.uncompared))
             doubtful |= s.point.undecided > 0
         for s in given:
             if s.negative_before == s.negative_after == counted[id(s.point)]:
                 s.negative_before = s.negative_after = s.point.negative
-        for point in branch.points:
-            if id(point) not in special and id(point) not in first:
-                compare = self.error_bars and doubtful
-                self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
-        if self.error_bars and doubtful:
-            self._leave_out_doubtful(branch, family=family)
-        for fold in (s for s in branch.special if s.kind == FOLD):
-            self._change_at_fold(fold, branch.points)
+        return doubtful
 
     def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
         """Make rows of special points that are zeros of the mesh, not of the rod."""
@@ -343,17 +347,6 @@ class SoftRows:
         rows = [p for p in branch.points[begin:] if id(p) not in singular]
         return bool(rows) and all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
 
-    @staticmethod
-    def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
-        """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
-        if fold.multiplicity != 1 or fold.negative_before != fold.negative_after:
-            return
-        decided = [p for p in rows if not p.undecided and p is not fold.point]
-        left = [p.negative for p in decided if p.arclength < fold.point.arclength][-1:]
-        right = [p.negative for p in decided if p.arclength > fold.point.arclength][:1]
-        if left and right and abs(left[0] - right[0]) == 1:
-            fold.negative_before, fold.negative_after = left[0], right[0]
-
     def undecided(self, branch: Branch) -> Iterator[str]:
         """Yield a sentence on each piece of a branch whose index is not decided, or not compared with a richer mesh."""
         if branch.name in self._uncompared:
@@ -362,17 +355,19 @@ class SoftRows:
             yield f"{branch.name}: At {name} = {at:.8g} the index is not compared with that of a richer mesh. {why}"
         for words, group in groupby(branch.points, lambda p: p.undecided and index_range(p.negative, p.undecided)):
             if words:
-                points = list(group)
-                solver = self.meshes.solvers[points[0].mesh]
-                worst = max((m for p in points for m in p.soft if not m.decided), key=lambda m: m.uncertainty)
-                least = TOLERANCE * solver.inertia.scale
-                remedy = FINER if worst.uncertainty > CLEARLY * least else EXACT
-                if remedy == FINER and not self.error_bars and worst.uncertainty <= solver.inertia.tolerance:
-                    remedy = BARS
-                low, high = (f"{p.load:.8g}" for p in (points[0], points[-1]))
-                load = solver.system.scene.load
-                where = f"At {load} = {low}" if len(points) == 1 else f"From {load} = {low} to {high}"
-                yield f"{branch.name}: {where} the index is {words} ({worst}): {remedy}."
+                yield f"{branch.name}: {self._piece(list(group), str(words))}"
+
+    def _piece(self, points: list[Point], words: str) -> str:
+        """Sentence on neighbouring points whose index is undecided, in ``words``."""
+        solver = self.meshes.solvers[points[0].mesh]
+        worst = max((m for p in points for m in p.soft if not m.decided), key=lambda m: m.uncertainty)
+        remedy = FINER if worst.uncertainty > CLEARLY * TOLERANCE * solver.inertia.scale else EXACT
+        if remedy == FINER and not self.error_bars and worst.uncertainty <= solver.inertia.tolerance:
+            remedy = BARS
+        low, high = (f"{p.load:.8g}" for p in (points[0], points[-1]))
+        load = solver.system.scene.load
+        where = f"At {load} = {low}" if len(points) == 1 else f"From {load} = {low} to {high}"
+        return f"{where} the index is {words} ({worst}): {remedy}."
 
     def _of(self, point: Point) -> SoftStates:
         if point.mesh not in self._states:
@@ -392,3 +387,12 @@ def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
     doubtful = any(sum(p.undecided > 0 for p in side[:number]) == number for side in (before, after))
     change = [(q.negative - p.negative, q.undecided - p.undecided) for p, q in zip(before[:1], after[:1], strict=False)]
     return special.kind.singular and doubtful and change != [(special.negative_after - special.negative_before, 0)]
+
+
+def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
+    """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
+    decided = [p for p in rows if not p.undecided and p is not fold.point]
+    left = [p.negative for p in decided if p.arclength < fold.point.arclength][-1:]
+    right = [p.negative for p in decided if p.arclength > fold.point.arclength][:1]
+    if left and right and abs(left[0] - right[0]) == 1:
+        fold.negative_before, fold.negative_after = left[0], right[0]

@@ -47,11 +47,12 @@ def write(group: h5py.Group, typical: Sequence[Typical]) -> None:
     own, text = group.create_group(GROUP), h5py.string_dtype()
     own["row"] = [each.row for each in typical]
     own.create_dataset("trouble", data=[each.trouble for each in typical], dtype=text)
-    known = [None if each.found is None else each.found._asdict() for each in typical]
-    motions = _stacked([None if one is None else one["motion"] for one in known], "")
-    own.create_dataset("motion", data=motions, dtype=text)
-    for name in ("value", "residual", "displacement", "rotation"):
-        own[name] = _stacked([None if one is None else one[name] for one in known], np.nan)
+    for name in Few._fields:
+        rows = [each.found and getattr(each.found, name) for each in typical]
+        if name == "motion":
+            own.create_dataset(name, data=_stacked(rows, ""), dtype=text)
+        else:
+            own[name] = _stacked(rows, np.nan)
 
 
 def _stacked(rows: Sequence[Any], nothing: Any) -> np.ndarray:

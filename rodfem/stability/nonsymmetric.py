@@ -117,22 +117,22 @@ def named(system: System, found: Frequencies, turned: np.ndarray, number: int | 
     """
     together = [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number]
     owner = np.repeat(np.arange(len(together)), list(map(len, together)))
-    spans = (found.vectors[:, group] for group in together)
-    several = (
-        orthonormal(system.comm, span, found.weighed[:, group]) if len(group) > 1 else span
-        for span, group in zip(spans, together, strict=True)
-    )
-    vectors = np.concatenate(list(several), axis=1)
+    vectors = np.concatenate([_span(system, found, group) for group in together], axis=1)
     squares, moved = np.zeros((len(together), 3)), np.zeros(len(together))
     for part in (vectors.real, vectors.imag) if np.iscomplexobj(vectors) else (vectors,):
         np.add.at(squares, owner, motion_names.squares(system, turned, part))
         np.add.at(moved, owner, motion_names.displacements(system, part))
-    kinds, floating = [""] * len(found.values), floats(system.scene)
-    for group, name in zip(together, motion_names.names_of(motion_names.of_all(squares, moved)), strict=True):
+    names, floating = motion_names.names_of(motion_names.of_all(squares, moved)), floats(system.scene)
+    kinds = dict.fromkeys(range(len(found.values)), "")
+    for group, name in zip(together, names, strict=True):
         rigid = floating and abs(found.values[group]).max() < STILL * found.far
-        for j in group:
-            kinds[j] = motion_names.RIGID if rigid else name
-    return replace(found, kinds=tuple(kinds))
+        kinds |= dict.fromkeys(group, motion_names.RIGID if rigid else name)
+    return replace(found, kinds=tuple(kinds.values()))
+
+
+def _span(system: System, found: Frequencies, group: list[int]) -> np.ndarray:
+    vectors = found.vectors[:, group]
+    return orthonormal(system.comm, vectors, found.weighed[:, group]) if len(group) > 1 else vectors
 
 
 def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[list[int]]:
