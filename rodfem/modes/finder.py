@@ -21,9 +21,8 @@ from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.linalg.matrices import local_rows, rounding, rounding_of
 from rodfem.linalg.orthogonal import combine, orthonormalize
-from rodfem.modes.modes import LEFT, SYMMETRY, Modes
+from rodfem.modes.modes import LEFT, SYMMETRY, Few, Modes, Typical
 from rodfem.modes.perturbation import Motion, Motions
-from rodfem.modes.recorded import Few, Typical
 from rodfem.stability import motion_names
 from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.cluster import DRAWN, as_vectors

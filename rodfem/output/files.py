@@ -20,9 +20,8 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import InputError
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
+from rodfem.modes.modes import Typical, write_typical
 from rodfem.modes.perturbation import Motion, Motions
-from rodfem.modes.recorded import Typical
-from rodfem.modes.recorded import write as write_typical
 from rodfem.output.contents import read_diagram
 from rodfem.output.table import COLUMNS, branch_data
 from rodfem.problem.arguments import checked
@@ -167,7 +166,7 @@ def states_of(
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
     every further field and scalar with P rows, strains, forces and moments (:mod:`rodfem.fem.resultants`), and under
     ``special/<i>`` the null vectors of its special points: displacement ``r``, ``rotation`` in the space frame, and the
-    change of ``q``.  The ``modes`` of each branch, if given, are in the group of :mod:`rodfem.modes.recorded`.  Below
+    change of ``q``.  The ``modes`` of each branch, if given, are in the group of :mod:`rodfem.modes.modes`.  Below
     the branch are the groups of :func:`rodfem.problem.supports.write`, for pictures; the file has the
     name of the ``first`` branch and the bending stiffness under ``section``.  ``solvers`` are those of the meshes that
     points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file, which stays as it is;

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rodfem.modes.modes import RIGID, SYMMETRY, load_modes
-from rodfem.modes.recorded import Few
+from rodfem.modes.modes import RIGID, SYMMETRY, Few, load_modes
 from rodfem.output.digits import eigenvalue_in_words
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.plot_modes import GROWTH, drawn_size

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.errors import InputError
-from rodfem.modes.modes import rows_with_modes
-from rodfem.modes.recorded import read as recorded
+from rodfem.modes.modes import rows_with_modes, typical_of
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_diagram import is_traced
 from rodfem.output.profiles import POINTS, PROFILES, profiles_of
@@ -56,7 +55,7 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
     """Modes of a branch by its rows, those with error bars in the file ``path``, and why others have none."""
     name, modes = branch["name"], {}
     zeros = [0] * len(shapes.r) if "omega2" in branch["columns"] else branch["columns"]["zero"]
-    typical = {each.row: each for each in recorded(group)}
+    typical = {each.row: each for each in typical_of(group)}
     exact = {row for other, row in rows_with_modes(path) if other == name}
     for row in sorted({*typical, *exact} & {*range(len(shapes.r))}):
         few, nodes = getattr(typical.get(row), "found", None), group["s"][row]

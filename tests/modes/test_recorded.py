@@ -20,8 +20,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.faults import in_words
 from rodfem.fem.fields import Discretization
 from rodfem.modes.finder import EVENLY, FEWEST, ModeFinder, typical_rows
-from rodfem.modes.modes import SYMMETRY
-from rodfem.modes.recorded import Typical, read
+from rodfem.modes.modes import SYMMETRY, Typical, typical_of
 from rodfem.problem.scene import Inertia, Scene
 from rodfem.report.payload import payload_of
 
@@ -33,7 +32,7 @@ def recorded(scene: Scene, plan: Plan, folder: Path, mesh: Discretization = MESH
     """Modes in the file of a run, by branch."""
     rodfem.run(scene, mesh, plan, folder, figures=False, quiet=True)
     with h5py.File(folder / "states.h5") as file:
-        return {name: list(read(group)) for name, group in file["branches"].items()}
+        return {name: list(typical_of(group)) for name, group in file["branches"].items()}
 
 
 @pytest.mark.short
