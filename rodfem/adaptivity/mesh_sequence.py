@@ -10,7 +10,7 @@ proportion to the distance from there follow the bend of either branch, however 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf, isfinite, log10
 
 import numpy as np
@@ -65,6 +65,7 @@ def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) 
     return Discretization(formulation, len(vertices) - 1, min(max(degree, 4), 9), vertices)
 
 
+@dataclass(eq=False)
 class TooCoarse(Exception):
     """The mesh does not resolve a ``point`` to the accuracy: its ``error`` is too large, infinite if it is not known.
 
@@ -72,11 +73,14 @@ class TooCoarse(Exception):
     ``why`` is a sentence.
     """
 
-    def __init__(
-        self, point: Point, error: float, directions: Sequence[PETSc.Vec] = (), order: float = 1.0, why: str = ""
-    ) -> None:
-        super().__init__(why or f"estimated error {error:.0e}")
-        self.point, self.error, self.directions, self.order = point, error, list(directions), order
+    point: Point
+    error: float
+    directions: Sequence[PETSc.Vec] = ()
+    order: float = 1.0
+    why: str = ""
+
+    def __str__(self) -> str:
+        return self.why or f"estimated error {self.error:.0e}"
 
 
 class Meshes:

@@ -34,7 +34,6 @@ from petsc4py import PETSc
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.observer import Observer
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.errors import ConvergenceError, InputError
@@ -302,27 +301,6 @@ def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
     if left or right:
         return np.sin(np.pi * (k - 0.5) * (x if left else 1 - x))
     return np.where(k % 2, np.sin(2 * np.pi * ((k + 1) // 2) * x), np.cos(2 * np.pi * ((k + 1) // 2) * x))
-
-
-def find_equilibria(
-    solver: BranchSolver,
-    load: float,
-    known: Sequence[Point] = (),
-    tries: int = 24,
-    seed: int = 0,
-    observer: Observer | None = None,
-) -> list[Point]:
-    """Equilibria at ``load`` beside the ``known`` ones, from ``tries`` deflated Newton iterations.
-
-    Each stands for all that the scene's symmetries make of it, and has index, energy, ordinate and a tangent in the
-    direction of increasing load.  How the tries ended goes to the ``observer``.  Raises :class:`InputError` for a load
-    that is not admissible.  ``solver`` and ``seed`` are those of :class:`Deflation`.
-    """
-    search = Deflation(solver, load, known, seed)
-    found = search.run(tries)
-    if observer is not None:
-        observer.note(str(search.tally))
-    return found
 
 
 def equilibria_at(

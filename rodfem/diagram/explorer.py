@@ -18,7 +18,7 @@ from rodfem.continuation.reduced import lines
 from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
-from rodfem.deflation.search import equilibria_at, find_equilibria
+from rodfem.deflation.search import Deflation, equilibria_at
 from rodfem.diagram.equivalence import are_images, equivalent, near
 from rodfem.diagram.first_state import ahead, first_state, name_of_first
 from rodfem.diagram.images import other_ordinates
@@ -70,7 +70,10 @@ class Explorer(Tracer):
         self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
         with self.solver.system.clock.scope("search"):
             known = equilibria_at(self.solver, self.branches, load, self.here)
-            return find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
+            search = Deflation(self.solver, load, known)
+            found = search.run(self.plan.tries)
+            self.observer.note(str(search.tally))
+            return found
 
     def _on_branch(self, point: Point, first: int = 0) -> bool:
         """Whether a point is on one of the branches traced, from number ``first`` on."""

@@ -17,7 +17,6 @@ and overrule what is set here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -275,8 +274,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         if len(held.last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
             start.array[:] += held.last
-        inverse = Inverse(held.shifted.factors)
-        solver = with_factors(*held.scaled, number, held.shift, inverse, start, held.deflated)
+        solver = self.eigensolver(number, start)
         with slepc_errors():
             solver.solve()
         found = solver.getConverged()
@@ -296,6 +294,31 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         stiffness, mass = self._norms()
         true = [i for i in range(len(values)) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
         return values[true], [vectors[i] for i in true], errors[true]
+
+    def eigensolver(self, number: int, start: PETSc.Vec) -> SLEPc.EPS:
+        """Set up shift-invert for the ``number`` eigenvalues nearest to the shift that was factored.
+
+        Vectors are right up to massless unknowns: purification corrects all of them at once.
+        """
+        held = self._held()
+        solver = eigensolver(*held.scaled, "rodfem_")
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        solver.setTarget(held.shift)
+        solver.setDimensions(number, number + max(number, LEAST))
+        solver.setTolerances(tol=OF_VECTORS, max_it=300)
+        solver.setPurify(False)
+        solver.setInitialSpace([start])
+        if held.deflated:
+            solver.setDeflationSpace(held.deflated)
+        transform = solver.getST()
+        transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
+        ksp = transform.getKSP()
+        ksp.setType("preonly")
+        ksp.getPC().setType("python")
+        ksp.getPC().setPythonContext(_Inverse(held.shifted.factors))
+        with slepc_errors():
+            solver.setFromOptions()
+        return solver
 
     def _norms(self) -> tuple[float, float]:
         stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self._held().scaled)
@@ -328,7 +351,7 @@ def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
     return solver
 
 
-class Inverse:
+class _Inverse:
     """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
 
     def __init__(self, factors: Factors) -> None:
@@ -337,39 +360,3 @@ class Inverse:
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
         """Solve for ``z``."""
         self.factors.solve(b, z)
-
-
-def with_factors(
-    matrix: PETSc.Mat,
-    mass: PETSc.Mat,
-    number: int,
-    target: complex,
-    inverse: Inverse,
-    start: PETSc.Vec | None = None,
-    deflated: Sequence[PETSc.Vec] = (),
-) -> SLEPc.EPS:
-    """Set up shift-invert for the ``number`` eigenvalues nearest to ``target`` of a pencil ``matrix - mu mass``.
-
-    The ``inverse`` of ``matrix - target mass`` is from factors made elsewhere.  Vectors are right up to massless
-    unknowns: purification corrects all of them at once.  Eigenvectors ``deflated`` are not found; ``start`` is the
-    first vector.
-    """
-    solver = eigensolver(matrix, mass, "rodfem_")
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    solver.setTarget(target)
-    solver.setDimensions(number, number + max(number, LEAST))
-    solver.setTolerances(tol=OF_VECTORS, max_it=300)
-    solver.setPurify(False)
-    if start is not None:
-        solver.setInitialSpace([start])
-    if deflated:
-        solver.setDeflationSpace(list(deflated))
-    transform = solver.getST()
-    transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
-    ksp = transform.getKSP()
-    ksp.setType("preonly")
-    ksp.getPC().setType("python")
-    ksp.getPC().setPythonContext(inverse)
-    with slepc_errors():
-        solver.setFromOptions()
-    return solver
