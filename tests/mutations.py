@@ -312,7 +312,7 @@ FAULTS = {
     ),
     "differences-along-a-locus-by-the-bounds-alone": Fault(
         "rodfem/codim2/criteria.py",
-        "np.minimum(DIFFERENCE, INSIDE * self.plane.room(p) / width)",
+        "np.minimum(DIFFERENCE, self.plane.room(p) / 100 / width)",
         "np.full(2, DIFFERENCE)",
         "tests/codim2/test_locus.py",
     ),

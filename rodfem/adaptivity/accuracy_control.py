@@ -28,8 +28,6 @@ POLISHED = 1e-3
 """Distance, in the metric, that it may move a point by at most."""
 TRIES, MOST = 4, 16
 """Meshes tried at one place, and in a run."""
-SURE = 10.0
-"""An error estimated by the decay of coefficients counts where it is this much better than the accuracy."""
 GROWN, SELDOM = 1.5, 10
 """An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
 NEAR = 0.1
@@ -71,7 +69,7 @@ class AccuracyControl:
         last = self.checked
         if last is not None and last.since < SELDOM and not self._at_bound(point):
             point.estimate = last.error * max(1.0, indicator / last.indicator)
-            if indicator < GROWN * last.indicator or point.estimate * SURE < self.accuracy:
+            if indicator < GROWN * last.indicator or 10 * point.estimate < self.accuracy:
                 last.since += 1
                 return
         with solver.system.clock.scope("error bars"):

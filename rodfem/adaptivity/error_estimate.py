@@ -40,6 +40,14 @@ from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event
 from rodfem.tolerances import ROUND_OFF, round_off, same_place
 
+RESOLVED_TO = 0.1
+"""Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
+order of which errors of loads are, is one per cent."""
+RESOLVED = 1e-9
+"""Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
+LEFT = 0.5
+"""Part of an error of an event that is left at most: that of a number of the nodes falls with their distance."""
+
 
 def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
     """Bound of the error of a ``value`` of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
@@ -89,18 +97,6 @@ class OrdinateBound:
             beside = of.of(r + after[0] - before[0], turned / np.sqrt(turned @ turned))
             largest = max(largest, abs(float(beside) - value))
         return largest
-
-
-AMPLE, MOST = 2.0, 0.75
-"""Safety factor on the ratio of the last coefficients, which may be small by coincidence; and the largest ratio of
-errors: beyond it neither mesh resolves the state."""
-RESOLVED_TO = 0.1
-"""Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
-order of which errors of loads are, is one per cent."""
-RESOLVED = 1e-9
-"""Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
-LEFT = 0.5
-"""Part of an error of an event that is left at most: that of a number of the nodes falls with their distance."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +149,8 @@ class Enriched:
         first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._indicators, (before, after), strict=True))
         if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
             return halved(degree)
-        return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
+        # the last coefficients may be small by coincidence; beyond three quarters neither mesh resolves the state
+        return max(halved(degree), min(2 * last / max(first, RESOLVED), 0.75))
 
     def estimate(self, special: SpecialPoint) -> None:
         """Set ``error_estimate`` and ``ordinate_error`` of a special point, and whether it is ``resolved``.

@@ -36,14 +36,16 @@ OF_A_RING = 1e-8
 """Accuracy with which a uniform ring is computed at least."""
 ALMOST = 1e-6
 """Part of an element that a piece of the rod may have more than a whole number of them."""
-MARGIN = 100.0
-"""A new mesh is made for an accuracy better than the one asked for by this factor: it is to last for a while."""
-FURTHER = 10.0
-"""By this factor more at each further try at one place."""
 
 OWN_MESH = Remedy(
     "use {} and {} instead of an accuracy", *(Argument("Discretization", name) for name in ("elements", "degree"))
 )
+SHARE = 0.25
+"""Largest step near a gap, relative to the distance from where the branches would cross."""
+LEAST = 1e-6
+"""Least bound of a step."""
+ARM = 0.05
+"""Distance, in the metric, at which the four arms that would meet are looked for."""
 
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:
@@ -120,7 +122,8 @@ class Meshes:
         old = self.solvers[trouble.point.mesh]
         error = trouble.error if isfinite(trouble.error) else 1e3 * self.accuracy
         found = self.indicator(old.mesh)(trouble.point.x, trouble.directions)
-        gain = self.accuracy / (error * MARGIN * FURTHER**tries)
+        # a hundred times better than asked for: the mesh is to last for a while
+        gain = self.accuracy / (error * 100.0 * 10.0**tries)
         indicator = max(found.indicator, TINY) * gain**trouble.order
         mesh = cheapest(old, found, indicator)
         fields = old.system.fields
@@ -195,14 +198,6 @@ class Meshes:
                 f"The branch could not be carried to another mesh near load {history[-1].load:.8g}", OWN_MESH
             )
         return pairs
-
-
-SHARE = 0.25
-"""Largest step near a gap, relative to the distance from where the branches would cross."""
-LEAST = 1e-6
-"""Least bound of a step."""
-ARM = 0.05
-"""Distance, in the metric, at which the four arms that would meet are looked for."""
 
 
 class Gap(Exception):

@@ -41,10 +41,8 @@ from rodfem.stability.motion_names import SHARE, MotionNames
 from rodfem.stability.near_zero import SPARE, NearZero, decide, judge, near_zero, quotients, soft_limit
 from rodfem.stability.soft_mode import Judgement, SoftMode, index_range
 
-REFINEMENTS = 2
-"""Meshes that are tried beyond that of a state until the signs of its soft modes are decided."""
-SURE = 0.1
-"""Part of an eigenvalue by which its quotients on two meshes differ if the mesh decides its sign, at most."""
+FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
+BARS = "richer meshes may decide that, ask for error bars"
 
 
 class SoftStates:
@@ -139,7 +137,7 @@ class SoftStates:
         for found in (here, there):
             with found.inertia.afresh():
                 values.append(float(found.nearest(1, ROUGH)[0][0]))
-        return abs(values[1] - values[0]) > SURE * abs(values[0])
+        return abs(values[1] - values[0]) > abs(values[0]) / 10
 
     def judgement(
         self, point: Point, near: NearZero, *, fixed_load: bool, family: bool, vanishing: Sequence[PETSc.Vec]
@@ -192,7 +190,7 @@ class SoftStates:
         """
         out, values, still = modes, np.array([m.value for m in modes]), list(vanishing)
         soft = bool((abs(values) < soft_limit(self.solver.inertia)).any())
-        for level in range(REFINEMENTS):
+        for level in range(2):  # meshes beyond that of the state
             richer = self._companion(level)
             try:
                 point, again = _on(richer, point, fixed_load, soft=soft)
@@ -286,12 +284,6 @@ def _nearest(
     return q.values[order], (q.uncertainty + STEADY * moved)[order]
 
 
-FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
-BARS = "richer meshes may decide that, ask for error bars"
-CLEARLY = 10.0
-"""Times the uncertainty by round-off above which one is that of the mesh."""
-
-
 class SoftRows:
     """Examines branches of one run; with ``error_bars`` the error of its meshes is part of every uncertainty."""
 
@@ -361,7 +353,7 @@ class SoftRows:
         """Sentence on neighbouring points whose index is undecided, in ``words``."""
         solver = self.meshes.solvers[points[0].mesh]
         worst = max((m for p in points for m in p.soft if not m.decided), key=lambda m: m.uncertainty)
-        remedy = FINER if worst.uncertainty > CLEARLY * TOLERANCE * solver.inertia.scale else EXACT
+        remedy = FINER if worst.uncertainty > 10 * TOLERANCE * solver.inertia.scale else EXACT
         if remedy == FINER and not self.error_bars and worst.uncertainty <= solver.inertia.tolerance:
             remedy = BARS
         low, high = (f"{p.load:.8g}" for p in (points[0], points[-1]))

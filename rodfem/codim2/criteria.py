@@ -40,6 +40,24 @@ UNSTABLE = "another frequency has become unstable, or stable, since the row befo
 """What is said of a row where their number has changed, with a potential and without one."""
 NEAREST = "the index is that of the frequencies nearest zero: the mesh has too many unknowns to find all of them"
 """What is said of a locus on a fine mesh."""
+SPLIT = 1.1
+"""Times what eigenvalues, or the ``D`` of pairs, that are equal by a symmetry differ by that each may be off: to first
+order."""
+IMPERFECT = 1e-7
+"""Over the lowest bending eigenvalue, or over the terms that cancel: a larger imperfection is not one of the mesh."""
+FEWER = 1e-5
+"""Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
+their mean, are not equal by a symmetry."""
+FIRST = 1e-4
+"""First step of the secants, relative to the bounds."""
+SHARP, NOISE = 1e-12, 1e-4
+"""Steps of the secants that end them: by their own size, or where they no longer shrink."""
+FAR = 1e-6
+"""Step of the secants from which on they tell the slope of ``D``."""
+DIFFERENCE = 1e-3
+"""Step of the central differences of ``D``, relative to the bounds."""
+Zero = tuple[float, float, Measured, PETSc.Vec]
+"""Place of a zero of ``D`` on a line of parameters, its uncertainty, the cluster and the state there."""
 
 
 def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None = None) -> int:
@@ -52,16 +70,6 @@ def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None
     chosen = np.argsort(own, kind="stable")[: len(own) - size]
     values, noise = spectrum.values[chosen], np.maximum(spectrum.zero, spectrum.noise[chosen])
     return int(((values.real < -noise) | (abs(values.imag) > np.maximum(noise, MET * abs(values)))).sum())
-
-
-SPLIT = 1.1
-"""Times what eigenvalues, or the ``D`` of pairs, that are equal by a symmetry differ by that each may be off: to first
-order."""
-IMPERFECT = 1e-7
-"""Over the lowest bending eigenvalue, or over the terms that cancel: a larger imperfection is not one of the mesh."""
-FEWER = 1e-5
-"""Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
-their mean, are not equal by a symmetry."""
 
 
 @dataclass(frozen=True)
@@ -196,20 +204,6 @@ def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[
     return right, [combine(left, column) for column in (vt.T @ u.T).T]
 
 
-FIRST = 1e-4
-"""First step of the secants, relative to the bounds."""
-SHARP, NOISE = 1e-12, 1e-4
-"""Steps of the secants that end them: by their own size, or where they no longer shrink."""
-FAR = 1e-6
-"""Step of the secants from which on they tell the slope of ``D``."""
-DIFFERENCE = 1e-3
-"""Step of the central differences of ``D``, relative to the bounds."""
-INSIDE = 0.01
-"""Greatest such step over the distance from what is not admissible, as a mass of zero: ``D`` has a pole there."""
-Zero = tuple[float, float, Measured, PETSc.Vec]
-"""Place of a zero of ``D`` on a line of parameters, its uncertainty, the cluster and the state there."""
-
-
 class Collision:
     """Corrects points of the plane to where two eigenvalues near ``omega2`` collide."""
 
@@ -232,7 +226,8 @@ class Collision:
         width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
         basis, forward = _basis(near), guess[2] / width
         gradient, clearest = np.zeros(2), here
-        steps = np.minimum(DIFFERENCE, INSIDE * self.plane.room(p) / width)
+        # D has a pole at what is not admissible, as a mass of zero
+        steps = np.minimum(DIFFERENCE, self.plane.room(p) / 100 / width)
         for which in (0, 1):
             system.line = self.plane.line(p, self.plane.axis(which))
             step = float(steps[which])

@@ -37,10 +37,31 @@ WINDOWS = tuple(0.064 / 2**i for i in range(11))
 """Half widths of windows, as arclengths, from wide to narrow."""
 POINTS = 8
 """Points of a window: an even number, none of them in the middle, where the end of a fold is singular."""
-LAST, TIMES = 2, 3.0
-"""Coefficients of a polynomial by which it is known how wrong the others are, and to which factor: they are few."""
 INSIDE = 0.5
 """Part of the window, about its middle, in which what is sought must be."""
+LOCATED = 1e-8
+"""Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
+UNPLACED = 1e-5
+"""Uncertainty along the curve, an arclength, of what cannot be placed: what differences for a tangent displace."""
+CERTAIN = 10.0
+"""Uncertainties of a parameter by which it changes towards a turning point: less is the round-off of a constant."""
+NONE = 1e-10
+"""Part of a unit tangent along one parameter, or of a coupling over that with the other one, that is round-off: it has
+no sign."""
+VANISHED, PASSED = 0.05, 1e-3
+"""Share that is left of a coupling where it vanishes, at an end and beside a cusp: its place is known to no more."""
+TRIES = 8
+"""Parabolas by which a least value in a step is sought, and times that a step is parted for more cusps than one."""
+DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
+"""The end of a curve of flutter: its double eigenvalue vanishes."""
+ENDS = "the fold ends on a branch point"
+DIVERGES = "the double eigenvalue vanishes: divergence"
+PASSES = "the fold passes a branch point"
+"""Marks of rows; at the last one the coupling vanishes as well, but the fold goes on."""
+Row = tuple[LocusPoint, str]
+"""A point of a locus and the kind of its mark; empty for none."""
+Test = Callable[[LocusPoint], float]
+"""What vanishes at a point of codimension two."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +122,7 @@ def place(
     if best is None or other is None:
         raise ConvergenceError("no two windows about the point hold the curve")
     both = (max(best.half, other.half), min(best.half, other.half))
-    return replace(best, ds=TIMES * best.ds + abs(best.s - other.s), apart=abs(best.p - other.p), windows=both)
+    return replace(best, ds=3 * best.ds + abs(best.s - other.s), apart=abs(best.p - other.p), windows=both)
 
 
 def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, half: float) -> Place:
@@ -114,7 +135,7 @@ def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sou
     order = np.arange(POINTS)
     odd = order % 2 == 1
     moves = np.where(odd, order / half, 0.0) if sought.stationary else np.where(odd, 0.0, 1.0)
-    wrong = float(abs(f.coef[-LAST:]).max() * moves.sum())
+    wrong = float(abs(f.coef[-2:]).max() * moves.sum())
     g = f.deriv() if sought.stationary else f
     slope, s = g.deriv(), 0.0
     for _ in range(POINTS):  # Newton's method
@@ -138,34 +159,6 @@ def ahead(plane: Plane, node: LocusPoint, s: float) -> Prediction:
 def _arclengths(half: float) -> np.ndarray:
     """Chebyshev's points of a window of this ``half`` width, (POINTS,)."""
     return np.asarray(half * np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS))
-
-
-LOCATED = 1e-8
-"""Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
-UNPLACED = 1e-5
-"""Uncertainty along the curve, an arclength, of what cannot be placed: what differences for a tangent displace."""
-CERTAIN = 10.0
-"""Uncertainties of a parameter by which it changes towards a turning point: less is the round-off of a constant."""
-NONE = 1e-10
-"""Part of a unit tangent along one parameter, or of a coupling over that with the other one, that is round-off: it has
-no sign."""
-VANISHED, PASSED = 0.05, 1e-3
-"""Share that is left of a coupling where it vanishes, at an end and beside a cusp: its place is known to no more."""
-ASIDE = 1e-2
-"""Distance from a cusp, over that of the nodes, at which the tangent has the direction that it has beside it."""
-TRIES = 8
-"""Parabolas by which a least value in a step is sought, and times that a step is parted for more cusps than one."""
-DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
-"""The end of a curve of flutter: its double eigenvalue vanishes."""
-ENDS = "the fold ends on a branch point"
-DIVERGES = "the double eigenvalue vanishes: divergence"
-PASSES = "the fold passes a branch point"
-"""Marks of rows; at the last one the coupling vanishes as well, but the fold goes on."""
-
-Row = tuple[LocusPoint, str]
-"""A point of a locus and the kind of its mark; empty for none."""
-Test = Callable[[LocusPoint], float]
-"""What vanishes at a point of codimension two."""
 
 
 class Codim2Points:
@@ -234,7 +227,7 @@ class Codim2Points:
 
     def _sides(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
         """Points on both sides of a ``node`` between two others, none where these are as close."""
-        aside = ASIDE * (b.s - a.s)
+        aside = (b.s - a.s) / 100  # the tangent has the direction that it has beside a cusp
         both = node.s - aside, node.s + aside
         return [self._at(a, b, s) for s in both] if a.s < both[0] and both[1] < b.s else []
 

@@ -42,8 +42,6 @@ from rodfem.fem.system import System
 from rodfem.problem.end import TURNS
 from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD, TINY
 
-MOST = 60
-"""Deflated Newton steps of one try."""
 NEAR = 1e-4
 """Plain Newton steps below this, in the metric and relative in natural sizes, end the deflated iteration: the plain one
 takes over."""
@@ -171,7 +169,7 @@ class Deflation:
                     return None
             return Correction(distance, size)
 
-        return newton(iteration, Limits(MOST, inf, NEAR))
+        return newton(iteration, Limits(60, inf, NEAR))
 
     def rescaling(self, x: PETSc.Vec, step: PETSc.Vec) -> float:
         """Factor that makes a plain Newton step at ``x`` the step of the deflated equations."""

@@ -55,14 +55,14 @@ from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.spectrum import FINITE, krylov
 
 INVERSES = ("saddle", "elimination")
-SPARE = 14
-"""Eigenvalues that are sought beyond those wanted: a Krylov space has the second of two equal ones late."""
 SINGULAR = 1e-6
 """Relative residual of a solve above which its matrix counts as singular."""
 RANK = 1e-10
 """Square of a part, relative to the vector's, below which it depends on others."""
 
 Solve = Callable[[np.ndarray], np.ndarray]
+APART = 1e-3
+"""Eigenvalues closer than this, relative to the greatest, are one for the parameters of the transform."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ class ReducedPencil:
             return self.kernel.project(solve(self.M @ self.kernel.expand(z)))
 
         start = T(generic(np.arange(n)))  # no massless part
-        nu, z = krylov(T, n, min(number + SPARE, n), start)
+        # a Krylov space has the second of two equal eigenvalues late: more are sought
+        nu, z = krylov(T, n, min(number + 14, n), start)
         finite = abs(nu) > FINITE * abs(nu).max()
         nu, vectors = nu[finite], self.kernel.expand(z[:, finite])
         if self.symmetric:  # round-off may make a complex pair of a double eigenvalue: its parts span the same plane
@@ -172,10 +173,6 @@ class ReducedPencil:
             return np.asarray(x - border @ scipy.linalg.lu_solve(capacitance, columns.T @ x))
 
         return solve
-
-
-APART = 1e-3
-"""Eigenvalues closer than this, relative to the greatest, are one for the parameters of the transform."""
 
 
 class Reduction(Method):

@@ -38,8 +38,6 @@ SEEN = 1e-3
 """Response of a mode to a functional, relative to the greatest one, below which the functional does not observe it."""
 DOUBLE = 1e-3
 """Eigenvalues nearer than this, relative, to a double one are that: round-off parts them by its square root."""
-EVENLY = 5
-"""States of a branch, evenly along it."""
 FEWEST, MOST = 4, 8
 """Modes of a state: those of negative eigenvalues are among them up to the latter."""
 FLOOR = 5e-12
@@ -305,7 +303,7 @@ def _sum(motions: list[Motion], weights: np.ndarray) -> Motion:
 def typical_rows(branch: Branch) -> dict[int, int]:
     """Rows of the typical states of a branch, and how many modes of each are wanted."""
     along = np.array([point.arclength for point in branch.points])
-    rows = [int(np.argmin(abs(along - place))) for place in np.linspace(along[0], along[-1], EVENLY)]
+    rows = [int(np.argmin(abs(along - place))) for place in np.linspace(along[0], along[-1], 5)]
     wanted = {row: branch.points[row].negative for row in rows}
     for special in branch.special:
         beside = special.negative_before, special.negative_after

@@ -41,8 +41,6 @@ from rodfem.tolerances import NEGLIGIBLE
 
 DIRECTION = 1e-6
 """Relative tolerance of ARPACK for the vector of the least singular value."""
-SMALL = 300
-"""Number of columns up to which the singular values are computed by LAPACK."""
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 DOUBTFUL = 1e-5
 """A singular value above this, relative to the greatest column, is far from zero."""
@@ -140,7 +138,7 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     """Smallest singular value of ``C`` (m, p), p > 0, and its right vector (p,); zero where C is exactly singular."""
     C = sp.csr_matrix(C)
     m, p = C.shape
-    if p <= SMALL or p > m:
+    if p <= 300 or p > m:  # LAPACK takes no time
         _, s, vt = np.linalg.svd(C.toarray(), full_matrices=p > m)
         return (float(s[-1]) if p <= m else 0.0), vt[-1]
     size = float(np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()))

@@ -17,8 +17,6 @@ from rodfem.tolerances import same_place
 
 PUSHED = 1e-8
 """Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
-NEAR = 1e-2
-"""Distance, in the metric, within which the state in space that belongs to a planar one is sought."""
 
 
 class InSpace:
@@ -82,7 +80,8 @@ class InSpace:
                 "leave planar out of the scene."
             )
         settled = state.copy()
-        if correct(self.system, settled, self.system.load_axis(), NEAR).converged:
+        # within this distance, in the metric, of the planar state
+        if correct(self.system, settled, self.system.load_axis(), 0.01).converged:
             state = settled  # else the state is so near a singular one that its own error decides as well
         return self.inertia.at(state)
 

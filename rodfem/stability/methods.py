@@ -31,12 +31,8 @@ SLICED = 1e-10
 """Relative tolerance of SLEPc for all eigenvalues of an interval."""
 WIDER = (0.0, 1e-9, 1e-7, 1e-5)
 """By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
-PETSC_ERR_PLIB = 77
-"""PETSc's error code for that."""
 ROOMS = (100, 400, 1600)
 """Percentages of room beyond MUMPS's estimate: where rotations have no mass many pivots of the pencil are delayed."""
-STEP = 1.0371
-"""Factor of the ends tried, no simple number: an end on an eigenvalue is unlikely."""
 LARGEST = 3000
 """Unknowns that dense matrices may have."""
 
@@ -218,7 +214,7 @@ def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None
             with slepc_errors():
                 solver.solve()
         except PETSc.Error as trouble:
-            if trouble.ierr == PETSC_ERR_PLIB:
+            if trouble.ierr == 77:  # PETSC_ERR_PLIB: what it finds does not match the counts at the ends
                 return None
             if trouble.ierr != PETSC_ERR_LIB or room == ROOMS[-1]:
                 raise
@@ -252,7 +248,8 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, roo
 
 def enclosed(pencil: SymmetricPencil, number: int) -> Interval:
     """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
-    low, step = pencil.shift, max(abs(pencil.shift), pencil.scale) * STEP
+    # no simple factor: an end on an eigenvalue is unlikely
+    low, step = pencil.shift, max(abs(pencil.shift), pencil.scale) * 1.0371
     while pencil.below(low + step) < number:
         step *= 2
     return low, low + step

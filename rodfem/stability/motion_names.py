@@ -25,8 +25,6 @@ from rodfem.tolerances import TINY
 
 SHARE = 0.9
 """Share of a vector in the span of a group above which it is named after it."""
-LARGEST_PART = 0.5
-"""Part of a rigid motion, relative to the largest one, above which it is named."""
 DEPENDENT = 1e-8
 """Eigenvalue of a Gram matrix of unit vectors below which they are dependent; square of a negligible generator."""
 PURE = 0.99
@@ -105,7 +103,7 @@ class MotionNames:
         turning, rigid, along = groups
         share, weights = self.share(v, rigid)
         if share > SHARE:
-            named = abs(weights) > LARGEST_PART * abs(weights).max()
+            named = abs(weights) > abs(weights).max() / 2
             return " with ".join(name for (name, _), chosen in zip(rigid, named, strict=True) if chosen)
         for motion in turning:
             if self.share(v, [motion])[0] > SHARE:

@@ -30,8 +30,6 @@ from rodfem.stability.soft_mode import Judgement, SoftMode
 
 MANY = 100
 """Most eigenvalues near zero that are decided one by one."""
-WILD = 1e6
-"""Half width of the band, over the lowest bending eigenvalue, above which nothing is decided."""
 DECIDED = 1e-3
 """Relative accuracy of eigenvalues that decide a sign."""
 FAR = 1e-2
@@ -127,7 +125,7 @@ def decide(found: Factored) -> Decision:
     inside, least = index.zero - found.drifts, ZERO_BAND * inertia.scale
     if inside == 0 or inertia.resolution <= least:
         return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
-    if inertia.resolution > WILD * inertia.scale:
+    if inertia.resolution > 1e6 * inertia.scale:
         raise ConvergenceError(
             f"Eigenvalues up to {inertia.resolution:.2g} are within round-off of the count, {inertia.scale:.2g} is the "
             "lowest of bending: the state, or a stiffness, is out of all proportion to it."

@@ -45,11 +45,19 @@ ALIKE = 1e-6
 """Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
 STILL = 1e-10
 """Share of the farthest eigenvalue below which one is zero."""
-FARTHEST = 1e4
-"""Times the slowest two eigenvalues, or their natural size, that others are far at most."""
-NEAR_ZERO = 1e-2
-"""Share of the farthest eigenvalue below which differences of others are relative to this share."""
 EPS = float(np.finfo(float).eps)
+BEYOND = 6
+"""Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
+SPARE = 2
+"""Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
+FREQUENCIES = 6
+"""Number of frequencies recorded at each load where nobody asks for another."""
+SLOW, SOLVED, CLEAR = 1e-3, 1e-9, 10.0
+"""Part of the natural size below which eigenvalues are slow, what a state leaves open of them, and times that."""
+APART = 1e-3
+"""Relative distance of two slow ones that are not one: one, or a multiple one, may be about to vanish in any rod."""
+PILE = 64
+"""States after which what PETSc keeps of matrices that are not used any more is destroyed."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +88,7 @@ class Frequencies:
         """
         sizes = np.sort(abs(self.values))
         greatest = float(sizes[-1]) if len(sizes) else 0.0
-        return greatest if self.floating else min(greatest, FARTHEST * self.natural)
+        return greatest if self.floating else min(greatest, 1e4 * self.natural)
 
     @property
     def natural(self) -> float:
@@ -141,7 +149,7 @@ def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[
     Those near zero are compared with what is ``far`` from it.
     """
     out: list[list[int]] = []
-    least = NEAR_ZERO * min(abs(values).max(initial=0.0), far)
+    least = min(abs(values).max(initial=0.0), far) / 100
     sizes = tolerance * np.maximum(abs(values), least)
     if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
         return [[i] for i in range(len(values))]
@@ -175,20 +183,6 @@ def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.
     parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
     sizes = np.maximum(parts, EPS * parts[-1])
     return np.asarray(vectors @ (turn / np.sqrt(np.where(sizes > 0.0, sizes, np.inf))))
-
-
-BEYOND = 6
-"""Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
-SPARE = 2
-"""Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
-FREQUENCIES = 6
-"""Number of frequencies recorded at each load where nobody asks for another."""
-SLOW, SOLVED, CLEAR = 1e-3, 1e-9, 10.0
-"""Part of the natural size below which eigenvalues are slow, what a state leaves open of them, and times that."""
-APART = 1e-3
-"""Relative distance of two slow ones that are not one: one, or a multiple one, may be about to vanish in any rod."""
-PILE = 64
-"""States after which what PETSc keeps of matrices that are not used any more is destroyed."""
 
 
 class NonsymmetricSolver(PencilMatrices):

@@ -45,12 +45,8 @@ REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 ALL = 1000
 """Rank of the mass up to which all eigenvalues are found: LAPACK takes some seconds there."""
-LARGEST = 2000
-"""Unknowns with mass up to which it is factored by dense matrices."""
 SOME = 40
 """Eigenvalues that are found where the rank is greater."""
-DENSE = 80
-"""Rank of the mass up to which all eigenvalues cost no more than some by a Krylov space."""
 RANK = 1e-13
 """Pivot of the mass below which it is round-off, relative to its diagonal: a quaternion's own length has no mass."""
 FINITE = 1e-13
@@ -70,7 +66,7 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
     """Rows with mass (h,), and ``L`` and ``R`` in them (h, r): by Cholesky's method with pivots of a unit diagonal."""
     size = np.sqrt(np.maximum(mass.diagonal(), 0.0))
     heavy = np.flatnonzero(size)
-    if len(heavy) > LARGEST:
+    if len(heavy) > 2000:  # too many for dense matrices
         return heavy, mass[heavy][:, heavy].tocsr(), sp.identity(len(heavy), format="csr")
     scale = size[heavy]
     block = mass[heavy][:, heavy].toarray() / np.outer(scale, scale)
@@ -171,7 +167,8 @@ class Condensed:
 
         By LAPACK where it costs no more, or SLEPc gives up: at times it cannot sort equal complex ones.
         """
-        if self.rank > max(DENSE, 3 * number) and (self.rank > ALL or "pairs" not in vars(self)):
+        # all eigenvalues of a rank of 80 cost no more than some by a Krylov space
+        if self.rank > max(80, 3 * number) and (self.rank > ALL or "pairs" not in vars(self)):
             try:
                 return self._nearest(number, left=left)
             except ConvergenceError:

@@ -45,8 +45,6 @@ HIT = 1e-8
 round-off, which spoils the others, and the count there."""
 OF_VECTORS = 1e-9
 """Relative tolerance of SLEPc for vectors of the left-most ones: the error of the eigenvalues is the square."""
-LEAST = 6
-"""How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
@@ -304,7 +302,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         solver = eigensolver(*held.scaled, "rodfem_")
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         solver.setTarget(held.shift)
-        solver.setDimensions(number, number + max(number, LEAST))
+        # in a Krylov space with fewer vectors restarts cost more
+        solver.setDimensions(number, number + max(number, 6))
         solver.setTolerances(tol=OF_VECTORS, max_it=300)
         solver.setPurify(False)
         solver.setInitialSpace([start])

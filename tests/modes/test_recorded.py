@@ -19,7 +19,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError
 from rodfem.faults import in_words
 from rodfem.fem.fields import Discretization
-from rodfem.modes.finder import EVENLY, FEWEST, ModeFinder, typical_rows
+from rodfem.modes.finder import FEWEST, ModeFinder
 from rodfem.modes.modes import SYMMETRY, Typical, typical_of
 from rodfem.problem.scene import Inertia, Scene
 from rodfem.report.payload import payload_of
@@ -89,18 +89,6 @@ def test_symmetries_come_last(folder: Path) -> None:
         turning = each.found.rotation[-1]
         np.testing.assert_allclose(abs(turning[:, 2]), abs(turning[0, 2]), rtol=1e-9)
         assert abs(turning[:, :2]).max() < 1e-9 * abs(turning[0, 2])
-
-
-def test_rows_that_are_typical(folder: Path) -> None:
-    """Both ends, evenly between by arclength, and each special point once."""
-    diagram = rodfem.trace(classics.euler("clamped-free"), MESH, Plan((0.0, 12.0), depth=1, error_bars=False))
-    for branch in diagram:
-        rows, along = typical_rows(branch), np.array([p.arclength for p in branch.points])
-        assert set(rows) >= {0, len(along) - 1} | {s.row for s in branch.special}
-        assert len(rows) <= EVENLY + len(branch.special)
-        largest = np.diff(along).max()
-        gaps = np.diff(along[sorted(rows)])
-        assert gaps.max() <= along[-1] / (EVENLY - 1) + largest
 
 
 @pytest.mark.long
