@@ -37,7 +37,7 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL, ROUGH, Factored
-from rodfem.stability.motion_names import SHARE, MotionNames
+from rodfem.stability.motion_names import MotionNames
 from rodfem.stability.near_zero import SPARE, NearZero, decide, judge, near_zero, quotients, soft_limit
 from rodfem.stability.soft_mode import Judgement, SoftMode, index_range
 
@@ -75,12 +75,42 @@ class SoftStates:
         vectors.  Raises :class:`ConvergenceError` if constraints that depend on each other leave less than no negative
         eigenvalue.
         """
-        inertia = self.solver.inertia
+        inertia, metric = self.solver.inertia, self.solver.system.metric
         least = self._doubtful(point, fixed_load, compare=compare)
         if least is None:
             return False
         near = near_zero(inertia.at(point.x), least=least)
-        found = self.judgement(point, near, fixed_load=fixed_load, family=family, vanishing=vanishing)
+        branch = [point.tangent] if family and point.tangent is not None else []
+        if branch:  # its own eigenvalue is a zero, and none of those that are judged
+            across_it = [i for i, v in enumerate(near.vectors) if across(metric, [v], branch)]
+            near = near.at(across_it, near.rest + len(near.vectors) - len(across_it))
+        modes = self._modes(point, near)
+        zero = [not across(metric, [v], vanishing) for v in near.vectors]
+        others = [m for m, is_zero in zip(modes, zero, strict=True) if not is_zero]
+        if others and self._richer:
+            with self.solver.system.clock.scope("error bars"):
+                others = self._refined(point, others, fixed_load, [*vanishing, *branch])
+        rest = iter(others)
+        modes = [
+            replace(m, uncertainty=max(abs(m.value), m.uncertainty)) if is_zero else next(rest)
+            for m, is_zero in zip(modes, zero, strict=True)
+        ]
+        self._record(point, judge(near, modes, inertia.tolerance))
+        return bool(point.soft)
+
+    def _modes(self, point: Point, near: NearZero) -> list[SoftMode]:
+        """Eigenvalues ``near`` zero of a ``point`` as soft modes of its mesh.
+
+        Without a richer mesh those within the tolerance of a count are undecided: round-off alone does not tell what
+        is zero for the rod.
+        """
+        least, bars = 0.0 if self._richer else self.solver.inertia.tolerance, near.uncertainty
+        bars = np.where(abs(near.values) > bars, np.maximum(bars, least), bars)
+        names = self.names(point.x, near.vectors)
+        return [SoftMode(*m) for m in zip(names, near.values.tolist(), bars.tolist(), strict=True)]
+
+    def _record(self, point: Point, found: Judgement) -> None:
+        """Give a ``point`` what was ``found``; raises :class:`ConvergenceError` for a negative index."""
         if found.negative < 0:
             raise ConvergenceError(
                 f"The count of negative eigenvalues at load {point.load:.8g} gave {found.negative}: the constraints "
@@ -89,8 +119,8 @@ class SoftStates:
         if point.negative_in_space is not None:  # that in the plane, and what is out of it
             point.negative_in_space += found.negative - point.negative
         point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
-        point.soft = [m for m in found.soft if not m.decided or abs(m.value) < soft_limit(inertia)]
-        return bool(point.soft)
+        limit = soft_limit(self.solver.inertia)
+        point.soft = [m for m in found.soft if not m.decided or abs(m.value) < limit]
 
     def _doubtful(self, point: Point, fixed_load: bool, *, compare: bool) -> int | None:
         """Number of eigenvalues nearest zero to be judged besides soft ones; None where there is nothing to judge.
@@ -139,75 +169,34 @@ class SoftStates:
                 values.append(float(found.nearest(1, ROUGH)[0][0]))
         return abs(values[1] - values[0]) > abs(values[0]) / 10
 
-    def judgement(
-        self, point: Point, near: NearZero, *, fixed_load: bool, family: bool, vanishing: Sequence[PETSc.Vec]
-    ) -> Judgement:
-        """Decide on eigenvalues ``near`` zero of a ``point`` as far as can be.
-
-        ``fixed_load``, ``family`` and ``vanishing`` are those of :meth:`examine`.  Without a richer mesh those within
-        the tolerance of a count are undecided: round-off alone does not tell what is zero for the rod.
-        """
-        every, near = len(near.values), self._across_the_branch(point, near) if family else near
-        names, tolerance = self.names(point.x, near.vectors), self.solver.inertia.tolerance
-        least, bars = 0.0 if self._richer else tolerance, near.uncertainty
-        bars = np.where(abs(near.values) > bars, np.maximum(bars, least), bars)
-        modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), bars.tolist(), strict=True)]
-        zero = self._zero(near, vanishing)
-        others = [m for m, is_zero in zip(modes, zero, strict=True) if not is_zero]
-        if others and self._richer:
-            with self.solver.system.clock.scope("error bars"):
-                others = self._refined(point, others, fixed_load, every - len(modes), vanishing)
-        rest = iter(others)
-        modes = [
-            replace(m, uncertainty=max(abs(m.value), m.uncertainty)) if is_zero else next(rest)
-            for m, is_zero in zip(modes, zero, strict=True)
-        ]
-        return judge(near, modes, tolerance)
-
-    def _zero(self, near: NearZero, vanishing: Sequence[PETSc.Vec]) -> list[bool]:
-        return [not across(self.solver.system.metric, [v], vanishing) for v in near.vectors]
-
-    def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
-        """Eigenvalues without that of the branch itself, a family of equilibria at one load."""
-        if point.tangent is None:
-            return near
-        image = self.solver.inertia.metric * point.tangent
-        own = [i for i, v in enumerate(near.vectors) if v.dot(image).real ** 2 > SHARE]
-        kept = [i for i in range(len(near.vectors)) if i not in own]
-        vectors = [near.vectors[i] for i in kept]
-        return replace(
-            near, values=near.values[kept], vectors=vectors, uncertainty=near.uncertainty[kept],
-            rest=near.rest + len(own),
-        )  # fmt: skip
-
     def _refined(
-        self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int, vanishing: Sequence[PETSc.Vec]
+        self, point: Point, modes: list[SoftMode], fixed_load: bool, still: Sequence[PETSc.Vec]
     ) -> list[SoftMode]:
         """The ``modes`` with values of richer meshes; of infinite uncertainty if those have no such state.
 
-        ``own`` eigenvalues nearest zero are those of the branch itself.  Those of the ``vanishing`` null vectors are
-        left out, too, by their vectors: on a richer mesh others may be nearer to zero.
+        Null vectors, and the tangent of a family, which are ``still``, are left out by their vectors: on a richer mesh
+        others may be nearer to zero.
         """
-        out, values, still = modes, np.array([m.value for m in modes]), list(vanishing)
-        soft = bool((abs(values) < soft_limit(self.solver.inertia)).any())
+        coarse = values = np.array([m.value for m in modes])
+        out, soft = modes, bool((abs(values) < soft_limit(self.solver.inertia)).any())
         for level in range(2):  # meshes beyond that of the state
             richer = self._companion(level)
             try:
                 point, again = _on(richer, point, fixed_load, soft=soft)
                 still = [_unit(richer.system, richer.transfer(v, state=False)) for v in still]
-                finer, rounding = _nearest(richer.solver, point, len(modes), own, still)
+                finer, rounding = _nearest(richer.solver, point, len(modes), still)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
             of_mesh = again.rho / (1 - again.rho) * abs(finer - values)
-            left = of_mesh + rounding
-            lost = _within_round_off(finer, of_mesh, rounding)
-            values = finer
+            lost, left, values = abs(finer) + of_mesh <= rounding, of_mesh + rounding, finer
             # a sign that is another one than the mesh's own is not decided there
-            coarse = np.array([m.value for m in modes])
             contrary, away = np.sign(values) != np.sign(coarse), abs(values - coarse)
             bars = np.where(away > abs(coarse), left + away, left)
-            out = [replace(m, value=float(v), uncertainty=float(u))
-                   for m, v, u in zip(modes, values, bars, strict=True)]  # fmt: skip
+            out = [
+                replace(m, value=v, uncertainty=u)
+                for m, v, u in zip(modes, values.tolist(), bars.tolist(), strict=True)
+            ]
+            # no richer mesh decides what is within round-off wherever the error of the mesh may move it
             settled = all(m.decided or is_lost for m, is_lost in zip(out, lost, strict=True))
             if settled or (contrary & (left < abs(values))).any():
                 return out
@@ -258,23 +247,18 @@ def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
     return v
 
 
-def _within_round_off(values: np.ndarray, of_mesh: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-    """Whether eigenvalues are within round-off wherever the error of the mesh may move them."""
-    return np.asarray(abs(values) + of_mesh <= rounding)
-
-
 def _nearest(
-    solver: BranchSolver, point: Point, number: int, left_out: int, still: Sequence[PETSc.Vec]
+    solver: BranchSolver, point: Point, number: int, still: Sequence[PETSc.Vec]
 ) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
-    The first ``left_out`` at the ``point``, and those of the vectors ``still``, are no part of that number.  What
-    arithmetic leaves open of the state, one more step of Newton's method tells.
+    Those of the vectors ``still`` at the ``point`` are no part of that number.  What arithmetic leaves open of the
+    state, one more step of Newton's method tells.
     """
     found = solver.inertia.at(point.x)
     found.count()
     with solver.inertia.afresh():
-        nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
+        nearest = found.nearest(len(still) + number + SPARE, NULL)[1]
     vectors = [v for v in nearest if across(solver.system.metric, [v], still)][:number]
     q = quotients(found, vectors, TOLERANCE * solver.inertia.scale)
     row = solver.axis if point.tangent is None else solver.row(point.tangent)

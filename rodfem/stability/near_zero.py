@@ -81,6 +81,11 @@ class NearZero(Quotients):
     firm: int
     rest: int
 
+    def at(self, places: list[int], rest: int) -> NearZero:
+        """Those at some places, and another number of other zeros."""
+        vectors = [self.vectors[i] for i in places]
+        return NearZero(self.values[places], vectors, self.uncertainty[places], self.firm, rest)
+
 
 def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
     """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
