@@ -81,9 +81,8 @@ class SoftStates:
             return False
         near = near_zero(inertia.at(point.x), least=least)
         branch = [point.tangent] if family and point.tangent is not None else []
-        if branch:  # its own eigenvalue is a zero, and none of those that are judged
-            across_it = [i for i, v in enumerate(near.vectors) if across(metric, [v], branch)]
-            near = near.at(across_it, near.rest + len(near.vectors) - len(across_it))
+        if branch:
+            near = _across_branch(metric, near, branch)
         modes = self._modes(point, near)
         zero = [not across(metric, [v], vanishing) for v in near.vectors]
         others = [m for m, is_zero in zip(modes, zero, strict=True) if not is_zero]
@@ -197,9 +196,8 @@ class SoftStates:
                 for m, v, u in zip(modes, values.tolist(), bars.tolist(), strict=True)
             ]
             # no richer mesh decides what is within round-off wherever the error of the mesh may move it
-            settled = all(m.decided or is_lost for m, is_lost in zip(out, lost, strict=True))
-            if settled or (contrary & (left < abs(values))).any():
-                return out
+            if ((abs(values) > bars) | lost).all() or (contrary & (left < abs(values))).any():
+                break
         return out
 
     def _companion(self, level: int) -> Enriched:
@@ -207,6 +205,12 @@ class SoftStates:
         if level == len(self._companions):
             self._companions.append(Enriched(self._companions[-1].solver) if level else self._richer[0]())
         return self._companions[level]
+
+
+def _across_branch(metric: PETSc.Mat, near: NearZero, branch: Sequence[PETSc.Vec]) -> NearZero:
+    """Eigenvalues without that of a ``branch`` at one load, which is a zero, and none of those that are judged."""
+    kept = [i for i, v in enumerate(near.vectors) if across(metric, [v], branch)]
+    return near.at(kept, near.rest + len(near.vectors) - len(kept))
 
 
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
