@@ -84,16 +84,14 @@ class SoftStates:
         if branch:
             near = _across_branch(metric, near, branch)
         modes = self._modes(point, near)
-        zero = [not across(metric, [v], vanishing) for v in near.vectors]
-        others = [m for m, is_zero in zip(modes, zero, strict=True) if not is_zero]
+        others = [i for i, v in enumerate(near.vectors) if across(metric, [v], vanishing)]
+        for i in set(range(len(modes))).difference(others):
+            modes[i] = replace(modes[i], uncertainty=max(abs(modes[i].value), modes[i].uncertainty))
         if others and self._richer:
             with self.solver.system.clock.scope("error bars"):
-                others = self._refined(point, others, fixed_load, [*vanishing, *branch])
-        rest = iter(others)
-        modes = [
-            replace(m, uncertainty=max(abs(m.value), m.uncertainty)) if is_zero else next(rest)
-            for m, is_zero in zip(modes, zero, strict=True)
-        ]
+                refined = self._refined(point, [modes[i] for i in others], fixed_load, [*vanishing, *branch])
+            for i, mode in zip(others, refined, strict=True):
+                modes[i] = mode
         self._record(point, judge(near, modes, inertia.tolerance))
         return bool(point.soft)
 
@@ -297,8 +295,7 @@ class SoftRows:
 
     def _examine_given(self, branch: Branch, family: bool) -> bool:
         """The same at loads asked for, at ends and events; whether one is undecided, or not on the richer mesh."""
-        singular = {id(s.point) for s in branch.special if s.kind.counted or s.test_function == "stretch"}
-        given = [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
+        given = _given(branch)
         doubtful = any(s.kind.singular and s.error_estimate == inf for s in branch.special)
         counted = {id(s.point): s.point.negative for s in given}
         for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
@@ -354,6 +351,12 @@ class SoftRows:
             richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
             self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
         return self._states[point.mesh]
+
+
+def _given(branch: Branch) -> list[SpecialPoint]:
+    """Loads asked for, ends and events of a ``branch``, but for those at special points."""
+    singular = {id(s.point) for s in branch.special if s.kind.counted or s.test_function == "stretch"}
+    return [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
 
 
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:

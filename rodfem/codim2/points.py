@@ -134,9 +134,8 @@ def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sou
     # each coefficient may be wrong by as much as the last two: by |T_k(0)| times that the value, |T_k'(0)| the slope
     order = np.arange(POINTS)
     odd = order % 2 == 1
-    moves = np.where(odd, order / half, 0.0) if sought.stationary else np.where(odd, 0.0, 1.0)
+    g, moves = (f.deriv(), np.where(odd, order / half, 0.0)) if sought.stationary else (f, np.where(odd, 0.0, 1.0))
     wrong = float(abs(f.coef[-2:]).max() * moves.sum())
-    g = f.deriv() if sought.stationary else f
     slope, s = g.deriv(), 0.0
     for _ in range(POINTS):  # Newton's method
         if not slope(s) or abs(s) > INSIDE * half:

@@ -231,7 +231,7 @@ class ModeFinder:
         rigid = [i for i in nearest if found.kinds[i] == motion_names.RIGID]
         moving = [i for i in nearest if i not in rigid][:number]
         chosen = [*sorted(moving, key=lambda i: values[i].real), *rigid]
-        if len(chosen) and (worst := found.errors[chosen].max()) > CONVERGED:
+        if (worst := found.errors[chosen].max(initial=0.0)) > CONVERGED:
             raise ConvergenceError(f"Eigenvalues have a backward error of {worst:.0e}: use another discretisation.")
         columns, value = _alone(pencil, found.vectors[:, chosen]), values[chosen]
         coalesced = np.isin(chosen, same)

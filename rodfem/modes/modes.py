@@ -163,8 +163,24 @@ def load_modes(path: Path | str, branch: str, row: int) -> Modes:
         if isinstance(trouble, InputError):
             raise
         raise InputError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
+    _check_arrays(arrays, motion, path)
     arrays["load"] = float(arrays["load"])
     return Modes(motion=motion, note=note, **arrays)
+
+
+def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path | str) -> None:
+    """Raise :class:`InputError` where arrays of a file are not of the shapes of :class:`Modes`."""
+    m, k = len(np.atleast_1d(arrays["s"])), len(motion)
+    shapes = {"load": (), "s": (m,), "r": (m, 3), "q": (m, 4), **dict.fromkeys(("value", "residual", "error"), (k,))}
+    for name, array in arrays.items():
+        wanted = shapes.get(name, (k, m, 3))
+        if np.shape(array) != wanted or np.asarray(array).dtype.kind not in "fciu":
+            raise InputError(
+                f"{path} has the {name} of the shape {np.shape(array)}, where numbers of the shape {wanted} were "
+                "expected: run the scene again."
+            )
+        if name not in ("residual", "error") and not np.isfinite(array).all():
+            raise InputError(f"{path} has a {name} that is not finite: run the scene again.")
 
 
 def rows_with_modes(path: Path) -> list[tuple[str, int]]:
