@@ -185,7 +185,7 @@ class Reduction(Method):
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """With a shift below the spectrum."""
         below = self.work.below(x)
-        found = self.reduced(x).near(number, below.shift)
+        found = self.reduced(x).near(number, below.solver.shift)
         return self.lifted(found, below.certifies(found.values), 1)
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
@@ -219,7 +219,7 @@ class Cayley(Reduction, SymmetricMethod):
         made, note = 0, ""
         for fresh in (False, True):
             if self._shift is None or fresh:
-                self._shift = cayley_shift(reduced.near(3, below.shift).values)
+                self._shift = cayley_shift(reduced.near(3, below.solver.shift).values)
                 made += 1
             try:
                 # the first two are equally far from the shift: more are asked for than wanted where they are multiple
@@ -231,7 +231,7 @@ class Cayley(Reduction, SymmetricMethod):
             if certified := below.certifies(found.values):
                 break
         else:
-            found = reduced.near(number, below.shift)
+            found = reduced.near(number, below.solver.shift)
             certified = below.certifies(found.values)
             made += 1
             note = ", but a count found some missing (equal eigenvalues): completed by shift-invert"

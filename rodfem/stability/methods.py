@@ -146,8 +146,8 @@ class Dense(Method):
         Raises :class:`InputError` if fewer than ``number`` are finite.
         """
         below = self.work.below(x)
-        stiffness, mass = (gathered(A).real for A in below.scaled)
-        pencil = condensed(stiffness, mass, below.shift)
+        stiffness, mass = (gathered(A).real for A in below.solver.scaled)
+        pencil = condensed(stiffness, mass, below.solver.shift)
         T = pencil.dual.T @ pencil.inverse
         nu, w = np.linalg.eigh((T + T.T) / 2)
         if number > (finite := int((nu > FINITE * nu[-1]).sum())):
@@ -160,7 +160,7 @@ class Dense(Method):
         for column in (pencil.images @ w / nu).T:
             vectors.append(self.work.system.new_vector())
             vectors[-1].array[:] = column[own]
-        values = below.shift + 1.0 / nu
+        values = below.solver.shift + 1.0 / nu
         errors = below.backward_errors(values, vectors)
         return Found(self.work.one * values, below.unscaled(vectors), errors, below.certifies(values))
 
@@ -210,7 +210,7 @@ def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None
     """
     for room in ROOMS:
         try:
-            solver = in_interval(*pencil.scaled, low, high, room)
+            solver = in_interval(*pencil.solver.scaled, low, high, room)
             with slepc_errors():
                 solver.solve()
         except PETSc.Error as trouble:
@@ -249,7 +249,7 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, roo
 def enclosed(pencil: SymmetricPencil, number: int) -> Interval:
     """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
     # no simple factor: an end on an eigenvalue is unlikely
-    low, step = pencil.shift, max(abs(pencil.shift), pencil.scale) * 1.0371
+    low, step = pencil.solver.shift, max(abs(pencil.solver.shift), pencil.solver.scale) * 1.0371
     while pencil.below(low + step) < number:
         step *= 2
     return low, low + step

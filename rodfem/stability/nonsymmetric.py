@@ -306,16 +306,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def shares(self, basis: np.ndarray) -> np.ndarray:
         """Share (k,) of the vector of each eigenvalue of the spectrum in the span of a real ``basis`` (n, m)."""
-        whole = np.concatenate(self.system.comm.allgather(basis / self.sizes.array_r.real[:, None]))
+        whole = np.concatenate(self.system.comm.allgather(basis / self.solver.sizes.array_r.real[:, None]))
         condensed = self.spectrum.condensed
         return inside(condensed.dual.T @ whole[condensed.heavy], condensed.pairs.right)
 
     def condensed(self, target: float) -> Condensed:
         """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""
-        self._held()
+        shift = target / self.solver.system.scene.units.omega2  # of this state alone
         if target not in self._condensed:
             stiffness, mass = (gathered(A).real for A in self.in_units())
-            shift = target / self.system.scene.units.omega2
             self._condensed = {target: condensed(stiffness, mass, shift)}  # factors are those of one shift
         return self._condensed[target]
 
@@ -325,7 +324,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         vectors = condensed.vectors(pairs, left=left)[self._own]
         weighed = condensed.spread(pairs.right)[self._own] if units.ordinary and not (self._free or left) else None
         if not units.ordinary:
-            values, vectors = values * units.omega2, vectors * self.sizes.array_r.real[:, None]
+            values, vectors = values * units.omega2, vectors * self.solver.sizes.array_r.real[:, None]
         if self._free and not left:
             vectors = vectors.astype(complex)
             self._complete(values, vectors)
@@ -341,7 +340,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k)."""
         comm = self.system.comm
-        return times(self._held().rows, vectors if comm.size == 1 else np.concatenate(comm.allgather(vectors)))
+        return times(self.solver.rows, vectors if comm.size == 1 else np.concatenate(comm.allgather(vectors)))
 
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """``a^* b`` of all ranks' rows."""

@@ -48,7 +48,9 @@ class StatePencil(Generic[Matrices]):
     def __init__(self, shared: Matrices) -> None:
         self.system, self._shared, self._filled = shared.system, shared, shared.filled
 
-    def _held(self) -> Matrices:
+    @property
+    def solver(self) -> Matrices:
+        """What made it, while the matrices are those of this state."""
         if self._shared.filled != self._filled:
             raise RuntimeError("The matrices hold another state by now: ask for this one again, by the solver's at().")
         return self._shared
@@ -56,21 +58,16 @@ class StatePencil(Generic[Matrices]):
     @property
     def matrix(self) -> PETSc.Mat:
         """Tangent matrix ``S``, and constraints against motions of symmetries."""
-        return self._held().matrix
+        return self.solver.matrix
 
     @property
     def mass(self) -> PETSc.Mat:
         """Kinetic metric ``M``."""
-        return self._held().mass
-
-    @property
-    def sizes(self) -> PETSc.Vec:
-        """Natural size of each unknown."""
-        return self._held().sizes
+        return self.solver.mass
 
     def in_units(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """The pencil for unknowns and eigenvalues in units of their natural sizes: see :func:`in_units`."""
-        return in_units(self.system, self.matrix, self.mass, self.sizes)
+        return in_units(self.system, self.matrix, self.mass, self.solver.sizes)
 
 
 def in_units(system: System, matrix: PETSc.Mat, mass: PETSc.Mat, sizes: PETSc.Vec) -> tuple[PETSc.Mat, PETSc.Mat]:

@@ -153,26 +153,11 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         super().__init__(shared)
         self.inertia, self._drifts = shared.inertia, shared.system.phase.count
 
-    @property
-    def shift(self) -> float:
-        """Where the next computation starts."""
-        return self._held().shift
-
-    @property
-    def scale(self) -> float:
-        """Size of the least eigenvalue."""
-        return self._held().scale
-
-    @property
-    def scaled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Matrix and mass."""
-        return self._held().scaled
-
     def leftmost(self, number: int) -> Found:
         """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer."""
-        held = self._held()
+        own = self.solver
         with self.system.clock("stability"):
-            modes = self._solve(number, EXTRA[0]) if len(held.last) else NOTHING
+            modes = self._solve(number, EXTRA[0]) if len(own.last) else NOTHING
             if not modes.certified:
                 self.go_below()
                 for extra in EXTRA:
@@ -185,7 +170,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
                 "richer discretisation."
             )
         spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
-        held.shift = modes.values[0] - 0.1 * spread
+        own.shift = modes.values[0] - 0.1 * spread
         values, vectors = self.system.scene.units.omega2 * modes.values, self.unscaled(modes.vectors)
         return modes._replace(values=values, vectors=vectors)
 
@@ -193,17 +178,17 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         """The same vectors in the rod's units, in place."""
         if not self.system.scene.units.ordinary:
             for vector in vectors:
-                vector.pointwiseMult(vector, self.sizes)
+                vector.pointwiseMult(vector, self.solver.sizes)
         return vectors
 
     def go_below(self) -> None:
         """Move the shift below the spectrum; raises :class:`ConvergenceError` if it has no lower end."""
-        held = self._held()
-        step = max(abs(held.shift), held.scale)
+        own = self.solver
+        step = max(abs(own.shift), own.scale)
         for _ in range(40):
-            if self.below(held.shift) == 0 and not self._shift_is_an_eigenvalue():
+            if self.below(own.shift) == 0 and not self._shift_is_an_eigenvalue():
                 return
-            held.shift -= step
+            own.shift -= step
             step *= 3
         raise ConvergenceError(
             "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness; give the rod a "
@@ -212,17 +197,17 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def _shift_is_an_eigenvalue(self) -> bool:
         """Whether that is so but for round-off, which a count does not tell: a step of inverse iteration does."""
-        held, mode = self._held(), self.inertia.seed(0)
+        own, mode = self.solver, self.inertia.seed(0)
         mode.scale(1.0 / self.system.norm(mode))
         grown = mode.duplicate()
-        held.shifted.factors.solve(held.scaled[1] * mode, grown)
-        return not self.system.norm(grown) * HIT * abs(held.shift) < 1.0
+        own.shifted.factors.solve(own.scaled[1] * mode, grown)
+        return not self.system.norm(grown) * HIT * abs(own.shift) < 1.0
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``; :class:`ConvergenceError` if the count breaks down."""
-        held = self._held()
-        held.factor(sigma)
-        negative, zero = held.shifted.factors.inertia()
+        own = self.solver
+        own.factor(sigma)
+        negative, zero = own.shifted.factors.inertia()
         below = negative - self.inertia.constraints - self._drifts
         if zero or below < 0:
             raise ConvergenceError(
@@ -233,7 +218,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def certifies(self, values: np.ndarray) -> bool:
         """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
-        small = SAME_EIGENVALUE * max(abs(values).max(), self.scale)
+        small = SAME_EIGENVALUE * max(abs(values).max(), self.solver.scale)
         distinct = values < values[-1] - small
         return (
             self.below(values[0] - small) == 0
@@ -246,20 +231,20 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
         A Krylov method finds the second of two equal eigenvalues late, by round-off.
         """
-        held = self._held()
-        held.factor(held.shift)
-        if not held.shifted.factors.regular:
-            held.shift -= held.scale
+        own = self.solver
+        own.factor(own.shift)
+        if not own.shifted.factors.regular:
+            own.shift -= own.scale
             return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
-        reach = max(values[-1] - held.shift, held.scale) if len(values) else np.inf
-        if len(values) and values[0] - held.shift < HIT * reach:
-            held.shift -= reach
+        reach = max(values[-1] - own.shift, own.scale) if len(values) else np.inf
+        if len(values) and values[0] - own.shift < HIT * reach:
+            own.shift -= reach
             return self._solve(number, extra)
         if len(values) < number:
             return Found(values, vectors, errors)
-        held.last = sum(vector.array_r for vector in vectors)
-        cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), held.scale)
+        own.last = sum(vector.array_r for vector in vectors)
+        cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), own.scale)
         known = int((values < cut).sum())
         return Found(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 
@@ -268,10 +253,10 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
         More than there are finite ones break the Krylov space down.
         """
-        held, start = self._held(), self.inertia.seed(1)
-        if len(held.last):  # a space that is invariant already would miss all else
+        own, start = self.solver, self.inertia.seed(1)
+        if len(own.last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
-            start.array[:] += held.last
+            start.array[:] += own.last
         solver = self.eigensolver(number, start)
         with slepc_errors():
             solver.solve()
@@ -298,42 +283,42 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
         Vectors are right up to massless unknowns: purification corrects all of them at once.
         """
-        held = self._held()
-        solver = eigensolver(*held.scaled, "rodfem_")
+        own = self.solver
+        solver = eigensolver(*own.scaled, "rodfem_")
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        solver.setTarget(held.shift)
+        solver.setTarget(own.shift)
         # in a Krylov space with fewer vectors restarts cost more
         solver.setDimensions(number, number + max(number, 6))
         solver.setTolerances(tol=OF_VECTORS, max_it=300)
         solver.setPurify(False)
         solver.setInitialSpace([start])
-        if held.deflated:
-            solver.setDeflationSpace(held.deflated)
+        if own.deflated:
+            solver.setDeflationSpace(own.deflated)
         transform = solver.getST()
         transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
         ksp = transform.getKSP()
         ksp.setType("preonly")
         ksp.getPC().setType("python")
-        ksp.getPC().setPythonContext(_Inverse(held.shifted.factors))
+        ksp.getPC().setPythonContext(_Inverse(own.shifted.factors))
         with slepc_errors():
             solver.setFromOptions()
         return solver
 
     def _norms(self) -> tuple[float, float]:
-        stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self._held().scaled)
+        stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self.solver.scaled)
         return stiffness, mass
 
     def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
         """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts, all at once."""
-        held = self._held()
-        right = np.stack([(held.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
-        for value, vector, column in zip(values, vectors, held.shifted.factors.solve_all(right).T, strict=True):
-            vector.array[:] = (value - held.shift) * column
+        own = self.solver
+        right = np.stack([(own.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
+        for value, vector, column in zip(values, vectors, own.shifted.factors.solve_all(right).T, strict=True):
+            vector.array[:] = (value - own.shift) * column
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
         stiffness, mass = self._norms()
-        errors, (S, M) = [], self._held().scaled
+        errors, (S, M) = [], self.solver.scaled
         for value, vector in zip(values, vectors, strict=True):
             residual = S * vector - M * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
