@@ -50,7 +50,7 @@ class StatePencil(Generic[Matrices]):
 
     @property
     def solver(self) -> Matrices:
-        """What made it, while the matrices are those of this state."""
+        """What made it; raises :class:`RuntimeError` where the matrices hold another state by now."""
         if self._shared.filled != self._filled:
             raise RuntimeError("The matrices hold another state by now: ask for this one again, by the solver's at().")
         return self._shared
