@@ -153,7 +153,7 @@ FAULTS = {
     "left-out-by-vectors": Fault(
         "rodfem/adaptivity/soft_states.py",
         "number + SPARE, NULL)[1]",
-        "number + SPARE, NULL)[1][len(still) :]",
+        "number + SPARE, NULL)[1][len(zeros) :]",
         AT_SPECIAL,
     ),
     "special-left": Fault(

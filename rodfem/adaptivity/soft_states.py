@@ -167,11 +167,11 @@ class SoftStates:
         return abs(values[1] - values[0]) > abs(values[0]) / 10
 
     def _refined(
-        self, point: Point, modes: list[SoftMode], fixed_load: bool, still: Sequence[PETSc.Vec]
+        self, point: Point, modes: list[SoftMode], fixed_load: bool, zeros: Sequence[PETSc.Vec]
     ) -> list[SoftMode]:
         """The ``modes`` with values of richer meshes; of infinite uncertainty if those have no such state.
 
-        Null vectors, and the tangent of a family, which are ``still``, are left out by their vectors: on a richer mesh
+        Null vectors, and the tangent of a family, the ``zeros``, are left out by their vectors: on a richer mesh
         others may be nearer to zero.
         """
         coarse = values = np.array([m.value for m in modes])
@@ -180,8 +180,8 @@ class SoftStates:
             richer = self._companion(level)
             try:
                 point, again = _on(richer, point, fixed_load, soft=soft)
-                still = [_unit(richer.system, richer.transfer(v, state=False)) for v in still]
-                finer, rounding = _nearest(richer.solver, point, len(modes), still)
+                zeros = [_unit(richer.system, richer.transfer(v, state=False)) for v in zeros]
+                finer, rounding = _nearest(richer.solver, point, len(modes), zeros)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
             of_mesh = again.rho / (1 - again.rho) * abs(finer - values)
@@ -250,18 +250,18 @@ def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
 
 
 def _nearest(
-    solver: BranchSolver, point: Point, number: int, still: Sequence[PETSc.Vec]
+    solver: BranchSolver, point: Point, number: int, zeros: Sequence[PETSc.Vec]
 ) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
-    Those of the vectors ``still`` at the ``point`` are no part of that number.  What arithmetic leaves open of the
+    Those of the vectors ``zeros`` at the ``point`` are no part of that number.  What arithmetic leaves open of the
     state, one more step of Newton's method tells.
     """
     found = solver.inertia.at(point.x)
     found.count()
     with solver.inertia.afresh():
-        nearest = found.nearest(len(still) + number + SPARE, NULL)[1]
-    vectors = [v for v in nearest if across(solver.system.metric, [v], still)][:number]
+        nearest = found.nearest(len(zeros) + number + SPARE, NULL)[1]
+    vectors = [v for v in nearest if across(solver.system.metric, [v], zeros)][:number]
     q = quotients(found, vectors, TOLERANCE * solver.inertia.scale)
     row = solver.axis if point.tangent is None else solver.row(point.tangent)
     settled = solver.inertia.at(stepped(solver, point.x, row))
