@@ -154,31 +154,13 @@ def locus(
     *,
     doubtful: bool = False,
 ) -> Locus:
-    """Follow a special point in the plane of the scene's load and a second parameter, to both sides.
+    """Follow a ``special`` point in the plane of the scene's load and a second ``parameter``, to both sides.
 
-    Parameters
-    ----------
-    solver
-        The solver that found the special point.  It is left as it was.
-    special
-        A fold, a branch point, a flutter load or a divergence load.
-    parameter
-        Name of the second parameter of the scene.
-    bounds
-        Intervals of the load and of the second parameter, on which the curve ends exactly.
-    steps
-        Control of the step; lengths are relative to the bounds.
-    error_bars
-        At how many rows, besides the marked ones, the error of the discretisation is estimated; 0: at none.
-    doubtful
-        Whether the mesh leaves the index beside the special point open, so that it does not resolve the curve.
-
-    Raises
-    ------
-    InputError
-        For a parameter, bounds or a kind of special point that make no sense.
-    ConvergenceError
-        Where the special point itself is not found again.
+    ``bounds`` are their intervals, on which the curve ends exactly; lengths of ``steps`` are relative to them.  Errors
+    are estimated at the marked rows and so many others, ``error_bars``; 0: at none.  The ``solver`` is that of the
+    special point, and is left as it was; ``doubtful``: its mesh leaves the index beside the point open.  Raises
+    :class:`InputError` for a parameter, bounds or a kind that make no sense, :class:`ConvergenceError` if the special
+    point is not found again.
     """
     system, scene = solver.system, solver.system.scene
     plane = Plane(system, parameter, bounds)

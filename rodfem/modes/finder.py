@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import bound
+from rodfem.adaptivity.error_estimate import Enriched, bound
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
 from rodfem.fem.quadrature_check import QuadratureCheck
-from rodfem.fem.transfer import Transfer, halved, richer_system
+from rodfem.fem.transfer import halved
 from rodfem.linalg.matrices import local_rows, rounding, rounding_of
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Few, Modes, Typical
@@ -60,9 +60,10 @@ class ModeFinder:
     """Finds the modes of states of one system; ``error_bars`` are from a second, richer discretisation."""
 
     def __init__(self, solver: BranchSolver, error_bars: bool = True) -> None:
-        self.assessor, self.motions, self.system = Assessor(solver), Motions(solver.system), solver.system
+        self.solver, self.assessor = solver, Assessor(solver)
+        self.motions, self.system = Motions(solver.system), solver.system
         self.error_bars, self._functionals = error_bars, np.zeros((0, 0))
-        self._richer: tuple[BranchSolver, Assessor, Transfer] | None = None
+        self._richer: tuple[Enriched, Assessor] | None = None
 
     def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
         """Assess the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
@@ -136,12 +137,10 @@ class ModeFinder:
     def _errors(self, x: PETSc.Vec, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
         """Bounds by the eigenvalues of the same state on a richer mesh, and their ``noise``; inf where it has none."""
         if self._richer is None:
-            richer = richer_system(self.system)
-            solver = BranchSolver(richer)
-            self._richer = solver, Assessor(solver), Transfer(self.system, richer)
-        solver, assessor, transfer = self._richer
-        guess = transfer(x, state=True)
-        y, outcome = solver.at_load(guess, self.system.scalar(x), reach=1.0)
+            enriched = Enriched(self.solver)
+            self._richer = enriched, Assessor(enriched.solver)
+        richer, assessor = self._richer
+        y, outcome = richer.solver.at_load(richer.transfer(x, state=True), self.system.scalar(x), reach=1.0)
         if not outcome.converged:
             return np.full(len(values), np.inf)
         number = len(values)
