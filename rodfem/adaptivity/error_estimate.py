@@ -141,12 +141,12 @@ class Enriched:
         self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
         self._ordinate = OrdinateBound(solver.shape, self.solver.shape)
         weights = weights_of(self.system.scene)
-        self._indicators = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
+        self._coarse, self.indicator = (SmoothnessIndicator(each, weights) for each in (solver, self.solver))
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
         """Ratio of the errors of a state (and its null vector) on the richer discretisation and on the first."""
         degree = self.coarse.system.fields.discretization.degree
-        first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._indicators, (before, after), strict=True))
+        first, last = self._coarse.unresolved(before[0], before[1:]), self.indicator.unresolved(after[0], after[1:])
         if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
             return halved(degree)
         # the last coefficients may be small by coincidence; beyond three quarters neither mesh resolves the state
@@ -206,7 +206,7 @@ class Enriched:
         last = system.scalar(x), self.solver.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
-        changed = self._indicators[1].changed(first, x, state=True)
+        changed = self.indicator.changed(first, x, state=True)
         rho = self.rho([point.x], [x])
         ordinate_error = self._ordinate(point.x, x, float(left[1]), rho)
         return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed)
@@ -232,7 +232,7 @@ class Enriched:
         slope = abs(ordinate_along(self.solver, found, tangent))
         load_left = abs(point.slope) * along + round_off(load, units.load)
         left = slope * along + round_off(ordinate, units.ordinate)
-        changed = self._indicators[1].changed(x, found, state=True)
+        changed = self.indicator.changed(x, found, state=True)
         rho = max(self.rho([point.x], [found]), LEFT)
         ordinate_error = self._ordinate(point.x, found, left, rho)
         return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed)
@@ -253,7 +253,7 @@ class Enriched:
         uncertain = 0.0 if special.kind == FOLD else load_uncertainty(solver, found)
         load_left = uncertain + round_off(found.load, units.load)
         left = STEADY * moved + round_off(ordinate, units.ordinate)
-        relaxed, indicator = [v.copy() for v in found.modes], self._indicators[1]
+        relaxed, indicator = [v.copy() for v in found.modes], self.indicator
         orthonormalize(relaxed, metric)
         sharp = combine(relaxed, np.array([(metric * v).dot(modes[0]) for v in relaxed]))
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])

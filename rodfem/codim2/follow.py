@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import RESOLVED_TO, bound
-from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
+from rodfem.adaptivity.error_estimate import RESOLVED_TO, Enriched, bound
 from rodfem.codim2.criteria import NEAREST, UNSTABLE, Collision, Singular, null_vectors, unstable
 from rodfem.codim2.curve import Half, Tracer
 from rodfem.codim2.locus import Locus, Mark
@@ -33,7 +32,7 @@ from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, K
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.quadrature_check import QuadratureCheck
-from rodfem.fem.transfer import Transfer, halved, richer_system
+from rodfem.fem.transfer import halved
 from rodfem.output.files import mesh_of
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -59,10 +58,8 @@ class RicherMesh:
 
     def __init__(self, solver: BranchSolver, kind: str, plane: Plane) -> None:
         """``solver`` has the mesh on which it was found."""
-        self.solver, self.kind = type(solver)(richer_system(solver.system)), kind
-        self.transfer = Transfer(solver.system, self.solver.system)
-        self.plane = Plane(self.solver.system, plane.names[1], plane.intervals)
-        self.indicator = SmoothnessIndicator(self.solver, weights_of(self.solver.system.scene))
+        self.richer, self.kind = Enriched(solver), kind
+        self.plane = Plane(self.richer.system, plane.names[1], plane.intervals)
         self.rho = halved(solver.system.fields.discretization.degree)
         self._criterion: Criterion | None = None
 
@@ -73,7 +70,7 @@ class RicherMesh:
         """
         near = self._transferred(node)
         if self._criterion is None:
-            self._criterion = criterion_of(self.solver, self.plane, self.kind, near)
+            self._criterion = criterion_of(self.richer.solver, self.plane, self.kind, near)
         resolved = True
         if node.sought is None:
             found = self._criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
@@ -86,16 +83,16 @@ class RicherMesh:
         return [bound(*pair, self.rho) for pair in each], resolved
 
     def _transferred(self, node: LocusPoint) -> LocusPoint:
-        x, dx = self.transfer(node.x, state=True), self.transfer(node.dx, state=False)
-        modes, left = ([self.transfer(v, state=False) for v in side] for side in (node.modes, node.left))
+        x, dx = self.richer.transfer(node.x, state=True), self.richer.transfer(node.dx, state=False)
+        modes, left = ([self.richer.transfer(v, state=False) for v in side] for side in (node.modes, node.left))
         return replace(node, x=x, dx=dx, modes=modes, left=left)
 
     def _changed(self, near: LocusPoint, found: LocusPoint) -> float:
         """Relative change of the strains of a state, or of one of its null vectors."""
-        norm, modes = self.solver.system.norm, near.modes[: near.multiplicity]
-        changes = [self.indicator.changed(near.x, found.x, state=True)]
+        norm, modes = self.richer.system.norm, near.modes[: near.multiplicity]
+        changes = [self.richer.indicator.changed(near.x, found.x, state=True)]
         for first, last in zip(modes, found.modes, strict=False):
-            changes.append(self.indicator.changed(first / norm(first), last / norm(last), state=False))
+            changes.append(self.richer.indicator.changed(first / norm(first), last / norm(last), state=False))
         return max(changes)
 
 

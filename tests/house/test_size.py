@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 36453,
+    "lines of Python": 36431,
     "files of Python": 235,
     "lines of C": 957,
     "module constants with a number": 450,
