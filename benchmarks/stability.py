@@ -32,7 +32,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.assessment import Assessor
-from rodfem.stability.dependence import rank_of
+from rodfem.stability.dependence import smallest_singular
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.near_zero import decide, quotient_error
 
@@ -311,7 +311,7 @@ def ranks() -> str:
             solver = Solver(small_states.scene(name), Discretization("pointwise", elements, 1)).equilibria
             pencil = Coordinates(solver.system, coordinates).assemble(solver.start(20.0 if name == "cord" else 0.1))
             h = solver.system.scene.length / elements
-            sigma = rank_of(pencil)
+            sigma, _ = smallest_singular(pencil.C)
             row += [f"{sigma:.4e}", f"{sigma / h:.5f}"]
         rows.append(row)
     return table(["n", "cord", "/h", "hemitropic", "/h", "hemitropic, compatible", "/h"], rows)

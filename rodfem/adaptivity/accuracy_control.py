@@ -1,9 +1,8 @@
 """Control of the accuracy of a branch while it is traced.
 
-The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients
-tells how it has changed since (:mod:`rodfem.adaptivity.grading`), which costs next to nothing.  Where it is too large,
-:class:`TooCoarse` is raised: the explorer then has a mesh made for that very state, carries the last points over, and
-goes on there (:mod:`rodfem.adaptivity.mesh_sequence`).
+The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients tells
+how it has changed (:mod:`rodfem.adaptivity.grading`).  If it is too large, :class:`TooCoarse` is raised: the explorer
+has a mesh made for that state, carries the last points over, and goes on (:mod:`rodfem.adaptivity.mesh_sequence`).
 """
 
 from __future__ import annotations
@@ -29,8 +28,6 @@ POLISHED = 1e-3
 """Distance, in the metric, that it may move a point by at most."""
 TRIES, MOST = 4, 16
 """Meshes tried at one place, and in a run."""
-SURE = 10.0
-"""An error estimated by the decay of coefficients counts where it is this much better than the accuracy."""
 GROWN, SELDOM = 1.5, 10
 """An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
 NEAR = 0.1
@@ -72,7 +69,7 @@ class AccuracyControl:
         last = self.checked
         if last is not None and last.since < SELDOM and not self._at_bound(point):
             point.estimate = last.error * max(1.0, indicator / last.indicator)
-            if indicator < GROWN * last.indicator or point.estimate * SURE < self.accuracy:
+            if indicator < GROWN * last.indicator or 10 * point.estimate < self.accuracy:
                 last.since += 1
                 return
         with solver.system.clock.scope("error bars"):
@@ -183,9 +180,9 @@ class AccuracyControl:
 
     @staticmethod
     def _index(point: Point, richer: Enriched, again: Again) -> int:
-        """Index on the richer mesh; the point's own where eigenvalues that are zero on one of the two make up for it.
+        """Index on the richer mesh; the point's own if eigenvalues that are zero on one of the two make up for it.
 
-        One factorisation suffices where it is the same; otherwise a second one separates zero eigenvalues from others.
+        One factorisation suffices if it is the same; else a second one separates zero eigenvalues from others.
         """
         inertia = richer.solver.inertia
         found = inertia.at(again.x)

@@ -1,21 +1,19 @@
-r"""Error bars: every special point is computed again on a richer discretisation, started from the first.
+"""Error bars: every special point is computed again on a richer discretisation, started from the first.
 
 Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
 difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
 ``2^-(degree+1)`` of what elements miss of a smooth state, and about the square of that of loads, and of positions at
-vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
-the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
-open of the richer result.
+vertices.  How smooth it is the last Legendre coefficients of the strains on the two meshes tell, whose ratio bounds
+that of loads and positions amply.  To that comes what location and arithmetic leave open of the richer result.
 
-All of this is asymptotic.  Errors of loads and positions are of second order in those of strains only while these are
-small, and a single value may agree on two meshes by accident, where what it has of either sign cancels; norms do not
-cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
-:data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
-may well exceed.  Of an ordinate that is taken inside of an element ``rho`` is of the largest change over that element,
-in which its error oscillates (:mod:`rodfem.adaptivity.ordinate_bound`).  Of an event it is at least what a sum over
-nodes has: half of it.
+All of this is asymptotic, and a single value may agree on two meshes by accident; norms do not.  If the strains of the
+state, or of its null vector, differ between the two meshes by more than :data:`RESOLVED_TO` of themselves, the first
+mesh does not resolve the state, and ``d`` is no bound.  Of an event ``rho`` is at least what a sum over nodes has: half
+of it.
 
-The state, its tangent and the null vector are interpolated, so that this costs a few solves.
+A centreline misses ``h^(2d)`` at vertices, and inside of elements of degree d far more: ``h^(d+2)`` times an
+oscillating polynomial, a combination of ``P_d`` and its neighbours.  Near a zero of it two meshes agree by accident.
+Of an ordinate that is taken inside of an element ``rho`` is therefore of the largest change over that element.
 """
 
 from __future__ import annotations
@@ -27,7 +25,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
-from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
@@ -37,14 +34,12 @@ from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordin
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
+from rodfem.fem.shape import Shape
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event
-from rodfem.tolerances import ROUND_OFF, round_off
+from rodfem.tolerances import ROUND_OFF, round_off, same_place
 
-AMPLE, MOST = 2.0, 0.75
-"""Safety factor on the ratio of the last coefficients, which may be small by coincidence; and the largest ratio of
-errors: beyond it neither mesh resolves the state."""
 RESOLVED_TO = 0.1
 """Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
 order of which errors of loads are, is one per cent."""
@@ -54,13 +49,62 @@ LEFT = 0.5
 """Part of an error of an event that is left at most: that of a number of the nodes falls with their distance."""
 
 
+def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
+    """Bound of the error of a ``value`` of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
+
+    ``about`` is the largest change of such a value near by: by accident the value itself may change by less.
+    """
+    change = abs(richer - value)
+    return change + rho / (1 - rho) * max(change, about) + left
+
+
+class OrdinateBound:
+    """Bounds the errors of ordinates of states on the mesh of a ``coarse`` shape by those of a ``richer`` one."""
+
+    def __init__(self, coarse: Shape, richer: Shape) -> None:
+        self.coarse, self.richer = coarse, richer
+        scene, fields = coarse.system.scene, coarse.system.fields
+        vertices = fields.all_vertices()
+        places = [p for p in scene.ordinate.places if not any(same_place(p, v, scene.length) for v in vertices)]
+        tried = np.empty(0)
+        for p in places:
+            i = int(np.searchsorted(vertices, p))
+            # three places for each zero of the polynomial
+            tried = np.linspace(vertices[i - 1], vertices[i], 3 * fields.discretization.degree + 2)[1:-1]
+        self._tried = [(float(s), coarse.weights(float(s)), richer.weights(float(s))) for s in tried]
+
+    def __call__(self, x: PETSc.Vec, again: PETSc.Vec, left: float, rho: float) -> float:
+        """Return a bound of the error of the ordinate of a state, ``x`` on the first mesh and ``again`` on the richer.
+
+        The ordinate of the latter is uncertain by ``left``, and has ``rho`` of the error.
+        """
+        return bound(self.coarse.ordinate(x), self.richer.ordinate(again), left, rho, self._change(x, again))
+
+    def _change(self, x: PETSc.Vec, again: PETSc.Vec) -> float:
+        """Largest change of the ordinate over the element in which it is taken; none at a vertex, or of an integral.
+
+        The ordinate is evaluated at its own place, with the changes of position and rotation of all others.
+        """
+        if not self._tried:
+            return 0.0
+        first, second = self.coarse.system.at(x), self.richer.system.at(again)
+        of = self.richer.system.scene.ordinate
+        r, q = self.richer.place(second, of.s or 0.0)
+        value, largest = float(of.of(r, q)), 0.0
+        for s, weights, richer in self._tried:
+            before, after = self.coarse.place(first, s, weights), self.richer.place(second, s, richer)
+            turned = q + after[1] - before[1]
+            beside = of.of(r + after[0] - before[0], turned / np.sqrt(turned @ turned))
+            largest = max(largest, abs(float(beside) - value))
+        return largest
+
+
 @dataclass(frozen=True)
 class Again:
-    """A point computed again: state ``x``, ``load``, ``ordinate``, and uncertainties of the two by location, round-off.
+    """A point computed again: ``x``, ``load``, ``ordinate``, and ``load_left``, ``ordinate_left``, their uncertainties.
 
-    These are ``load_left`` and ``ordinate_left``.  ``ordinate_error`` bounds the error of the first ordinate, ``rho``
-    is the part of the first errors that is left, and ``changed`` the relative change of the strains of the state or of
-    its null vector, the larger one.
+    ``ordinate_error`` bounds the error of the first ordinate, ``rho`` is the part of the first errors that is left, and
+    ``changed`` the relative change of the strains of the state or of its null vector, the larger one.
     """
 
     x: PETSc.Vec
@@ -85,12 +129,11 @@ class Again:
 class Enriched:
     """A second, richer discretisation of the system of a solver, and its estimates.
 
-    ``origins`` are branch points that were located there: each with the special point of the first discretisation, and
+    ``origins`` are branch points that were located there, each with the special point of the first discretisation, and
     the part of the error that is left.
     """
 
     def __init__(self, solver: BranchSolver) -> None:
-        """Compile and allocate the richer system."""
         self.coarse, self.system = solver, richer_system(solver.system)
         self.solver = BranchSolver(self.system)
         self.transfer = Transfer(solver.system, self.system)
@@ -98,21 +141,22 @@ class Enriched:
         self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
         self._ordinate = OrdinateBound(solver.shape, self.solver.shape)
         weights = weights_of(self.system.scene)
-        self._indicators = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
+        self._coarse, self.indicator = (SmoothnessIndicator(each, weights) for each in (solver, self.solver))
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
         """Ratio of the errors of a state (and its null vector) on the richer discretisation and on the first."""
         degree = self.coarse.system.fields.discretization.degree
-        first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._indicators, (before, after), strict=True))
+        first, last = self._coarse.unresolved(before[0], before[1:]), self.indicator.unresolved(after[0], after[1:])
         if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
             return halved(degree)
-        return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
+        # the last coefficients may be small by coincidence; beyond three quarters neither mesh resolves the state
+        return max(halved(degree), min(2 * last / max(first, RESOLVED), 0.75))
 
     def estimate(self, special: SpecialPoint) -> None:
-        """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of its errors in load and ordinate.
+        """Set ``error_estimate`` and ``ordinate_error`` of a special point, and whether it is ``resolved``.
 
-        They are infinite where the richer discretisation does not find the point, and no bounds where the point is not
-        ``resolved``, which is set, too.
+        They are infinite if the richer discretisation does not find the point, and no bounds if the point is not
+        resolved.
         """
         if special.test_function == "stretch":
             return  # it has its own estimate: see :mod:`rodfem.adaptivity.zero_stretch`
@@ -135,8 +179,8 @@ class Enriched:
     def again(self, point: Point, *, fixed_load: bool) -> Again:
         """Solve for a point on the richer discretisation, at its load, once, or across its tangent.
 
-        One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` where
-        there is no such point.
+        One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` if there
+        is none.
         """
         key = id(point), self.system.damping
         if fixed_load and key in self._at_loads:
@@ -162,7 +206,7 @@ class Enriched:
         last = system.scalar(x), self.solver.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
-        changed = self._indicators[1].changed(first, x, state=True)
+        changed = self.indicator.changed(first, x, state=True)
         rho = self.rho([point.x], [x])
         ordinate_error = self._ordinate(point.x, x, float(left[1]), rho)
         return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed)
@@ -188,7 +232,7 @@ class Enriched:
         slope = abs(ordinate_along(self.solver, found, tangent))
         load_left = abs(point.slope) * along + round_off(load, units.load)
         left = slope * along + round_off(ordinate, units.ordinate)
-        changed = self._indicators[1].changed(x, found, state=True)
+        changed = self.indicator.changed(x, found, state=True)
         rho = max(self.rho([point.x], [found]), LEFT)
         ordinate_error = self._ordinate(point.x, found, left, rho)
         return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed)
@@ -209,7 +253,7 @@ class Enriched:
         uncertain = 0.0 if special.kind == FOLD else load_uncertainty(solver, found)
         load_left = uncertain + round_off(found.load, units.load)
         left = STEADY * moved + round_off(ordinate, units.ordinate)
-        relaxed, indicator = [v.copy() for v in found.modes], self._indicators[1]
+        relaxed, indicator = [v.copy() for v in found.modes], self.indicator
         orthonormalize(relaxed, metric)
         sharp = combine(relaxed, np.array([(metric * v).dot(modes[0]) for v in relaxed]))
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])

@@ -1,11 +1,11 @@
-r"""Graded meshes: how smooth a state is along the rod, and the cheapest elements that resolve it to an accuracy.
+"""Graded meshes: how smooth a state is along the rod, and the cheapest elements that resolve it to an accuracy.
 
 On each element the Legendre coefficients of the strains (curvature and stretch, weighted as in the stored energy) decay
 like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
-Approximation Theory and Approximation Practice, chapter 8).  With elements of degree d the strains are missed by
-``A rho^-d``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
-in front is measured by a computation on a richer mesh.  On an element of another size the distance stays, and ``rho``
-follows: how large an element may be at each place is had in closed form.
+Approximation Theory and Approximation Practice, chapter 8).  Elements of degree d miss ``A rho^-d`` of the strains, and
+the *square* of that, integrated along the rod, of loads and positions, which are stationary; the factor in front is
+measured on a richer mesh.  On an element of another size the distance stays, and ``rho`` follows: how large an element
+may be at each place is had in closed form.
 """
 
 from __future__ import annotations
@@ -24,14 +24,8 @@ from rodfem.fem.fields import Discretization, Fields, turning_of
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
 
-DEGREES = range(4, 11)
-"""Degrees to choose from."""
 FIXED, PER_DEGREE = 600.0, 0.27
 """Cost of a point of a branch with n unknowns of degree d is as ``FIXED + n (1 + PER_DEGREE d)``: measured, cord."""
-KEEP = 0.15
-"""Another degree than the present one must save this part of the cost: its forms have to be compiled or loaded."""
-LARGEST = 3.0
-"""No element grows by more than this factor at a time: the decay was measured on the element that there is."""
 LEAST_DECAY, MOST_DECAY = 1.5, 1e3
 
 
@@ -59,7 +53,8 @@ class Smoothness:
         needed = (self.amplitude**2 * length / indicator) ** (0.5 / degree)
         needed = np.maximum(needed, LEAST_DECAY)
         factor = (self.decay - 1 / self.decay) / (needed - 1 / needed)
-        return np.asarray(np.diff(self.vertices) * np.minimum(factor, LARGEST))
+        # the decay was measured on the element that there is: no element grows by more at a time
+        return np.asarray(np.diff(self.vertices) * np.minimum(factor, 3.0))
 
     def fulfilled_by(self, mesh: Discretization, vertices: np.ndarray, indicator: float) -> bool:
         """Whether elements with these vertices are nowhere larger than the indicator allows."""
@@ -187,9 +182,10 @@ def cheapest(solver: BranchSolver, found: Smoothness, indicator: float) -> Discr
     fields = solver.system.fields
     present = fields.discretization
     best: tuple[float, Discretization] | None = None
-    for degree in sorted({*DEGREES, present.degree}):
+    for degree in sorted({*range(4, 11), present.degree}):
         vertices = _place(fields, found, found.sizes(degree, indicator))
-        effort = cost(fields, len(vertices) - 1, degree) * (1.0 if degree == present.degree else 1 + KEEP)
+        # forms of another degree have to be compiled or loaded
+        effort = cost(fields, len(vertices) - 1, degree) * (1.0 if degree == present.degree else 1.15)
         if best is None or effort < best[0]:
             mesh = replace(present, elements=len(vertices) - 1, degree=degree, vertices=tuple(map(float, vertices)))
             best = effort, mesh

@@ -1,42 +1,48 @@
-r"""Soft modes of states, with what the mesh adds to their uncertainty, and refined until their sign is decided.
+"""Soft modes of states and branches, with what the mesh adds to their uncertainty.
 
-The state is solved for again on a mesh of half the elements' length and one degree more.  With eigenvalues ``mu`` on
-the mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - mu| / (1 - rho)``
+A mesh may make an eigenvalue of its own of one that is exponentially small: it pins what slides along the rod.  The
+state is solved for again on a mesh of half the elements' length and one degree more.  With eigenvalues ``mu`` on the
+mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - mu| / (1 - rho)``
 (:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh, unless
-it is within round-off on every one.  Where an eigenvalue changes by more than itself on the mesh that bound is none of
-what the mesh says of its sign: all of the change is added.  One whose sign is another one than on the mesh itself is
-undecided there, whatever richer meshes say, and so is one where the richer mesh has another state than the mesh, by the
+it is within round-off on every one.  If an eigenvalue changes by more than itself all of the change is added.  One of
+another sign than on the mesh itself is undecided there, and so is one if the richer mesh has another state, by the
 strains of the two.
 
 What vanishes at a special point is zero there by construction, and undecided.  The special point of a richer mesh is at
 another load, so that its other eigenvalues are compared across the branch.
+
+Rows that one factorisation decided have no soft modes.  With error bars the eigenvalue nearest zero is compared at the
+loads asked for and at the ends of branches; all along a branch if one of these is undecided, or a special point is not
+on the richer mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import compress, groupby
+from math import inf, isfinite
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
+from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.arc import STEADY, stepped
-from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.kinds import EVENT, FOLD
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL, ROUGH, Factored
-from rodfem.stability.motion_names import SHARE, MotionNames
+from rodfem.stability.motion_names import MotionNames
 from rodfem.stability.near_zero import SPARE, NearZero, decide, judge, near_zero, quotients, soft_limit
-from rodfem.stability.soft_mode import Judgement, SoftMode
+from rodfem.stability.soft_mode import Judgement, SoftMode, index_range
 
-REFINEMENTS = 2
-"""Meshes that are tried beyond that of a state until the signs of its soft modes are decided."""
-SURE = 0.1
-"""Part of an eigenvalue by which its quotients on two meshes differ if the mesh decides its sign, at most."""
+FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
+BARS = "richer meshes may decide that, ask for error bars"
 
 
 class SoftStates:
@@ -47,7 +53,6 @@ class SoftStates:
     """
 
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
-        """Nothing is computed before a state is given."""
         self.solver, self.names = solver, MotionNames(solver.system, solver.inertia.metric)
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
@@ -65,17 +70,44 @@ class SoftStates:
         """Record the soft modes of a ``point``, and its index as far as they are decided; whether there are any.
 
         On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
-        ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Along a ``family``
-        of equilibria at one load that of the branch itself is zero.  At a special point the eigenvalues of its null
-        vectors, which are ``vanishing``, are zero.  Raises :class:`ConvergenceError` where constraints that depend on
-        each other leave less than no negative eigenvalue.
+        ``compare`` the index there is asked for; eigenvalues of another sign are soft, too.  Along a ``family`` of
+        equilibria at one load that of the branch itself is zero, at a special point those of its ``vanishing`` null
+        vectors.  Raises :class:`ConvergenceError` if constraints that depend on each other leave less than no negative
+        eigenvalue.
         """
-        inertia = self.solver.inertia
+        inertia, metric = self.solver.inertia, self.solver.system.metric
         least = self._doubtful(point, fixed_load, compare=compare)
         if least is None:
             return False
         near = near_zero(inertia.at(point.x), least=least)
-        found = self.judgement(point, near, fixed_load=fixed_load, family=family, vanishing=vanishing)
+        branch = [point.tangent] if family and point.tangent is not None else []
+        if branch:
+            near = _across_branch(metric, near, branch)
+        modes = self._modes(point, near)
+        others = [i for i, v in enumerate(near.vectors) if across(metric, [v], vanishing)]
+        for i in set(range(len(modes))).difference(others):
+            modes[i] = replace(modes[i], uncertainty=max(abs(modes[i].value), modes[i].uncertainty))
+        if others and self._richer:
+            with self.solver.system.clock.scope("error bars"):
+                refined = self._refined(point, [modes[i] for i in others], fixed_load, [*vanishing, *branch])
+            for i, mode in zip(others, refined, strict=True):
+                modes[i] = mode
+        self._record(point, judge(near, modes, inertia.tolerance))
+        return bool(point.soft)
+
+    def _modes(self, point: Point, near: NearZero) -> list[SoftMode]:
+        """Eigenvalues ``near`` zero of a ``point`` as soft modes of its mesh.
+
+        Without a richer mesh those within the tolerance of a count are undecided: round-off alone does not tell what
+        is zero for the rod.
+        """
+        least, bars = 0.0 if self._richer else self.solver.inertia.tolerance, near.uncertainty
+        bars = np.where(abs(near.values) > bars, np.maximum(bars, least), bars)
+        names = self.names(point.x, near.vectors)
+        return [SoftMode(*m) for m in zip(names, near.values.tolist(), bars.tolist(), strict=True)]
+
+    def _record(self, point: Point, found: Judgement) -> None:
+        """Give a ``point`` what was ``found``; raises :class:`ConvergenceError` for a negative index."""
         if found.negative < 0:
             raise ConvergenceError(
                 f"The count of negative eigenvalues at load {point.load:.8g} gave {found.negative}: the constraints "
@@ -84,8 +116,8 @@ class SoftStates:
         if point.negative_in_space is not None:  # that in the plane, and what is out of it
             point.negative_in_space += found.negative - point.negative
         point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
-        point.soft = [m for m in found.soft if not m.decided or abs(m.value) < soft_limit(inertia)]
-        return bool(point.soft)
+        limit = soft_limit(self.solver.inertia)
+        point.soft = [m for m in found.soft if not m.decided or abs(m.value) < limit]
 
     def _doubtful(self, point: Point, fixed_load: bool, *, compare: bool) -> int | None:
         """Number of eigenvalues nearest zero to be judged besides soft ones; None where there is nothing to judge.
@@ -125,89 +157,45 @@ class SoftStates:
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 
     def _moved(self, point: Point, there: Factored) -> bool:
-        """Whether the eigenvalue nearest zero has another value at the same point on the richer mesh, by quotients."""
-        here, richer = self.solver.inertia.at(point.x), self._companion(0)
+        """Whether the eigenvalue nearest zero has another value at the same point on the richer mesh."""
+        here = self.solver.inertia.at(point.x)
         here.count()
-        with self.solver.inertia.afresh():
-            v = here.nearest(1, ROUGH)[1][0]
-        w = _unit(richer.system, richer.transfer(v, state=False))
-        value, other = (x.dot(found.matrix * x).real + found.shift for x, found in ((v, here), (w, there)))
-        return bool(abs(other - value) > SURE * abs(value))
-
-    def judgement(
-        self, point: Point, near: NearZero, *, fixed_load: bool, family: bool, vanishing: Sequence[PETSc.Vec]
-    ) -> Judgement:
-        """Decide on eigenvalues ``near`` zero of a ``point`` as far as can be.
-
-        ``fixed_load``, ``family`` and ``vanishing`` are those of :meth:`examine`.  Without a richer mesh those within
-        the tolerance of a count are undecided, beyond round-off too: they are zero in every count, and round-off alone
-        does not tell what is zero for the rod.
-        """
-        every, near = len(near.values), self._across_the_branch(point, near) if family else near
-        names, tolerance = self.names(point.x, near.vectors), self.solver.inertia.tolerance
-        least, bars = 0.0 if self._richer else tolerance, near.uncertainty
-        bars = np.where(abs(near.values) > bars, np.maximum(bars, least), bars)
-        modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), bars.tolist(), strict=True)]
-        zero = self._zero(near, vanishing)
-        others = [m for m, is_zero in zip(modes, zero, strict=True) if not is_zero]
-        if others and self._richer:
-            with self.solver.system.clock.scope("error bars"):
-                others = self._refined(point, others, fixed_load, every - len(modes), vanishing)
-        rest = iter(others)
-        modes = [
-            replace(m, uncertainty=max(abs(m.value), m.uncertainty)) if is_zero else next(rest)
-            for m, is_zero in zip(modes, zero, strict=True)
-        ]
-        return judge(near, modes, tolerance)
-
-    def _zero(self, near: NearZero, vanishing: Sequence[PETSc.Vec]) -> list[bool]:
-        """Whether each of some eigenvalues is one of the null vectors that are ``vanishing``."""
-        return [not across(self.solver.system.metric, [v], vanishing) for v in near.vectors]
-
-    def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
-        """Eigenvalues without that of the branch itself, a family of equilibria at one load."""
-        if point.tangent is None:
-            return near
-        image = self.solver.inertia.metric * point.tangent
-        own = [i for i, v in enumerate(near.vectors) if v.dot(image).real ** 2 > SHARE]
-        kept = [i for i in range(len(near.vectors)) if i not in own]
-        vectors = [near.vectors[i] for i in kept]
-        return replace(
-            near, values=near.values[kept], vectors=vectors, uncertainty=near.uncertainty[kept],
-            rest=near.rest + len(own),
-        )  # fmt: skip
+        values = []
+        for found in (here, there):
+            with found.inertia.afresh():
+                values.append(float(found.nearest(1, ROUGH)[0][0]))
+        return abs(values[1] - values[0]) > abs(values[0]) / 10
 
     def _refined(
-        self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int, vanishing: Sequence[PETSc.Vec]
+        self, point: Point, modes: list[SoftMode], fixed_load: bool, zeros: Sequence[PETSc.Vec]
     ) -> list[SoftMode]:
-        """The ``modes`` with values of richer meshes; of infinite uncertainty where those have no such state.
+        """The ``modes`` with values of richer meshes; of infinite uncertainty if those have no such state.
 
-        ``own`` eigenvalues nearest zero are those of the branch itself.  Those of the ``vanishing`` null vectors are
-        left out, too, by their vectors: on a richer mesh others may be nearer to zero.
+        Null vectors, and the tangent of a family, the ``zeros``, are left out by their vectors: on a richer mesh
+        others may be nearer to zero.
         """
-        out, values, still = modes, np.array([m.value for m in modes]), list(vanishing)
-        soft = bool((abs(values) < soft_limit(self.solver.inertia)).any())
-        for level in range(REFINEMENTS):
+        coarse = values = np.array([m.value for m in modes])
+        out, soft = modes, bool((abs(values) < soft_limit(self.solver.inertia)).any())
+        for level in range(2):  # meshes beyond that of the state
             richer = self._companion(level)
             try:
                 point, again = _on(richer, point, fixed_load, soft=soft)
-                still = [_unit(richer.system, richer.transfer(v, state=False)) for v in still]
-                finer, rounding = _nearest(richer.solver, point, len(modes), own, still)
+                zeros = [_unit(richer.system, richer.transfer(v, state=False)) for v in zeros]
+                finer, rounding = _nearest(richer.solver, point, len(modes), zeros)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
             of_mesh = again.rho / (1 - again.rho) * abs(finer - values)
-            left = of_mesh + rounding
-            lost = _within_round_off(finer, of_mesh, rounding)
-            values = finer
+            lost, left, values = abs(finer) + of_mesh <= rounding, of_mesh + rounding, finer
             # a sign that is another one than the mesh's own is not decided there
-            coarse = np.array([m.value for m in modes])
             contrary, away = np.sign(values) != np.sign(coarse), abs(values - coarse)
             bars = np.where(away > abs(coarse), left + away, left)
-            out = [replace(m, value=float(v), uncertainty=float(u))
-                   for m, v, u in zip(modes, values, bars, strict=True)]  # fmt: skip
-            settled = all(m.decided or is_lost for m, is_lost in zip(out, lost, strict=True))
-            if settled or (contrary & (left < abs(values))).any():
-                return out
+            out = [
+                replace(m, value=v, uncertainty=u)
+                for m, v, u in zip(modes, values.tolist(), bars.tolist(), strict=True)
+            ]
+            # no richer mesh decides what is within round-off wherever the error of the mesh may move it
+            if ((abs(values) > bars) | lost).all() or (contrary & (left < abs(values))).any():
+                break
         return out
 
     def _companion(self, level: int) -> Enriched:
@@ -217,22 +205,18 @@ class SoftStates:
         return self._companions[level]
 
 
+def _across_branch(metric: PETSc.Mat, near: NearZero, branch: Sequence[PETSc.Vec]) -> NearZero:
+    """Eigenvalues without that of a ``branch`` at one load, which is a zero, and none of those that are judged."""
+    kept = [i for i, v in enumerate(near.vectors) if across(metric, [v], branch)]
+    return near.at(kept, near.rest + len(near.vectors) - len(kept))
+
+
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
     """Point on a richer mesh, and what was found when it was computed there.
 
-    Beside a soft mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere where it fails.
-    Raises :class:`ConvergenceError` where the mesh has no such point, with a soft mode also where it has another state.
-
-    Parameters
-    ----------
-    richer
-        Companion of the mesh.
-    point
-        Point on the mesh itself.
-    fixed_load
-        As in :meth:`SoftStates.examine`.
-    soft
-        Whether the point is known to have a soft mode.
+    Beside a ``soft`` mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere if it
+    fails. Raises :class:`ConvergenceError` if the mesh has no such point, with a soft mode also if it has another
+    state.
     """
     system = richer.system
     given = system.damping
@@ -265,27 +249,133 @@ def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
     return v
 
 
-def _within_round_off(values: np.ndarray, of_mesh: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-    """Whether eigenvalues are within round-off wherever the error of the mesh may move them: no richer mesh decides."""
-    return np.asarray(abs(values) + of_mesh <= rounding)
-
-
 def _nearest(
-    solver: BranchSolver, point: Point, number: int, left_out: int, still: Sequence[PETSc.Vec]
+    solver: BranchSolver, point: Point, number: int, zeros: Sequence[PETSc.Vec]
 ) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
-    The first ``left_out`` of them at the ``point``, and those of the vectors ``still``, are no part of that number.
-    What arithmetic leaves open of the state, one more step of Newton's method tells.
+    Those of the vectors ``zeros`` at the ``point`` are no part of that number.  What arithmetic leaves open of the
+    state, one more step of Newton's method tells.
     """
     found = solver.inertia.at(point.x)
     found.count()
     with solver.inertia.afresh():
-        nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
-    vectors = [v for v in nearest if across(solver.system.metric, [v], still)][:number]
+        nearest = found.nearest(len(zeros) + number + SPARE, NULL)[1]
+    vectors = [v for v in nearest if across(solver.system.metric, [v], zeros)][:number]
     q = quotients(found, vectors, TOLERANCE * solver.inertia.scale)
     row = solver.axis if point.tangent is None else solver.row(point.tangent)
     settled = solver.inertia.at(stepped(solver, point.x, row))
     moved = abs(np.array([v.dot(settled.matrix * v).real for v in vectors]) - q.values)
     order = np.argsort(q.values)
     return q.values[order], (q.uncertainty + STEADY * moved)[order]
+
+
+class SoftRows:
+    """Examines branches of one run; with ``error_bars`` the error of its meshes is part of every uncertainty."""
+
+    def __init__(self, meshes: Meshes, *, error_bars: bool) -> None:
+        self.meshes, self.error_bars = meshes, error_bars
+        self._states: dict[int, SoftStates] = {}
+        self._uncompared: dict[str, tuple[float, str]] = {}
+
+    def examine(self, branch: Branch) -> None:
+        """Record soft modes, and undecided eigenvalues, at the points of a branch."""
+        family, special = self._is_family(branch), {id(s.point) for s in branch.special}
+        doubtful = self._examine_given(branch, family)
+        rows = branch.points[1:] if branch.parent else branch.points  # without the branch point that it leaves
+        compare = self.error_bars and doubtful
+        for point in rows:
+            if id(point) not in special:
+                self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
+        if compare:
+            self._leave_out_doubtful(branch, family=family)
+        for fold in branch.special:
+            if fold.kind == FOLD and fold.multiplicity == 1 and fold.negative_before == fold.negative_after:
+                _change_at_fold(fold, branch.points)
+
+    def _examine_given(self, branch: Branch, family: bool) -> bool:
+        """The same at loads asked for, at ends and events; whether one is undecided, or not on the richer mesh."""
+        given = _given(branch)
+        doubtful = any(s.kind.singular and s.error_estimate == inf for s in branch.special)
+        counted = {id(s.point): s.point.negative for s in given}
+        for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
+            states = self._of(s.point)
+            states.examine(s.point, fixed_load=s.kind.given, compare=self.error_bars, family=family)
+            if states.uncompared and isfinite(s.error_estimate) and s.resolved:  # else the special point says so
+                self._uncompared.setdefault(branch.name, (s.point.load, states.uncompared))
+            doubtful |= s.point.undecided > 0
+        for s in given:
+            if s.negative_before == s.negative_after == counted[id(s.point)]:
+                s.negative_before = s.negative_after = s.point.negative
+        return doubtful
+
+    def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
+        """Make rows of special points that are zeros of the mesh, not of the rod."""
+        rows = [p for p in branch.points if not any(p is s.point for s in branch.special)]
+        left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
+        for s in compress(branch.special, left_out):
+            self._of(s.point).examine(s.point, fixed_load=False, compare=True, family=family)
+        branch.special[:] = [s for s, out in zip(branch.special, left_out, strict=True) if not out]
+
+    def _is_family(self, branch: Branch) -> bool:
+        """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
+        span, singular = self.meshes.solvers[0].system.scene.span, {id(s.point) for s in branch.special}
+        begin = 1 if branch.parent else 0  # a pitchfork begins without a slope
+        rows = [p for p in branch.points[begin:] if id(p) not in singular]
+        return bool(rows) and all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
+
+    def undecided(self, branch: Branch) -> Iterator[str]:
+        """Yield a sentence on each piece of a branch whose index is not decided, or not compared with a richer mesh."""
+        if branch.name in self._uncompared:
+            at, why = self._uncompared.pop(branch.name)
+            name = self.meshes.solvers[0].system.scene.load
+            yield f"{branch.name}: At {name} = {at:.8g} the index is not compared with that of a richer mesh. {why}"
+        for words, group in groupby(branch.points, lambda p: p.undecided and index_range(p.negative, p.undecided)):
+            if words:
+                yield f"{branch.name}: {self._piece(list(group), str(words))}"
+
+    def _piece(self, points: list[Point], words: str) -> str:
+        """Sentence on neighbouring points whose index is undecided, in ``words``."""
+        solver = self.meshes.solvers[points[0].mesh]
+        worst = max((m for p in points for m in p.soft if not m.decided), key=lambda m: m.uncertainty)
+        remedy = FINER if worst.uncertainty > 10 * TOLERANCE * solver.inertia.scale else EXACT
+        if remedy == FINER and not self.error_bars and worst.uncertainty <= solver.inertia.tolerance:
+            remedy = BARS
+        low, high = (f"{p.load:.8g}" for p in (points[0], points[-1]))
+        load = solver.system.scene.load
+        where = f"At {load} = {low}" if len(points) == 1 else f"From {load} = {low} to {high}"
+        return f"{where} the index is {words} ({worst}): {remedy}."
+
+    def _of(self, point: Point) -> SoftStates:
+        if point.mesh not in self._states:
+            richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
+            self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
+        return self._states[point.mesh]
+
+
+def _given(branch: Branch) -> list[SpecialPoint]:
+    """Loads asked for, ends and events of a ``branch``, but for those at special points."""
+    singular = {id(s.point) for s in branch.special if s.kind.counted or s.test_function == "stretch"}
+    return [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
+
+
+def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
+    """Whether a ``special`` point is the mesh's, by the ``rows``: on one side the next two are undecided.
+
+    One is enough if the richer mesh has no such point.  Not if the decided indices on both sides differ by its own
+    change, and as much is undecided: that is another mode.
+    """
+    first = sum(p.arclength < special.point.arclength for p in rows)
+    before, after, number = rows[:first][::-1], rows[first:], 2 if isfinite(special.error_estimate) else 1
+    doubtful = any(sum(p.undecided > 0 for p in side[:number]) == number for side in (before, after))
+    change = [(q.negative - p.negative, q.undecided - p.undecided) for p, q in zip(before[:1], after[:1], strict=False)]
+    return special.kind.singular and doubtful and change != [(special.negative_after - special.negative_before, 0)]
+
+
+def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
+    """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
+    decided = [p for p in rows if not p.undecided and p is not fold.point]
+    left = [p.negative for p in decided if p.arclength < fold.point.arclength][-1:]
+    right = [p.negative for p in decided if p.arclength > fold.point.arclength][:1]
+    if left and right and abs(left[0] - right[0]) == 1:
+        fold.negative_before, fold.negative_after = left[0], right[0]

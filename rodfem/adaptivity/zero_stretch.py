@@ -36,10 +36,9 @@ def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
 
 
 def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
-    """A point right before the ``last`` admissible one after the row ``a``; None where it is not found.
+    """A point right before the ``last`` admissible one after the row ``a``; None if it is not found.
 
-    A rod that is squeezed to nothing has no stiffness against some motions: at the very end their eigenvalues are zero,
-    whatever sign they had before.
+    At the end a rod that is squeezed to nothing has no stiffness against some motions, whose eigenvalues are zero.
     """
     try:
         return Arc(solver, a, last).point(last.arclength - ASIDE * (last.arclength - a.arclength))
@@ -64,11 +63,11 @@ def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) 
 
 
 def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
-    """Sharpen an end at which the smallest stretch vanishes; raises :class:`ConvergenceError` where that fails.
+    """Sharpen an end at which the smallest stretch vanishes; raises :class:`ConvergenceError` if that fails.
 
-    A strain converges like ``h^k`` only, far slower than a load does.  The point is computed on meshes two and
-    four times as fine, one degree richer (the forms of :class:`Enriched` serve); the finer one is kept.  Its error is a
-    quarter of their difference at most, all of it for linear elements.
+    A strain converges like ``h^k`` only.  The point is computed on meshes two and four times as fine, one degree richer
+    (the forms of :class:`Enriched` serve); the finer one is kept.  Its error is a quarter of their difference at most,
+    all of it for linear elements.
     """
     system, d = solver.system, solver.system.fields.discretization
     sample, found = solver.shape.sample(end.point.x), list[Point]()

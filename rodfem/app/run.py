@@ -26,9 +26,8 @@ from rodfem.diagram.trace import PLAN, traced
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.modes.finder import ModeFinder
+from rodfem.modes.finder import ModeFinder, typical_modes
 from rodfem.modes.modes import Modes, save_modes
-from rodfem.modes.typical import typical_modes
 from rodfem.output.files import save_json, save_run
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no

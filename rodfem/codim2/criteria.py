@@ -1,28 +1,45 @@
-r"""What the points of a locus fulfil: its defining equations, as a corrector onto the curve.
+"""What the points of a locus fulfil: its defining equations, as a corrector onto the curve.
 
 Folds, branch points and divergence loads are where the second variation is singular: the equations of one of them
 (:mod:`rodfem.continuation.singular`) on a plane across the curve.  A branch point is one as long as its symmetry lasts:
-where the unfolding parameters do not vanish, or the equations change along the null vectors as the parameters follow
-the curve, a parameter is an imperfection.  Null vectors that a symmetry relates vanish together, or the curve ends.
-Flutter has equations of its own (:mod:`rodfem.codim2.collision`).
+if the unfolding parameters do not vanish, or the equations change along the null vectors as the parameters follow the
+curve, a parameter is an imperfection.  Null vectors that a symmetry relates vanish together, or the curve ends.
+
+At flutter two eigenvalues ``mu1``, ``mu2`` collide: ``D = ((mu1 - mu2)/2)^2`` vanishes
+(:mod:`rodfem.stability.cluster`; two pairs of equal ones if the rod bends alike in all planes).  The eigenvalues have a
+square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve unless the gradient
+of ``D`` vanishes (Seyranian & Mailybaev, *Multiparameter Stability Theory with Mechanical Applications*, World
+Scientific 2003, chapters 2 and 5).  A point of it is found on a line of the plane by the secant method for ``D``, its
+tangent from central differences.  Pairs that are equal by a symmetry have one ``D``; where they part, the curve ends.
+
+Other unstable eigenvalues are counted by the factors of a symmetric tangent matrix, and without a potential among all
+that the mesh has: those that are negative or complex.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.codim2.plane import Destroyed, Guess, LocusPoint, Plane
-from rodfem.codim2.unstable import UNSTABLE, VANISHED, unstable
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.singular import Curve, Section, SingularState, SingularSystem
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine, orthonormalize
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure, noise_of
+from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, TINY
 
+MET = 1e-4
+"""Imaginary part, relative to the eigenvalue, below which a pair has only just met: it has a square root there."""
+VANISHED = "another eigenvalue has vanished since the row before, seen from the start"
+UNSTABLE = "another frequency has become unstable, or stable, since the row before, seen from the start"
+"""What is said of a row where their number has changed, with a potential and without one."""
+NEAREST = "the index is that of the frequencies nearest zero: the mesh has too many unknowns to find all of them"
+"""What is said of a locus on a fine mesh."""
 SPLIT = 1.1
 """Times what eigenvalues, or the ``D`` of pairs, that are equal by a symmetry differ by that each may be off: to first
 order."""
@@ -31,6 +48,28 @@ IMPERFECT = 1e-7
 FEWER = 1e-5
 """Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
 their mean, are not equal by a symmetry."""
+FIRST = 1e-4
+"""First step of the secants, relative to the bounds."""
+SHARP, NOISE = 1e-12, 1e-4
+"""Steps of the secants that end them: by their own size, or where they no longer shrink."""
+FAR = 1e-6
+"""Step of the secants from which on they tell the slope of ``D``."""
+DIFFERENCE = 1e-3
+"""Step of the central differences of ``D``, relative to the bounds."""
+Zero = tuple[float, float, Measured, PETSc.Vec]
+"""Place of a zero of ``D`` on a line of parameters, its uncertainty, the cluster and the state there."""
+
+
+def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None = None) -> int:
+    """Unstable eigenvalues but for ``size`` ones: those nearest to zero, or of an invariant subspace.
+
+    Its ``basis`` (n, size) is orthonormal in the mass.
+    """
+    spectrum = pencil.spectrum
+    own = -abs(spectrum.values) if basis is None else pencil.shares(basis)
+    chosen = np.argsort(own, kind="stable")[: len(own) - size]
+    values, noise = spectrum.values[chosen], np.maximum(spectrum.zero, spectrum.noise[chosen])
+    return int(((values.real < -noise) | (abs(values.imag) > np.maximum(noise, MET * abs(values)))).sum())
 
 
 @dataclass(frozen=True)
@@ -47,14 +86,12 @@ class _Frame:
 
 
 class Singular:
-    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
+    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence.
+
+    It is bordered with the null vectors of a point ``near`` the curve in a ``plane``; ``solver`` has the mesh.
+    """
 
     def __init__(self, solver: BranchSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
-        """Border with the null vectors of a point ``near`` the curve, and the left ones where there are such.
-
-        ``solver`` has the mesh, ``plane`` the two parameters.  At a ``fold`` the single null vector is coupled to the
-        load; otherwise the points are branch points.
-        """
         self.solver, self.plane, self.fold = solver, plane, fold
         self.states = SingularSystem(solver, near.modes, np.eye(len(near.modes))[:, : near.multiplicity], fold=fold)
         self.inertia, self.metric = self.states.inertia, self.states.inertia.metric
@@ -109,7 +146,6 @@ class Singular:
         return np.asarray(np.maximum(abs(last), ROUND_OFF * np.maximum(self.plane.sizes, abs(p))))
 
     def _require(self, found: SingularState) -> None:
-        """Raise :class:`Destroyed` where an imperfection has taken the branch point apart, or null vectors part."""
         if not self.fold and found.size > IMPERFECT * self.inertia.scale:
             raise Destroyed(self._broken)
         if found.spread > FEWER * self.inertia.scale:
@@ -152,9 +188,8 @@ class Singular:
 def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
     """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
 
-    By borders that are arbitrary at first: each solution is a step of inverse iteration, and the better border.  Of
-    several the left ones are turned such that each is along the right one of the same number as far as it can be:
-    where a symmetry relates them ``G`` is a multiple of one.
+    By inverse iteration, of borders that are arbitrary at first.  Of several the left ones are turned to be along the
+    right ones of the same number: if a symmetry relates them ``G`` is a multiple of one.
     """
     states = SingularSystem(solver, [], np.eye(number), fold=False)
     metric = states.inertia.metric
@@ -167,3 +202,124 @@ def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[
     overlap = np.array([[(metric * v).dot(w) for w in left] for v in right])
     u, _, vt = np.linalg.svd(overlap)
     return right, [combine(left, column) for column in (vt.T @ u.T).T]
+
+
+class Collision:
+    """Corrects points of the plane to where two eigenvalues near ``omega2`` collide."""
+
+    others = UNSTABLE
+
+    def __init__(self, solver: BranchSolver, plane: Plane) -> None:
+        self.solver, self.plane = solver, plane
+        self.eigensolver = NonsymmetricSolver(solver.system)
+
+    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Size of a step: parameters over the widths of their bounds."""
+        return float(np.linalg.norm(dp / self.plane.width))
+
+    def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
+        """As :class:`~rodfem.codim2.plane.Criterion` says; the direction of the state plays no part.
+
+        Raises :class:`ConvergenceError`, and :class:`Destroyed` if pairs that met at once do not any more.
+        """
+        node, here = self._onto(guess, near, reach)
+        width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
+        basis, forward = _basis(near), guess[2] / width
+        gradient, clearest = np.zeros(2), here
+        # D has a pole at what is not admissible, as a mass of zero
+        steps = np.minimum(DIFFERENCE, self.plane.room(p) / 100 / width)
+        for which in (0, 1):
+            system.line = self.plane.line(p, self.plane.axis(which))
+            step = float(steps[which])
+            low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-step, step))
+            gradient[which] = (high.discriminant - low.discriminant) / (2 * step)
+            clearest = max((clearest, low, high), key=lambda m: m.spread)
+        if not np.linalg.norm(gradient):
+            raise ConvergenceError("the discriminant is constant")
+        if here.split > FEWER * max(omega2**2, system.scene.units.omega2**2):
+            raise Destroyed(f"its {here.cluster.size // 2} pairs of eigenvalues do not meet together any more")
+        dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
+        orientation = 1 if dq @ forward >= 0 else -1
+        basis = clearest.cluster.basis
+        rest = unstable(self.eigensolver.at(self.plane.at(p, x)), basis.shape[1], basis)
+        return replace(
+            node,
+            dp=orientation * dq * width,
+            orientation=orientation,
+            located_to=node.located_to + SPLIT * here.split * abs(gradient) / (gradient @ gradient) * width,
+            modes=as_vectors(system, basis),
+            rest=rest + (here.cluster.size if omega2 < 0 else 0),
+            lower=int(np.sign(gradient[0])),
+        )
+
+    def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
+        """See :class:`~rodfem.codim2.plane.Criterion`."""
+        return self._onto(guess, near, 1.0)[0]
+
+    def _onto(self, guess: Guess, near: LocusPoint, reach: float) -> tuple[LocusPoint, Measured]:
+        """Point of the curve on the line, and the cluster there; the tangent is the one that was given."""
+        p, x, dp, _ = guess
+        width, system = self.plane.width, self.solver.system
+        forward = dp / width / np.linalg.norm(dp / width)
+        across = np.array([-forward[1], forward[0]])
+        system.line = self.plane.line(p, across * width)
+        t, last, here, x = self._collide(x, Cluster(_basis(near), near.omega2), reach)
+        p = p + t * across * width
+        x = self.plane.at(p, x)
+        located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
+        ordinate, still = self.solver.shape.ordinate(x), system.new_vector()
+        return LocusPoint(p, x, forward * width, still, located, ordinate=ordinate, omega2=here.cluster.mean), here
+
+    def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
+        """Zero of ``D`` on the system's line of parameters, by secants.
+
+        These take ``D`` from the eigenvalues, and end near the zero, or where they no longer shrink.  The last digits
+        are by ``D`` of both subspaces, right and left.
+        """
+        t, other = 0.0, FIRST
+        now, x = self._measured(t, x, cluster)
+        at_other = self._measured(other, x, cluster)[0].discriminant
+        before = np.inf
+        slope = (at_other - now.discriminant) / (other - t)
+        for _ in range(12):
+            if now.discriminant == at_other:
+                break
+            step = -now.discriminant * (other - t) / (at_other - now.discriminant)
+            if abs(step) < SHARP or (abs(step) < NOISE and abs(step) > 0.3 * before):
+                return self._by_both_sides((t, abs(step), now, x), slope)
+            if abs(other - t) > FAR:
+                slope = (at_other - now.discriminant) / (other - t)
+            other, at_other, before = t, now.discriminant, abs(step)
+            t += step
+            if abs(t) > reach:
+                break
+            now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
+        raise ConvergenceError("two eigenvalues do not collide near by")
+
+    def _by_both_sides(self, found: Zero, slope: float) -> Zero:
+        """Correct a zero of ``D`` that was ``found`` twice, by its ``slope``.
+
+        The uncertainty is the last change and the round-off of ``D``.  If left vectors are not found, as beside a
+        double zero, the zero stays that of the eigenvalues.
+        """
+        t, _, now, x = found
+        with suppress(ConvergenceError):
+            for _ in range(2):
+                noise = noise_of(self.eigensolver.at(x), now)
+                step = -noise.two_sided / slope
+                t += step
+                now, x = self._measured(t, x, now.cluster)
+                found = t, abs(step) + abs(noise.discriminant / slope), now, x
+        return found
+
+    def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
+        """The cluster at ``t`` on the system's line of parameters, and the state there."""
+        x, outcome = self.solver.at_load(guess, t)
+        if not outcome.converged:
+            raise ConvergenceError("no equilibrium is found there")
+        return measure(self.eigensolver.at(x), cluster), x
+
+
+def _basis(near: LocusPoint) -> np.ndarray:
+    """Basis (n, size) of the invariant subspace at a point, this rank's n unknowns."""
+    return np.stack([v.array_r.real for v in near.modes], axis=1)

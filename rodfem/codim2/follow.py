@@ -1,38 +1,137 @@
-r"""Loci of special points in the plane of two parameters: the boundary of stability.
+"""Loci of special points in the plane of two parameters: the boundary of stability.
 
 A fold, a branch point, a flutter or a divergence load ``lam`` of a scene moves as another of its parameters does.  Its
-curve in the plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of
-the state and *both* parameters (see :mod:`rodfem.codim2.criteria` and :mod:`rodfem.codim2.collision`): neither is the
-independent one, so that the curve may turn back with respect to either, and a fold's curve goes through cusps, where it
-is smooth but for its projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the
-special point changes its kind.
+curve in the plane of both is followed by pseudo-arclength continuation of the equations that define it
+(:mod:`rodfem.codim2.criteria`), in the space of the state and *both* parameters: neither is the independent one, so
+that the curve may turn back with respect to either, and goes through cusps.  Both directions are followed, to the
+bounds, exactly, or to where the special point changes its kind.  Arclength is measured with the parameters relative to
+the widths of their bounds, and the state in its metric.
 
-Arclength is measured with the parameters relative to the widths of their bounds, and the state in its metric.
+Errors of rows are how far the curve of a richer discretisation is away.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.criteria import null_vectors
+from rodfem.adaptivity.error_estimate import RESOLVED_TO, Enriched, bound
+from rodfem.codim2.criteria import NEAREST, UNSTABLE, Collision, Singular, null_vectors, unstable
 from rodfem.codim2.curve import Half, Tracer
-from rodfem.codim2.errors import Errors, criterion_of, errors_of, not_integrated
 from rodfem.codim2.locus import Locus, Mark
 from rodfem.codim2.plane import Criterion, Interval, LocusPoint, Plane
-from rodfem.codim2.unstable import NEAREST, UNSTABLE, unstable
+from rodfem.codim2.points import place
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, KINDS
+from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, KINDS
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.quadrature_check import QuadratureCheck
+from rodfem.fem.transfer import halved
 from rodfem.output.files import mesh_of
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+
+
+class Errors(NamedTuple):
+    """Bounds (n, 2) of the errors of rows, nan where they are not estimated, inf if the richer mesh finds no point.
+
+    ``unresolved`` rows are those whose state, or null vectors, the mesh does not resolve.
+    """
+
+    error: np.ndarray
+    unresolved: list[int]
+
+
+def criterion_of(solver: BranchSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
+    """Defining equations in a ``plane`` of a ``kind`` of special points, ``near`` one; ``solver`` has the mesh."""
+    return Collision(solver, plane) if kind == FLUTTER else Singular(solver, plane, near, fold=kind == FOLD)
+
+
+class RicherMesh:
+    """The same locus, of a ``kind`` of special points in a ``plane``, on a discretisation one degree richer."""
+
+    def __init__(self, solver: BranchSolver, kind: str, plane: Plane) -> None:
+        """``solver`` has the mesh on which it was found."""
+        self.richer, self.kind = Enriched(solver), kind
+        self.plane = Plane(self.richer.system, plane.names[1], plane.intervals)
+        self.rho = halved(solver.system.fields.discretization.degree)
+        self._criterion: Criterion | None = None
+
+    def compare(self, node: LocusPoint) -> tuple[list[float], bool]:
+        """Bounds of the errors of both parameters, and whether the mesh resolves the state and its null vectors.
+
+        Raises :class:`ConvergenceError`.
+        """
+        near = self._transferred(node)
+        if self._criterion is None:
+            self._criterion = criterion_of(self.richer.solver, self.plane, self.kind, near)
+        resolved = True
+        if node.sought is None:
+            found = self._criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
+            there, located_to = found.p, found.located_to
+            resolved = self._changed(near, found) <= RESOLVED_TO
+        else:
+            sought = place(self._criterion, self.plane, near, node.sought, node.windows)
+            there, located_to = sought.p, sought.dp
+        each = zip(node.p, there, node.located_to + located_to, strict=True)
+        return [bound(*pair, self.rho) for pair in each], resolved
+
+    def _transferred(self, node: LocusPoint) -> LocusPoint:
+        x, dx = self.richer.transfer(node.x, state=True), self.richer.transfer(node.dx, state=False)
+        modes, left = ([self.richer.transfer(v, state=False) for v in side] for side in (node.modes, node.left))
+        return replace(node, x=x, dx=dx, modes=modes, left=left)
+
+    def _changed(self, near: LocusPoint, found: LocusPoint) -> float:
+        """Relative change of the strains of a state, or of one of its null vectors."""
+        norm, modes = self.richer.system.norm, near.modes[: near.multiplicity]
+        changes = [self.richer.indicator.changed(near.x, found.x, state=True)]
+        for first, last in zip(modes, found.modes, strict=False):
+            changes.append(self.richer.indicator.changed(first / norm(first), last / norm(last), state=False))
+        return max(changes)
+
+
+def errors_of(
+    solver: BranchSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: Iterable[int]
+) -> Errors:
+    """Estimate errors at some ``rows`` of ``nodes``: the distance to the curve of a richer discretisation.
+
+    It is measured across the curve, but for turning points and ends to those of the other curve.  ``solver``, ``kind``
+    and ``plane`` are those of the locus.
+    """
+    error, rows, unresolved = np.full((len(nodes), 2), np.nan), sorted(rows), set[int]()
+    if not rows:
+        return Errors(error, [])
+    richer = RicherMesh(solver, kind, plane)
+    for row in rows:
+        try:
+            error[row], resolved = richer.compare(nodes[row])
+            unresolved |= set() if resolved else {row}
+        except ConvergenceError:
+            error[row] = np.inf
+    beside = [{*rows[max(i - 1, 0) : i + 2]} for i in range(len(rows))]
+    doubtful = {row for row, near in zip(rows, beside, strict=True) if nodes[row].sought and near & unresolved}
+    return Errors(error, sorted(unresolved | doubtful))
+
+
+def not_integrated(solver: BranchSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> str:
+    """Take the errors away of ``nodes`` at which the mesh does not integrate the equations; a clause on the first.
+
+    ``solver`` has found the locus in a ``plane``; ``error`` (n, 2) is changed.
+    """
+    check, said = QuadratureCheck(solver.system), ""
+    for row in np.flatnonzero(np.isfinite(error[:, 0])):
+        node = nodes[row]
+        if words := check(plane.at(node.p, node.x)):
+            error[row] = np.nan
+            said = said or f"at {plane.words(node.p, 6)} {words}"
+    return said
+
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
@@ -52,31 +151,13 @@ def locus(
     *,
     doubtful: bool = False,
 ) -> Locus:
-    """Follow a special point in the plane of the scene's load and a second parameter, to both sides.
+    """Follow a ``special`` point in the plane of the scene's load and a second ``parameter``, to both sides.
 
-    Parameters
-    ----------
-    solver
-        The solver that found the special point.  It is left as it was.
-    special
-        A fold, a branch point, a flutter load or a divergence load.
-    parameter
-        Name of the second parameter of the scene.
-    bounds
-        Intervals of the load and of the second parameter, on which the curve ends exactly.
-    steps
-        Control of the step; lengths are relative to the bounds.
-    error_bars
-        At how many rows, besides the marked ones, the error of the discretisation is estimated; 0: at none.
-    doubtful
-        Whether the mesh leaves the index beside the special point open, so that it does not resolve the curve.
-
-    Raises
-    ------
-    InputError
-        For a parameter, bounds or a kind of special point that make no sense.
-    ConvergenceError
-        Where the special point itself is not found again.
+    ``bounds`` are their intervals, on which the curve ends exactly; lengths of ``steps`` are relative to them.  Errors
+    are estimated at the marked rows and so many others, ``error_bars``; 0: at none.  The ``solver`` is that of the
+    special point, and is left as it was; ``doubtful``: its mesh leaves the index beside the point open.  Raises
+    :class:`InputError` for a parameter, bounds or a kind that make no sense, :class:`ConvergenceError` if the special
+    point is not found again.
     """
     system, scene = solver.system, solver.system.scene
     plane = Plane(system, parameter, bounds)

@@ -40,55 +40,43 @@ class Mark:
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
-    ``scene`` and ``title`` name the rod, ``labels`` are those of the two parameters in mathematics, and
-    ``ordinate_name`` is that of the ordinate.  ``constants`` holds all parameters of the scene, and ``discretization``
-    formulation, elements and degree.
+    ``scene`` and ``title`` name the rod, ``labels``, ``words`` and ``units`` the two parameters in mathematics, words
+    and their units, ``ordinate_name`` the ordinate.  ``constants`` holds all parameters of the scene,
+    ``discretization`` formulation, elements and degree.
 
-    Attributes
-    ----------
-    kind
+    Attributes ---------- kind
         ``fold``, ``branch point``, ``flutter`` or ``divergence``.
-    names, bounds
-        The two parameters, the scene's load first, and their intervals.
-    values
-        Both parameters, (n, 2).
+    names, bounds, values
+        The two parameters, the scene's load first, their intervals, and both at each row, (n, 2).
     ordinate, natural
         The scene's ordinate, (n,), and its natural size, of which round-off is a part.
     index
         Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
-        negative.  Under loads without a potential the number of unstable eigenvalues, of those nearest to zero.
+        negative.  Under loads without a potential the number of unstable eigenvalues.
     lower
-        Side of the load on which the index is the lower one at the start: -1 below, 1 above, 0 where it is not known,
-        as for a fold.
+        Side of the load on which the index is the lower one at the start: -1 below, 1 above, 0 not known.
     omega2
         The double eigenvalue of flutter, (n,), nan for others.
     located_to
         How far the parameters are uncertain for the given discretisation, (n, 2): of turning points, cusps and ends
         also along the curve.
     error
-        How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
-        2); of turning points, cusps and ends how far those of that curve are, so also along it.  It is nan where it was
-        not asked for, inf where the richer one does not find the point.
+        How far, across the curve, that of a richer discretisation is away in either parameter, (n, 2); of turning
+        points, cusps and ends how far those of that curve are.  It is nan where it was not asked for, inf where the
+        richer one does not find the point.
     unresolved
-        Rows whose state, or null vector, the discretisation does not resolve, as far as that was examined, where errors
-        may exceed their bounds: all of them where it does not resolve the special point.
+        Rows whose state, or null vector, the discretisation does not resolve, where errors may exceed their bounds.
     planar
         Whether the rod is kept in a plane: the index is that of changes in it, and stability is not that in space.
     marks
         Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
         eigenvalue has passed through zero, not located.
-    start
-        Row of the special point from which the curve was started.
-    ended
-        Why it ends, at its first and at its last row.
+    start, ended
+        Row of the special point from which the curve was started; why it ends, at its first and at its last row.
     states
         State vector of each row, of the system on which the locus was computed; not saved.
     crossings
         Load and ordinate at the start, and wherever else the curve passes the second parameter's value there.
-    words
-        What the two parameters are, for the axes of pictures; empty where the scene does not say it.
-    units
-        Names of their units; empty where they have none.
     note
         Why errors that were asked for are not estimated; empty where they are.
     """

@@ -33,7 +33,7 @@ class Destroyed(ConvergenceError):
 
 @dataclass(frozen=True)
 class Sought:
-    """What marks a point along a curve: ``of`` a point is stationary there where ``stationary``, else it is zero."""
+    """What marks a point along a curve: ``of`` a point is zero there, or ``stationary``."""
 
     of: Callable[[LocusPoint], float]
     stationary: bool
@@ -44,15 +44,14 @@ class LocusPoint:
     """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
 
     ``located_to`` (2,) are the uncertainties of the parameters, ``ordinate`` is the scene's.  ``rest`` counts the
-    negative eigenvalues, or the unstable ones under loads without a potential, other than those that vanish or collide
-    here (-1: not counted); those that collide are real on the side ``lower`` of the load.  ``omega2`` is a double
-    eigenvalue.  At folds ``coupling`` (2,) is the derivative of the equations in the two parameters along the null
-    vector, in units of the bounds, and ``curvature`` the second one along it.  ``modes`` are the null vectors, as many
-    as the ``multiplicity``, and modes near by, or a basis of the double eigenvalue's invariant subspace; ``left`` are
-    the left null vectors where they are others.
-    ``orientation`` is the side of the tangent, -1 or 1, on which the defining function grows: it changes only where two
-    curves cross.  ``ended`` says why the curve ends here, empty where it does not.  A turning point or an end is
-    ``sought`` along the curve, and was found in ``windows`` of these half widths (:mod:`rodfem.codim2.place`).
+    negative (without a potential: unstable) eigenvalues but for those that vanish or collide here, -1: not counted;
+    those that collide are real on the side ``lower`` of the load.  ``omega2`` is a double eigenvalue.  At folds
+    ``coupling`` (2,) is the derivative of the equations in the two parameters along the null vector, in units of the
+    bounds, and ``curvature`` the second one along it.  ``modes`` are the null vectors, as many as the ``multiplicity``,
+    and modes near by, or a basis of the double eigenvalue's invariant subspace; ``left`` are the left null vectors
+    where they are others. ``orientation`` is the side of the tangent, -1 or 1, on which the defining function grows: it
+    changes only where two curves cross.  ``ended`` says why the curve ends here.  A turning point or an end is
+    ``sought`` along the curve, and was found in ``windows`` of these half widths.
     """
 
     p: np.ndarray
@@ -81,10 +80,9 @@ class LocusPoint:
 
 
 class Plane:
-    """Lines in the plane of two parameters of the scene of a system.
+    """Lines in the plane of two parameters of the scene of a system, the first of which is the scene's load.
 
-    The first parameter is the scene's load.  ``bounds`` (2, 2) are their ``intervals``, whose ``width`` (2,) scales
-    them, and ``sizes`` (2,) their natural sizes.
+    ``bounds`` (2, 2) are their ``intervals``, whose ``width`` (2,) scales them, and ``sizes`` (2,) their natural sizes.
     """
 
     def __init__(self, system: System, parameter: str, bounds: tuple[Interval, Interval]) -> None:
@@ -142,10 +140,7 @@ class Plane:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries.
-
-        A symmetry that the second parameter breaks is one of the scene all the same.
-        """
+        """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries."""
         system, verification = self.system, self.system.verification
         before, dropped, notices = (system.line, system.phase), {*verification.dropped}, [*verification.notices]
         try:
@@ -158,8 +153,7 @@ class Plane:
 class Criterion(Protocol):
     """Defining equations of a locus: a corrector onto it.
 
-    ``solver`` has the mesh.  ``others`` says of a row that the number of unstable eigenvalues but for those of the
-    locus has changed.
+    ``solver`` has the mesh; ``others`` says that the number of other unstable eigenvalues has changed at a row.
     """
 
     solver: BranchSolver
@@ -172,8 +166,8 @@ class Criterion(Protocol):
         """Point of the locus on the plane through a ``guess`` across its direction; raises :class:`ConvergenceError`.
 
         Across a direction of the parameters alone that is a line of theirs.  ``near`` is a point of the locus whose
-        null vectors, or invariant subspace, are close by.  ``reach`` bounds how far the state may move, in the metric.
-        Where the special point changes its kind a :class:`Destroyed` is raised.
+        null vectors, or invariant subspace, are close by; ``reach`` bounds how far the state may move, in the metric.
+        Raises :class:`Destroyed` where the special point changes its kind.
         """
 
     def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:

@@ -1,29 +1,44 @@
 """Points of codimension two between two nodes of a locus: cusps, and ends of folds and of flutter; and turning points.
 
 At a *cusp* of a fold its curvature vanishes and both parameters turn back, while the coupling of its null vector with
-the parameters does not vanish.  Where it does, in both of them at one place, the fold *ends on a branch point*: beyond
-it the curve is its own mirror image.  It may also *pass a branch point*, to other parameters.  A double eigenvalue that
+the parameters does not vanish.  If it does, in both of them at one place, the fold *ends on a branch point*: beyond it
+the curve is its own mirror image; or it *passes a branch point*, to other parameters.  A double eigenvalue that
 vanishes ends a curve of flutter.
 
-What changes sign between two nodes is located.  What changes it twice is looked for where a parabola or cubic through
-the nodes has its extremum: such a step is parted there.
+What changes sign between two nodes is located.  What changes it twice is looked for at the extremum of a parabola or
+cubic through the nodes: such a step is parted there.
+
+Points of a locus are known to the last digits *across* it, tangents by differences displace places along it.  Points
+on both sides are corrected to the curve at Chebyshev's points of a window of the tangent, and what is sought is read
+from the polynomials through them, with its uncertainty: the last two coefficients, which hold the round-off of the
+points and what the polynomial leaves out (L. N. Trefethen, *Approximation Theory and Approximation Practice*, SIAM
+2013, chapters 3 and 8), and the difference between the best two of several windows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial import Chebyshev
 
-from rodfem.codim2.place import ahead, place
-from rodfem.codim2.plane import REACH, Criterion, LocusPoint, Plane, Sought, between
+from rodfem.codim2.plane import REACH, Criterion, LocusPoint, Plane, Prediction, Sought, between
 from rodfem.continuation.kinds import GAP
+from rodfem.continuation.prediction import lagrange
 from rodfem.errors import ConvergenceError
+from rodfem.linalg.orthogonal import combine
 from rodfem.output.digits import number
 from rodfem.roots import zero_between
+from rodfem.tolerances import TINY
 
+WINDOWS = tuple(0.064 / 2**i for i in range(11))
+"""Half widths of windows, as arclengths, from wide to narrow."""
+POINTS = 8
+"""Points of a window: an even number, none of them in the middle, where the end of a fold is singular."""
+INSIDE = 0.5
+"""Part of the window, about its middle, in which what is sought must be."""
 LOCATED = 1e-8
 """Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
 UNPLACED = 1e-5
@@ -35,8 +50,6 @@ NONE = 1e-10
 no sign."""
 VANISHED, PASSED = 0.05, 1e-3
 """Share that is left of a coupling where it vanishes, at an end and beside a cusp: its place is known to no more."""
-ASIDE = 1e-2
-"""Distance from a cusp, over that of the nodes, at which the tangent has the direction that it has beside it."""
 TRIES = 8
 """Parabolas by which a least value in a step is sought, and times that a step is parted for more cusps than one."""
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
@@ -45,24 +58,118 @@ ENDS = "the fold ends on a branch point"
 DIVERGES = "the double eigenvalue vanishes: divergence"
 PASSES = "the fold passes a branch point"
 """Marks of rows; at the last one the coupling vanishes as well, but the fold goes on."""
-
 Row = tuple[LocusPoint, str]
 """A point of a locus and the kind of its mark; empty for none."""
 Test = Callable[[LocusPoint], float]
 """What vanishes at a point of codimension two."""
 
 
+@dataclass(frozen=True)
+class Place:
+    """Arclength ``s`` from the middle of a window, and its uncertainty ``ds``.
+
+    ``through`` are the polynomials of both parameters in the arclength, and ``nodes`` the points of a window of this
+    ``half`` width.  By ``apart`` (2,) the parameters of another window differ; ``windows`` are the half widths of both.
+    """
+
+    s: float
+    ds: float
+    through: list[Chebyshev]
+    nodes: list[LocusPoint]
+    half: float
+    apart: np.ndarray
+    windows: tuple[float, ...] = ()
+
+    @property
+    def p(self) -> np.ndarray:
+        """Both parameters there, (2,)."""
+        return self._parameters(self.s)
+
+    @property
+    def dp(self) -> np.ndarray:
+        """Uncertainties of both parameters that those along the curve bring, (2,)."""
+        return np.maximum(*(abs(self._parameters(self.s + side) - self.p) for side in (-self.ds, self.ds)))
+
+    def _parameters(self, s: float) -> np.ndarray:
+        return np.array([float(q(s)) for q in self.through])
+
+    def interpolated(self, node: LocusPoint) -> LocusPoint:
+        """The point there by the polynomials alone, with what ``node``, close by, has else: nothing is solved for."""
+        value, _ = lagrange(_arclengths(self.half), self.s)
+        across = np.max([n.located_to for n in self.nodes], axis=0)
+        x = combine([n.x for n in self.nodes], value)
+        return replace(node, p=self.p, x=x, located_to=across + self.dp + self.apart)
+
+
+def place(
+    criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, windows: tuple[float, ...] = WINDOWS
+) -> Place:
+    """Where ``sought`` is on the curve of a ``criterion`` through ``node``, close to it: the best of ``windows``.
+
+    These are half widths, as arclengths, from wide to narrow.  Windows that cannot be filled, or that leave the bounds
+    of the ``plane``, are passed over.  Raises :class:`ConvergenceError` where fewer than two can.
+    """
+    best: Place | None = None
+    other: Place | None = None
+    for half in windows:
+        try:
+            here = _in_window(criterion, plane, node, sought, half)
+        except ConvergenceError:
+            continue
+        best, other = (here, best) if best is None or here.ds < best.ds else (best, here)
+        if other is here:
+            break
+    if best is None or other is None:
+        raise ConvergenceError("no two windows about the point hold the curve")
+    both = (max(best.half, other.half), min(best.half, other.half))
+    return replace(best, ds=3 * best.ds + abs(best.s - other.s), apart=abs(best.p - other.p), windows=both)
+
+
+def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, half: float) -> Place:
+    """Where ``sought`` is, by points of a window of this ``half`` width; raises :class:`ConvergenceError`."""
+    t = _arclengths(half)
+    nodes = [criterion.onto(ahead(plane, node, float(s)), node) for s in t]
+    tables = [[sought.of(n) for n in nodes], *np.array([n.p for n in nodes]).T]
+    f, *through = (Chebyshev.fit(t, values, POINTS - 1, domain=[-half, half]) for values in tables)
+    # each coefficient may be wrong by as much as the last two: by |T_k(0)| times that the value, |T_k'(0)| the slope
+    order = np.arange(POINTS)
+    odd = order % 2 == 1
+    g, moves = (f.deriv(), np.where(odd, order / half, 0.0)) if sought.stationary else (f, np.where(odd, 0.0, 1.0))
+    wrong = float(abs(f.coef[-2:]).max() * moves.sum())
+    slope, s = g.deriv(), 0.0
+    for _ in range(POINTS):  # Newton's method
+        if not slope(s) or abs(s) > INSIDE * half:
+            break
+        s -= float(g(s) / slope(s))
+    ds = wrong / max(abs(float(slope(s))), TINY)
+    if not abs(s) + ds < INSIDE * half:
+        raise ConvergenceError("what is sought is not in the window")
+    return Place(s, ds, through, nodes, half, np.zeros(2))
+
+
+def ahead(plane: Plane, node: LocusPoint, s: float) -> Prediction:
+    """Point on the tangent of ``node``; raises :class:`ConvergenceError` out of the bounds."""
+    p = node.p + s * node.dp
+    if plane.outside(p) is not None:
+        raise ConvergenceError("the window leaves the bounds")
+    return p, node.x + node.dx * s, node.dp, node.dx
+
+
+def _arclengths(half: float) -> np.ndarray:
+    """Chebyshev's points of a window of this ``half`` width, (POINTS,)."""
+    return np.asarray(half * np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS))
+
+
 class Codim2Points:
     """Finds what lies between two nodes of a locus of a ``criterion`` in a ``plane``."""
 
     def __init__(self, criterion: Criterion, plane: Plane) -> None:
-        """Keep what solves for points, and the plane."""
         self.criterion, self.plane = criterion, plane
 
     def between(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> tuple[list[Row], str]:
         """Rows between two nodes, in their order, and why the curve ends there; empty where it does not.
 
-        ``a`` and ``b`` are one after the other, and ``before`` is the node before them, None where there is none.
+        ``a`` and ``b`` are one after the other, and ``before`` is the node before them, None if there is none.
         """
         if self._reverses(a, b):
             coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
@@ -78,11 +185,7 @@ class Codim2Points:
         return self._rows(a, b, before, TRIES), ""
 
     def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
-        """Point between two neighbours at which a parameter has a value; none where it cannot be located.
-
-        The neighbours are ``a`` and ``b``; parameter number ``which`` (0 or 1) has the given ``value`` there, but where
-        the curve turns back next to it.
-        """
+        """Point between neighbours ``a``, ``b`` where parameter ``which`` has a ``value``; none if not located."""
         node, axis = self.located(a, b, lambda n: float(n.p[which]) - value), self.plane.axis(which)
         if node is None:
             return []
@@ -123,7 +226,7 @@ class Codim2Points:
 
     def _sides(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
         """Points on both sides of a ``node`` between two others, none where these are as close."""
-        aside = ASIDE * (b.s - a.s)
+        aside = (b.s - a.s) / 100  # the tangent has the direction that it has beside a cusp
         both = node.s - aside, node.s + aside
         return [self._at(a, b, s) for s in both] if a.s < both[0] and both[1] < b.s else []
 
@@ -195,8 +298,7 @@ class Codim2Points:
     def _reverses(self, a: LocusPoint, b: LocusPoint) -> bool:
         """Whether coupling and tangent change their signs between two nodes, in each parameter that has some.
 
-        Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.  Where it
-        goes on to others it passes the branch point.
+        Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.
         """
         coupled = _coupled(a, b)
         moves = np.minimum(abs(a.dp), abs(b.dp)) > NONE * self.plane.width
@@ -211,8 +313,7 @@ class Codim2Points:
     def _end_of_fold(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
         """The end near ``node`` of a fold on a branch point, by interpolation between its two sides.
 
-        No point can be corrected to it: there the curve of branch points passes, on which corrections may slide along.
-        Nor has the fold a tangent of its own there, but for the cubic between ``a`` and ``b``.
+        No point can be corrected to it: the curve of branch points passes there, on which corrections may slide along.
         """
         node, sought = replace(self._on_cubic(a, b, node.s), p=node.p, x=node.x), _reversal(self.plane, a, b)
         try:
@@ -229,10 +330,9 @@ class Codim2Points:
         return replace(end, rest=end.rest + len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0)))
 
     def _end(self, a: LocusPoint, b: LocusPoint, share: float, end: LocusPoint | None) -> tuple[LocusPoint, str]:
-        """The last row and words for its place: ``end``, or else, or if that is not between the nodes, on their cubic.
+        """The last row and words for its place: ``end``, or if that is not between the nodes, on their cubic.
 
-        There the line through both values of what vanishes is zero, at a ``share`` of the step: it is off by no more
-        than it is from either of them.
+        There the line through both values of what vanishes is zero, at a ``share`` of the step.
         """
         if end is None or self.criterion.length(end.p - a.p, end.x - a.x) > b.s - a.s:
             end = _within(self._on_cubic(a, b, a.s + share * (b.s - a.s)), a, b)

@@ -26,9 +26,9 @@ from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors
 from rodfem.problem.units import Units
+from rodfem.stability.in_space import InSpace
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.near_zero import decide
-from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.symmetric import SymmetricSolver
 

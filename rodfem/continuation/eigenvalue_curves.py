@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.stability.frequencies import ALIKE, Frequencies, groups, orthonormal, product, squares
+from rodfem.stability.nonsymmetric import ALIKE, Frequencies, groups, orthonormal, product, squares
 from rodfem.tolerances import TINY
 
 STRANGE = 1.0

@@ -108,10 +108,9 @@ def _misfit(system: System, values: np.ndarray) -> np.ndarray:
 
 
 def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) -> PETSc.Vec:
-    """Add to a state smooth changes of all fields that no symmetry leaves alone; clamps are kept.
+    """Add to a state ``like`` smooth changes of all fields, by about ``amplitude``, that no symmetry leaves alone.
 
-    The state ``like`` of the ``system`` is changed by about ``amplitude``, in radian and in natural sizes of the rod;
-    ``seed`` is that of the random numbers.
+    Clamps of the ``system`` are kept; ``seed`` is that of the random numbers.
     """
     f, named, units = system.fields, system.at(like).named, system.scene.units
     rng = np.random.default_rng(seed)

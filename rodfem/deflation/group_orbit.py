@@ -27,11 +27,8 @@ from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.tolerances import NEGLIGIBLE
 
 FREQUENCIES = (0.5, 1.0)
-AMOUNTS = np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)
 STILL = 1e-20
 """Squared norm of a part of the velocity, relative to that of the state, below which it is round-off."""
-TURNS = 2 * np.pi * np.array([1.0, -1.0, 2.0, -2.0])
-"""By how much the angles of equal states of a planar rod may differ: a search winds it up no farther."""
 
 
 class Orbit:
@@ -79,7 +76,7 @@ class Orbit:
         """Amount for the state nearest to ``x``, given the metric times ``x``: the best of many, refined."""
         G, c = self.products, np.array([part.dot(image) for part in self.parts])
         start = (c[1] - G[0, 1]) / G[1, 1] if self.moves_on else 0.0
-        amounts = start + AMOUNTS
+        amounts = start + np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)
         w = self.weights(amounts)
         a = float(amounts[np.argmin(np.einsum("im,ij,jm->m", w, G, w) - 2 * c @ w)])
         for _ in range(6):
@@ -103,7 +100,7 @@ def same_rotations(system: System, x: PETSc.Vec) -> list[PETSc.Vec]:
     if system.scene.closed or system.comm.allreduce(held, op=MPI.LOR):
         return []
     values = state.named[field]
-    others = [-values] if field == "q" else [values + turn for turn in TURNS]
+    others = [-values] if field == "q" else [values + 2 * np.pi * turn for turn in (1, -1, 2, -2)]
     out = [system.vector(f.filled(state.named | state.scalars | {field: other}), state.drifts) for other in others]
     for image in out:
         system.set_load(image, system.scalar(x))
@@ -117,7 +114,6 @@ class Orbits:
     """
 
     def __init__(self, system: System) -> None:
-        """Start with none; translations, whose generators are the same at all states, are told from rotations."""
         self.system = system
         self.states: list[PETSc.Vec] = []
         self.orbits: list[dict[int, Orbit]] = []

@@ -1,34 +1,53 @@
 r"""Deflation: further equilibria at one load, whether or not a branch connects them to those that are known.
 
-Each try starts from a smooth seeded guess, a known state that is turned, and iterates by Newton's method on equations
-from which the known equilibria are divided out (:mod:`rodfem.deflation.deflated_newton`).  What a symmetry makes of a
-known equilibrium is known too: a continuous symmetry makes it a circle (:mod:`rodfem.deflation.group_orbit`), discrete
-ones a few isolated images (:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain
-Newton method, and kept if it is new and admissible.  States of known branches are found by
-:mod:`rodfem.deflation.known`.
+Each try starts from a smooth seeded guess, a known state that is turned.  A few steps of gradient flow (backward Euler:
+Newton's method with ``K + alpha M`` for ``K``) fit its multipliers, which far from equilibrium matter more than all
+else: of guesses turned by 0.8 from a straight hemitropic rod 4 of 20 led to a buckled state without them, 20 with them.
+Then it iterates by Newton's method on equations from which the known equilibria are divided out (Farrell, Birkisson &
+Funke, SIAM J. Sci. Comput. 37 (2015) A2026-A2045) ::
+
+    G(x) = M(x) F(x),    M(x) = prod_i (1 / d_i(x)^2 + 1),    d_i(x) = distance of x from the known equilibrium i.
+
+They keep all their solutions but those.  ``G'`` differs from ``M F'`` by a matrix of rank one, so that its Newton step
+is the plain one ``p = -F'^-1 F``, rescaled (Sherman & Morrison) ::
+
+    step = p / (1 - grad log M . p),    grad log M . p = -sum_i 2 <x - x_i, p> / (d_i^2 (1 + d_i^2)).
+
+The distance is that of the system's metric: at a given load the rotation determines the strains and multipliers of a
+rod with a convex energy.  What a symmetry makes of a known equilibrium is known too: ``d_i`` is the distance from the
+nearest point of its orbit (:mod:`rodfem.deflation.group_orbit`), and discrete symmetries add isolated images
+(:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
+new and admissible.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from math import inf, isfinite, nan
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Point
+from rodfem.continuation.arc import Arc
+from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.observer import Observer
-from rodfem.deflation.deflated_newton import FLOW, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
+from rodfem.deflation.group_orbit import Orbits
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.fem.newton import correct
+from rodfem.fem.newton import LARGEST, Correction, Limits, NewtonResult, correct, linear_step, newton, relative_size
 from rodfem.fem.system import System
 from rodfem.problem.end import TURNS
-from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD
+from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD, TINY
 
+NEAR = 1e-4
+"""Plain Newton steps below this, in the metric and relative in natural sizes, end the deflated iteration: the plain one
+takes over."""
+FLOW = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
+"""Reciprocal time steps of the gradient flow, over the rod's lowest bending eigenvalue."""
 LEAST, GREATEST = 0.3, 3.0
 """Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
 SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
@@ -62,25 +81,16 @@ class SearchLog:
         )
 
 
-class Deflation(DeflatedNewton):
-    """Search for equilibria of a :class:`~rodfem.continuation.branch_solver.BranchSolver`'s scene at one load.
+class Deflation:
+    """Search for equilibria at one ``load``, on the mesh of a ``solver``, beside the ``known`` ones at that load.
 
-    Attributes
-    ----------
-    found
-        New equilibria, one of each set that the symmetries carry into each other.
-    tally
-        How the tries ended.
-    mirrors
-        Discrete symmetries of the scene at this load.
+    New ones are ``found``, one of each set that the symmetries carry into each other; the ``tally`` says how tries
+    ended, ``mirrors`` are the discrete symmetries.  ``seed`` is that of the random guesses.  Raises :class:`InputError`
+    for a known equilibrium at another load.
     """
 
     def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
-        """Deflate the known equilibria and their images; :class:`InputError` where one is at another load.
-
-        ``solver`` has the mesh, ``load`` is that of all ``known`` points, and ``seed`` that of the random guesses.
-        """
-        super().__init__(solver)
+        self.solver, self.system, self.known = solver, solver.system, Orbits(solver.system)
         self.load, self.seed = load, seed
         scene = self.system.scene
         scene.parameters[scene.load].check(scene.load, load)
@@ -95,9 +105,8 @@ class Deflation(DeflatedNewton):
         self.bases: list[PETSc.Vec] = []
         self.found: list[Point] = []
         self.energies: list[float] = []
-        self.slides = any(
-            s.along for s in self.system.symmetries
-        )  # then states shifted along the rod are one, and known by their energy
+        # states shifted along the rod are one, and known by their energy
+        self.slides = any(s.along for s in self.system.symmetries)
         self.tally = SearchLog(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
         for point in known:
             self._deflate(point.x)
@@ -126,6 +135,71 @@ class Deflation(DeflatedNewton):
                 self.found.append(point)
                 self._deflate(point.x)
         return self.found
+
+    def flow(self, x: PETSc.Vec, alphas: Sequence[float] = FLOW) -> None:
+        """Steps of gradient flow from ``x``, in place: towards constraints, lower energy, and multipliers that fit."""
+        system = self.system
+        for alpha in alphas:
+            system.set_phase(None)
+            # backward Euler for M x' = -F(x), linearised: (S + alpha M) dx = -F
+            step = linear_step(system, x, self.solver.axis, alpha * self.solver.inertia.scale)
+            size = nan if step is None else system.norm(step)
+            if step is None or not isfinite(size) or not self._advance(x, step, -min(1.0, LARGEST / max(size, TINY))):
+                return
+
+    def approach(self, x: PETSc.Vec) -> NewtonResult:
+        """Deflated Newton steps from ``x``, in place, until a plain step is small.
+
+        A step is never longer than ``LARGEST``, and is halved while it leads to where the stored energy has no value.
+        """
+        system = self.system
+
+        def iteration(fresh: bool) -> Correction | None:
+            system.set_phase(x)
+            step = linear_step(system, x, self.solver.axis)
+            if step is None:
+                return None
+            step.scale(-1.0)
+            distance = system.norm(step)
+            # the plain step measures the distance from a solution of F = 0: plain Newton converges from here
+            size = max(distance, relative_size(system, x, step))
+            if isfinite(size) and size >= NEAR:
+                factor = self.rescaling(x, step)
+                factor *= min(1.0, LARGEST / max(abs(factor) * distance, TINY))
+                if not self._advance(x, step, factor):
+                    return None
+            return Correction(distance, size)
+
+        return newton(iteration, Limits(60, inf, NEAR))
+
+    def rescaling(self, x: PETSc.Vec, step: PETSc.Vec) -> float:
+        """Factor that makes a plain Newton step at ``x`` the step of the deflated equations."""
+        # grad log M . p, a sum over the known equilibria: see the module
+        image = self.system.metric * step
+        slope = 0.0
+        for d, apart in self.known.nearest(x):
+            d = max(d, NEGLIGIBLE)
+            slope -= 2 * apart.dot(image) / (d * d * (1 + d * d))
+        return 1.0 / (1.0 - slope) if abs(1.0 - slope) > NEGLIGIBLE else 1.0 / NEGLIGIBLE
+
+    def _advance(self, x: PETSc.Vec, step: PETSc.Vec, factor: float) -> bool:
+        """Add ``factor`` times a step, halved while the stored energy has no value there; False if it never has."""
+        system, equations = self.system, self.system.new_vector()
+        for _ in range(10):
+            trial = x + step * factor
+            self._normalise(trial)
+            system.at(trial).residual(equations)
+            if isfinite(equations.norm()):
+                trial.copy(x)
+                return True
+            factor /= 2
+        return False
+
+    def _normalise(self, x: PETSc.Vec) -> None:
+        """Make the nodal quaternions of ``x`` of unit length."""
+        state, f = self.system.at(x), self.system.fields
+        normalised = {f.turning.name: f.turning.normalised(state.turned)}
+        self.system.vector(f.filled(state.named | normalised), state.drifts).copy(x)
 
     def nearest_known(self, x: PETSc.Vec) -> float:
         """Distance of a state from all that is known, images by symmetries included; infinite if that is nothing."""
@@ -185,9 +259,8 @@ class Deflation(DeflatedNewton):
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
     """Known state turned by a smooth rotation that respects clamps, its vector of that root mean square size.
 
-    The vector is a random combination of the lowest four waves along the rod that vanish where directors are clamped.
-    It depends on the nodes and the seed only, not on how the rod is shared among ranks.  ``base`` is the known state of
-    the ``system``, ``amplitude`` the size in radian, ``seed`` that of the random numbers.
+    The vector, of this ``amplitude``, is a random combination of the lowest four waves along the rod that vanish where
+    directors are clamped; it depends on the nodes and the ``seed`` only.  ``base`` is a state of the ``system``.
     """
     f = system.fields
     rng = np.random.default_rng(seed)
@@ -204,10 +277,9 @@ def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[i
 
 
 def turned_over(system: System, base: PETSc.Vec) -> list[PETSc.Vec]:
-    """Known state turned as a whole by half a turn about d1, and about d2, where both ends turn freely; else none.
+    """Known state ``base`` turned over, half a turn about d1, and about d2, where both ends turn freely; else none.
 
-    Waves along the rod never get there: a rod between two pins may hang below the one that it stands on.  Newton's
-    method moves the ends to where they are held.  ``base`` is the known state of the ``system``.
+    Waves along the rod never get there: a rod between two pins may hang below the one that it stands on.
     """
     if system.scene.closed or any(end.turning != TURNS for end in system.scene.sides):
         return []
@@ -230,23 +302,71 @@ def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
     return np.where(k % 2, np.sin(2 * np.pi * ((k + 1) // 2) * x), np.cos(2 * np.pi * ((k + 1) // 2) * x))
 
 
-def find_equilibria(
-    solver: BranchSolver,
-    load: float,
-    known: Sequence[Point] = (),
-    tries: int = 24,
-    seed: int = 0,
-    observer: Observer | None = None,
-) -> list[Point]:
-    """Equilibria at ``load`` beside the ``known`` ones, from ``tries`` deflated Newton iterations.
+class Coexisting(NamedTuple):
+    """An equilibrium with its symmetric copies: so many mirror images, itself among them.
 
-    Each stands for all that the scene's symmetries make of it, and carries its index, energy, ordinate and a tangent in
-    the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
-    Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one.  ``solver`` has
-    the mesh, and ``seed`` is that of the random guesses.
+    Continuous symmetries that it breaks, ``freedoms`` of them, make a circle (a torus, a line) of each.
     """
-    search = Deflation(solver, load, known, seed)
-    found = search.run(tries)
-    if observer is not None:
-        observer.note(str(search.tally))
+
+    point: Point
+    images: int
+    freedoms: int
+
+
+def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
+    """An equilibrium with the number of its copies."""
+    system, known, phase = solver.system, Orbits(solver.system), solver.system.phase
+    known.add(point.x)
+    images = [mirror(system, point.x) for mirror in mirrors(system, point.x)]
+    system.phase, count = phase, 1
+    for x in images:
+        if all(apart >= APART for apart, _ in known.nearest(x)):
+            known.add(x)
+            count += 1
+    return Coexisting(point, count, system.active_drifts(point.x))
+
+
+def equilibria_at(
+    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
+) -> list[Point]:
+    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
+
+    A row at that load is one; none counts twice, as where branches begin and end at one state, or what the symmetries
+    carry into each other.  Raises :class:`ConvergenceError` where there is none between two points on either side of
+    the load.  ``here`` brings points of ``branches`` to the mesh of ``solver``, where they are on others.
+    """
+    found, known = list[Point](), Orbits(solver.system)
+    for branch in branches:
+        for point in _along(solver, [here(p) for p in branch.points], load, singular_states(branch)):
+            if all(apart >= APART for apart, _ in known.nearest(point.x)):
+                point.branch = branch.name
+                found.append(point)
+                known.add(point.x)
     return found
+
+
+def singular_states(branch: Branch) -> set[int]:
+    """Ids of the states of a branch that are those of folds and branch points."""
+    first = {id(branch.points[0].x)} if branch.parent else set()
+    return first | {id(s.point.x) for s in branch.special if s.kind.singular}
+
+
+def _along(solver: BranchSolver, points: Sequence[Point], load: float, singular: set[int]) -> Iterator[Point]:
+    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh.
+
+    At those whose states are ``singular``, by their ids, Newton's method at the load itself has nothing to go by: they
+    are what was located.
+    """
+    for a, b in zip(points, [*points[1:], None], strict=True):
+        if a.load == load and id(a.x) in singular:
+            yield solver.point(a.x, a.arclength, a.tangent)
+        elif a.load == load:
+            x, outcome = solver.at_load(a.x, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(
+                    f"No equilibrium was found at {solver.system.scene.load} = {load:g} beside a row there: use more "
+                    "elements, or another load."
+                )
+            yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)
+        if b is not None and (a.load - load) * (b.load - load) < 0:
+            yield Arc(solver, a, b).at_load(load)

@@ -29,8 +29,7 @@ from rodfem.continuation.kinds import FLUTTER, Kind
 from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
-from rodfem.stability.frequencies import ALIKE, MULTIPLE, groups
-from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricPencil, NonsymmetricSolver, groups
 from rodfem.stability.spectrum import SHIFT, Spectrum, inside
 from rodfem.tolerances import TINY, round_off, unit
 

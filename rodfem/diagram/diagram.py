@@ -16,14 +16,14 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import EVENT, KINDS
 from rodfem.continuation.step_control import StepControl
-from rodfem.deflation.known import Coexisting, equilibria_at, with_copies
+from rodfem.deflation.search import Coexisting, equilibria_at, with_copies
 from rodfem.diagram import tables
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
+from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
-from rodfem.modes.typical import typical_modes
 from rodfem.output.files import as_data, origin, save_run
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.roles import derived

@@ -10,7 +10,7 @@ from math import isfinite
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.gaps import Gap, arms
+from rodfem.adaptivity.mesh_sequence import Gap, arms
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
@@ -18,8 +18,7 @@ from rodfem.continuation.reduced import lines
 from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
-from rodfem.deflation.known import equilibria_at
-from rodfem.deflation.search import find_equilibria
+from rodfem.deflation.search import Deflation, equilibria_at
 from rodfem.diagram.equilibria import ahead, first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
 from rodfem.diagram.tracer import Tracer
@@ -66,7 +65,10 @@ class Explorer(Tracer):
         self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
         with self.solver.system.clock.scope("search"):
             known = equilibria_at(self.solver, self.branches, load, self.here)
-            return find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
+            search = Deflation(self.solver, load, known)
+            found = search.run(self.plan.tries)
+            self.observer.note(str(search.tally))
+            return found
 
     def _on_branch(self, point: Point, first: int = 0) -> bool:
         """Whether a point is on one of the branches traced, from number ``first`` on."""

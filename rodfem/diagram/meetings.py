@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rodfem.continuation.eigenvalue_curves import assignment
-from rodfem.stability.frequencies import ALIKE, groups
+from rodfem.stability.nonsymmetric import ALIKE, groups
 from rodfem.stability.spectrum import Spectrum, times
 
 LOWER = 0.7

@@ -16,7 +16,7 @@ from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.deflation.search import find_equilibria
+from rodfem.deflation.search import Deflation
 from rodfem.diagram.equilibria import check_index, first_state
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
@@ -269,7 +269,7 @@ class Solver:
                 "A search by deflation needs a scene whose loads all have a potential: "
                 f"{', '.join(self.scene.without_potential())} has none."
             )
-        return [self.examined(p) for p in find_equilibria(self.equilibria, load, known, tries, seed)]
+        return [self.examined(p) for p in Deflation(self.equilibria, load, known, seed).run(tries)]
 
 
 def state_of(point: Point | SpecialPoint | PETSc.Vec) -> PETSc.Vec:

@@ -8,8 +8,7 @@ from math import inf
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.gaps import Gap, Gaps
-from rodfem.adaptivity.mesh_sequence import Meshes
+from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.crossings import Node, Zeros, fourth
 from rodfem.continuation.kinds import IMPERFECT

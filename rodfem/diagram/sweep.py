@@ -32,8 +32,15 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.ranks import as_failure, without
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
-from rodfem.stability.frequencies import REAL, Frequencies, named
-from rodfem.stability.nonsymmetric import FREQUENCIES, NonsymmetricPencil, NonsymmetricSolver, begins_slowly
+from rodfem.stability.nonsymmetric import (
+    FREQUENCIES,
+    REAL,
+    Frequencies,
+    NonsymmetricPencil,
+    NonsymmetricSolver,
+    begins_slowly,
+    named,
+)
 from rodfem.tolerances import DRIFT, unit
 
 LOADS = 101

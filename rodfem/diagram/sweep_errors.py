@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
+from rodfem.adaptivity.error_estimate import OrdinateBound, bound
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER

@@ -2,7 +2,7 @@
 
 Whatever is solved for hands the loop an *iteration*: what moves the unknowns by one correction.  That of a state on a
 plane is here, by LU factors of the bordered matrix; states held by forces, singular states and states away from known
-ones have theirs (:mod:`rodfem.continuation.singular`, :mod:`rodfem.deflation.deflated_newton`).
+ones have theirs (:mod:`rodfem.continuation.singular`, :mod:`rodfem.deflation.search`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 r"""The singular pencil of a state, Kumar & Healey (2010), (21), in given coordinates.
 
-The pencil ``(K C; C^t 0) x = mu (M 0; 0 0) x`` of :mod:`rodfem.stability.blocks` in three sets of coordinates:
+The pencil ``(K C; C^t 0) x = mu (M 0; 0 0) x`` of :mod:`rodfem.stability.pencil` in three sets of coordinates:
 
 * ``full``: the unknowns as they are, four components of ``q`` at each node and the multiplier ``eta`` of its norm;
 * ``tangent``: a spin ``theta`` in the space frame at each node, ``dq = 1/2 theta q``.  The sparse map ``T`` takes it to
@@ -45,17 +45,16 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix
 from rodfem.problem.end import CLOSING_MOMENT
-from rodfem.stability.blocks import Blocks, Pencil
-from rodfem.stability.pencil import symmetry_modes, weighed_modes
+from rodfem.stability.pencil import Blocks, Pencil, symmetry_modes, weighed_modes
 
 COORDINATES = ("full", "tangent", "compatible")
 
 
 @dataclass(frozen=True)
 class MappedPencil(Pencil):
-    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones.
+    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones; ``symmetric`` but under a follower load.
 
-    It is ``symmetric`` but under a follower load.  The rows of spins are ``where["theta"]``.
+    The rows of spins are ``where["theta"]``.
     """
 
     T: sp.csr_matrix

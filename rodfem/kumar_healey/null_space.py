@@ -35,18 +35,11 @@ Step = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Kernel:
-    """Basis ``Q2`` (m, m - p) of the kernel of ``C^t``.
+    """Basis ``Q2`` (m, m - p) of the kernel of ``C^t``; ``size`` is ``m``, ``padded`` that with rows added.
 
-    Attributes
-    ----------
-    size, padded
-        ``m``, and the number of rows with those added.
-    steps
-        Factors of ``Q``, first to last.
-    free
-        Rows on which the kernel of the sparse columns lives after these, (k,).
-    reflections
-        Factorisation of the dense columns in these rows, as LAPACK's ``dgeqrf`` leaves it, and its scalars.
+    ``steps`` are the factors of ``Q``, first to last.  The kernel of the sparse columns lives on the ``free`` rows
+    (k,); ``reflections`` are the factorisation of the dense columns there, as LAPACK's ``dgeqrf`` leaves it, and its
+    scalars.
     """
 
     size: int
@@ -93,10 +86,10 @@ class Kernel:
 
 
 def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
-    """Kernel of ``C^t``, for ``C`` (m, p) and the arclengths of its columns' groups (p,), nan for a dense column.
+    """Kernel of ``C^t``, for ``C`` (m, p) and arclengths ``place`` (p,) of groups of columns, nan for a dense one.
 
-    Raises :class:`InputError` where a constraint depends on the others, where there are more than unknowns, or where a
-    row couples more than two neighbouring groups.
+    Raises :class:`InputError` if a constraint depends on the others, if there are more than unknowns, or if a row
+    couples more than two neighbouring groups.
     """
     C = sp.csr_matrix(C, copy=True)
     m, p = C.shape
@@ -152,8 +145,7 @@ def _eliminated(C: sp.csr_matrix, group: np.ndarray, scale: float) -> Kernel:
 def _links(C: sp.csr_matrix, group: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Rows (links, rows) of each link, what they couple on its left and right (links, rows, width), and a number.
 
-    From that number on they are empty rows, which make all links equally long.  Rows of C that couple nothing are left
-    out.
+    From that number on they are empty rows, which make all links equally long.
     """
     m, width = C.shape[0], int(np.bincount(group).max())
     groups = 2 ** int(np.ceil(np.log2(group.max() + 2))) - 1

@@ -1,9 +1,9 @@
-r"""Eigenvalues by reduction: the pencil of a state on the null space of its constraints.
+"""Eigenvalues by reduction: the pencil of a state on the null space of its constraints, and by the Cayley transform.
 
 With ``C = (Q1 Q2) (R; 0)`` from :mod:`rodfem.kumar_healey.null_space`, the perturbations that fulfil the constraints
 are ``x = Q2 z``, and the singular pencil ``(K C; C^t 0), (M 0; 0 0)`` of size m + p becomes
 
-    Q2^t K Q2 z = mu Q2^t M Q2 z,        of size m - p,
+    Q2^t K Q2 z = mu Q2^t M Q2,        of size m - p,
 
 whose finite eigenvalues are those of the former, without its 2p infinite ones (Kumar & Healey 2010, (21)-(32)).
 
@@ -11,20 +11,27 @@ A Krylov space of the inverse of the shifted matrix, ``A = K - sigma M``, finds 
 
     T = (Q2^t A Q2)^-1 Q2^t M Q2,        T z = z / (mu - sigma).
 
-The inverse is a block of that of a sparse saddle point matrix:
+The inverse is a block of that of a sparse saddle point matrix (``inverse="saddle"``):
 
     ( A    C ) ( x )   ( Q2 b )
     ( C^t  0 ) ( y ) = (  0   ),        (Q2^t A Q2)^-1 b = Q2^t x:
 
-the second row puts x in the kernel, Q2^t times the first is Q2^t A Q2 z = b (``inverse="saddle"``).  It holds whenever
-C has full rank and sigma is no eigenvalue, also where A itself is singular.  Elimination of x, (32),
+the second row puts x in the kernel, Q2^t times the first is Q2^t A Q2 z = b.  It holds if C has full rank and sigma is
+no eigenvalue, also if A itself is singular.  Elimination of x, (32) (``inverse="elimination"``),
 
-    (Q2^t A Q2)^-1 = Q2^t [A^-1 - A^-1 C (C^t A^-1 C)^-1 C^t A^-1] Q2        (``inverse="elimination"``),
+    (Q2^t A Q2)^-1 = Q2^t [A^-1 - A^-1 C (C^t A^-1 C)^-1 C^t A^-1] Q2,
 
-factors A alone and needs p solves and a dense p x p matrix more: for a few integral constraints.  It fails where A is
-singular although the reduced matrix is not.  So it is in the pointwise formulation without mass (``rho_A = 0``) or with
-sigma = 0, where A has no entry for the centreline at all, and where sigma is an eigenvalue of the unconstrained pencil.
+factors A alone and needs p solves and a dense p x p matrix more: for a few integral constraints.  It fails if A is
+singular although the reduced matrix is not: in the pointwise formulation without mass (``rho_A = 0``) or with
+sigma = 0, where A has no entry for the centreline, and if sigma is an eigenvalue of the unconstrained pencil.
 
+The Cayley transform ``(mu - a2) / (mu - a1)`` with ``a1 = (mu1 + mu2) / 2`` and ``a2 = 2 mu2 - a1`` is 3 at the first
+eigenvalue, -1 at the second, and less than one in size beyond: the first dominates.  Along a branch the two are
+estimated by those of the point before.  It belongs to the matrix
+
+    (K - a1 M)^-1 (K - a2 M) = 1 + (a1 - a2) (K - a1 M)^-1 M,
+
+whose Krylov spaces are those of ``(K - a1 M)^-1 M`` for any ``a2``: shift-invert with the shift ``a1``.
 Every rank has the whole matrices and computes the same.
 """
 
@@ -36,23 +43,26 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
+from petsc4py import PETSc
 from scipy.sparse.linalg import splu
 
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.kumar_healey.coordinates import MappedPencil
+from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
 from rodfem.kumar_healey.null_space import kernel
 from rodfem.linalg.orthogonal import generic
+from rodfem.stability.methods import NEAR_ZERO, Found, Interval, Method, SymmetricMethod, Workspace
+from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.spectrum import FINITE, krylov
 
 INVERSES = ("saddle", "elimination")
-SPARE = 14
-"""Eigenvalues that are sought beyond those wanted: a Krylov space has the second of two equal ones late."""
 SINGULAR = 1e-6
 """Relative residual of a solve above which its matrix counts as singular."""
 RANK = 1e-10
 """Square of a part, relative to the vector's, below which it depends on others."""
 
 Solve = Callable[[np.ndarray], np.ndarray]
+APART = 1e-3
+"""Eigenvalues closer than this, relative to the greatest, are one for the parameters of the transform."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +77,7 @@ class Reduced:
     errors: np.ndarray
 
 
-class Reduction:
+class ReducedPencil:
     """The reduced eigenproblem of a pencil: blocks ``K``, ``C``, ``M`` and the ``kernel`` of ``C^t``."""
 
     def __init__(self, pencil: MappedPencil, inverse: str = "saddle") -> None:
@@ -81,8 +91,8 @@ class Reduction:
     def near(self, number: int, target: float) -> Reduced:
         """Return the ``number`` eigenvalues nearest to ``target``, of equally near ones the left.
 
-        With a target below the spectrum they are the left-most ones.  Raises :class:`InputError` for more eigenvalues
-        than there are rows, :class:`ConvergenceError` where fewer are found, or where the shifted matrix is singular.
+        Raises :class:`InputError` for more eigenvalues than there are rows, :class:`ConvergenceError` if fewer are
+        found, or the shifted matrix is singular.
         """
         n = self.kernel.dimension
         if number > n:
@@ -93,7 +103,8 @@ class Reduction:
             return self.kernel.project(solve(self.M @ self.kernel.expand(z)))
 
         start = T(generic(np.arange(n)))  # no massless part
-        nu, z = krylov(T, n, min(number + SPARE, n), start)
+        # a Krylov space has the second of two equal eigenvalues late: more are sought
+        nu, z = krylov(T, n, min(number + 14, n), start)
         finite = abs(nu) > FINITE * abs(nu).max()
         nu, vectors = nu[finite], self.kernel.expand(z[:, finite])
         if self.symmetric:  # round-off may make a complex pair of a double eigenvalue: its parts span the same plane
@@ -162,3 +173,74 @@ class Reduction:
             return np.asarray(x - border @ scipy.linalg.lu_solve(capacitance, columns.T @ x))
 
         return solve
+
+
+class Reduction(Method):
+    """A Krylov space of the reduced pencil."""
+
+    def __init__(self, work: Workspace) -> None:
+        super().__init__(work)
+        self.coordinates = Coordinates(work.system)
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """With a shift below the spectrum."""
+        below = self.work.below(x)
+        found = self.reduced(x).near(number, below.solver.shift)
+        return self.lifted(found, below.certifies(found.values), 1)
+
+    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+        """With a shift near zero."""
+        found = self.reduced(x).near(number, NEAR_ZERO * scale_in_units(self.work.system))
+        return Found(self.work.one * found.values, [], found.errors, factorisations=1)
+
+    def reduced(self, x: PETSc.Vec) -> ReducedPencil:
+        """The reduced pencil at ``x``, symmetry modes left out."""
+        return ReducedPencil(self.coordinates.without_modes(x, self.work.sizes))
+
+    def lifted(self, found: Reduced, certified: bool, factorisations: int, note: str = "") -> Found:
+        """What was ``found``, as vectors of the system in its units; ``certified``: a count finds no more.
+
+        It cost so many ``factorisations``, and a ``note`` goes after the reason.
+        """
+        vectors = self.coordinates.lift(found.vectors, self.work.sizes)
+        return Found(self.work.one * found.values, vectors, found.errors, certified, factorisations, note)
+
+
+class Cayley(Reduction, SymmetricMethod):
+    """Its shift is from estimates of the two left-most eigenvalues, or from those of the last state."""
+
+    def __init__(self, work: Workspace) -> None:
+        super().__init__(work)
+        self._shift: float | None = None
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """With the shift of the last state; with a new one where a count finds some missing."""
+        below, reduced = self.work.below(x), self.reduced(x)
+        made, note = 0, ""
+        for fresh in (False, True):
+            if self._shift is None or fresh:
+                self._shift = cayley_shift(reduced.near(3, below.solver.shift).values)
+                made += 1
+            try:
+                # the first two are equally far from the shift: more are asked for than wanted where they are multiple
+                found = reduced.near(min(number + 2, reduced.kernel.dimension), self._shift)
+            except ConvergenceError:
+                continue
+            made += 1
+            found = Reduced(found.values[:number], found.vectors[:, :number], found.errors[:number])
+            if certified := below.certifies(found.values):
+                break
+        else:
+            found = reduced.near(number, below.solver.shift)
+            certified = below.certifies(found.values)
+            made += 1
+            note = ", but a count found some missing (equal eigenvalues): completed by shift-invert"
+        if number > 1:
+            self._shift = cayley_shift(found.values)
+        return self.lifted(found, certified, made, note)
+
+
+def cayley_shift(values: np.ndarray) -> float:
+    """``a1``, the mean of the first of ascending ``values`` (k,), k > 0, and of the next that is not equal."""
+    others = values[values > values[0] + APART * abs(values).max()]
+    return float((values[0] + others[0]) / 2) if len(others) else float(values[0] + abs(values).max() / 4)

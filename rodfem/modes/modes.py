@@ -20,10 +20,10 @@ Symmetry modes, whose eigenvalue is zero for a reason, come after the others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 SYMMETRY, RIGID = "symmetry", "rigid motion"
 """Names of the motion in a symmetry mode, and in one of a rod that nothing holds, under loads without a potential."""
+TYPICAL = "modes"
+"""Group of a branch in ``states.h5`` that has modes at a few of its states, one state a row of each array."""
 FIELDS = ("value", "residual", "error", "displacement", "rotation", "rotation_body")
 LEFT = ("left_displacement", "left_rotation", "weight_displacement", "weight_rotation")
 
@@ -56,8 +58,8 @@ class Modes:
     value
         Eigenvalues ``mu = omega^2`` (K,); those of symmetries, zero, come last.  Complex under non-conservative loads.
     residual, error
-        Backward errors of the eigenpairs, and estimated errors of the discretisation (K,); nan where not estimated, and
-        for symmetries.
+        Backward errors of the eigenpairs, and estimated errors of the discretisation (K,); nan where not estimated,
+        and for symmetries.
     motion
         What each does: :data:`SYMMETRY`, bending about a director, torsion, or a mixture.
     displacement, rotation
@@ -115,13 +117,11 @@ def save_modes(
     first: bool,
     scene: Scene | None = None,
 ) -> None:
-    """Append the modes of one state to an HDF5 file (``first``: a new one), to be called on one rank.
+    """Append the ``modes`` of a ``row`` of a ``branch`` to the HDF5 file ``path`` (``first``: a new one), on one rank.
 
     ``about`` says in the file's attributes what rod it is.  Group ``/branches/<branch>/<row>``, named as in
     ``states.h5``, has the state's ``load``, ``s``, ``r``, ``q`` and the arrays of :class:`Modes`; a complex number is a
-    compound of ``r`` and ``i``.  Of a ``scene``, if given, what holds and loads it is written for pictures, as in
-    ``states.h5`` (see :func:`rodfem.problem.supports.write`).  ``modes`` are those of row ``row`` of ``branch``;
-    ``path`` is that of the file.
+    compound of ``r`` and ``i``.  What holds and loads the ``scene``, if given, is written for pictures.
     """
 
     def add(file: h5py.File) -> None:
@@ -152,8 +152,7 @@ def load_modes(path: Path | str, branch: str, row: int) -> Modes:
             MODES.check_hdf5(file, ("branches",))
             group = file[f"branches/{branch}/{row}"]
             names = [name for name in Modes.__dataclass_fields__ if name != "note"]
-            missing = [name for name in names if name not in group]
-            if missing:
+            if missing := [name for name in names if name not in group]:
                 raise InputError(
                     f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another "
                     "version of rodfem wrote it; run the scene again."
@@ -185,7 +184,7 @@ def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path
 
 
 def rows_with_modes(path: Path) -> list[tuple[str, int]]:
-    """Branches and rows that a file has modes of, none without a file; raises :class:`InputError` where it is unfit."""
+    """Branches and rows that a file has modes of, none without a file; raises :class:`InputError` if it is unfit."""
     if not path.exists():
         return []
     try:
@@ -215,3 +214,78 @@ def _contents(path: Path | str) -> str:
             return "it has " + "; ".join(f"{name}, row {', '.join(rows)}" for name, rows in file["branches"].items())
     except UNREADABLE:
         return f"run a scene with {Argument('Plan', 'modes')} and {Argument('Plan', 'at')}"
+
+
+class Few(NamedTuple):
+    """Some modes of a state, of unit kinetic energy; arrays are complex under loads without a potential.
+
+    Eigenvalues ``value`` (K,), those of symmetries, zero, last; backward errors ``residual`` (K,), nan for symmetries;
+    ``motion``, the name of each; ``displacement`` and ``rotation`` (K, m, 3) in the space frame.
+    """
+
+    value: np.ndarray
+    residual: np.ndarray
+    motion: tuple[str, ...]
+    displacement: np.ndarray
+    rotation: np.ndarray
+
+
+@dataclass(frozen=True)
+class Typical:
+    """Modes ``found`` at the ``row`` of a branch; None where they were not, and why so is the ``trouble``."""
+
+    row: int
+    found: Few | None
+    trouble: str = ""
+
+
+def write_typical(group: h5py.Group, typical: Sequence[Typical]) -> None:
+    """Write modes into the ``group`` of a branch; nothing without any state."""
+    if not typical:
+        return
+    own, text = group.create_group(TYPICAL), h5py.string_dtype()
+    own["row"] = [each.row for each in typical]
+    own.create_dataset("trouble", data=[each.trouble for each in typical], dtype=text)
+    for name in Few._fields:
+        rows = [each.found and getattr(each.found, name) for each in typical]
+        if name == "motion":
+            own.create_dataset(name, data=_stacked(rows, ""), dtype=text)
+        else:
+            own[name] = _stacked(rows, np.nan)
+
+
+def _stacked(rows: Sequence[Any], nothing: Any) -> np.ndarray:
+    """Arrays, some of them None, as the rows of one, filled up with ``nothing``."""
+    given = [np.asarray(row) for row in rows if row is not None]
+    if not given:
+        return np.full((len(rows), 0), nothing, dtype=object if nothing == "" else float)
+    shape = tuple(np.max([row.shape for row in given], axis=0).astype(int))
+    dtype = object if nothing == "" else np.result_type(*given)
+    out = np.full((len(rows), *shape), nothing, dtype=dtype)
+    for place, row in zip(out, rows, strict=True):
+        if row is not None:
+            array = np.asarray(row)
+            place[tuple(map(slice, array.shape))] = array
+    return out
+
+
+def typical_of(group: Mapping[str, Any]) -> Iterator[Typical]:
+    """Modes in the group of a branch, open or in memory: in order of their rows; none where the file has none."""
+    if TYPICAL not in group:
+        return
+    own = group[TYPICAL]
+    arrays = {name: own[name][()] for name in ("row", "trouble", *Few._fields)}
+    for i, row in enumerate(arrays["row"]):
+        trouble, value = _text(arrays["trouble"][i]), arrays["value"][i]
+        count = int(np.isfinite(value).sum())
+        if trouble:
+            yield Typical(int(row), None, trouble)
+            continue
+        nodes = int(np.isfinite(arrays["rotation"][i][0, :, 0]).sum())
+        moved = (arrays[name][i][:count, :nodes] for name in ("displacement", "rotation"))
+        names = tuple(_text(name) for name in arrays["motion"][i][:count])
+        yield Typical(int(row), Few(value[:count], arrays["residual"][i][:count], names, *moved))
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)

@@ -14,9 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
-from rodfem.modes.modes import RIGID, SYMMETRY, load_modes, rows_with_modes
-from rodfem.modes.recorded import Few
-from rodfem.modes.recorded import read as recorded
+from rodfem.modes.modes import RIGID, SYMMETRY, Few, load_modes, rows_with_modes, typical_of
 from rodfem.output.digits import eigenvalue_in_words
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.pieces import typical_state
@@ -67,7 +65,7 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
     """Modes of a branch by its rows, those with error bars in the file ``path``, and why others have none."""
     name, modes = branch["name"], {}
     zeros = [0] * len(shapes.r) if "omega2" in branch["columns"] else branch["columns"]["zero"]
-    typical = {each.row: each for each in recorded(group)}
+    typical = {each.row: each for each in typical_of(group)}
     exact = {row for other, row in rows_with_modes(path) if other == name}
     for row in sorted({*typical, *exact} & {*range(len(shapes.r))}):
         few, nodes = getattr(typical.get(row), "found", None), group["s"][row]

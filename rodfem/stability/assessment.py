@@ -14,9 +14,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.shape import Shape
 from rodfem.ranks import as_failure
-from rodfem.stability.blocks import Blocks
-from rodfem.stability.dependence import rank_of
+from rodfem.stability.dependence import require_independent_constraints
 from rodfem.stability.methods import Found, Method, Workspace
 from rodfem.stability.near_zero import Decision, decide
 from rodfem.stability.registry import AUTO, METHODS, find
@@ -37,29 +37,20 @@ class Verdict:
     negative, zero, undecided
         Index, number of zero eigenvalues (symmetry modes included), and of those whose sign is not decided, which are
         not among the negative ones; under non-conservative loads the number of eigenvalues with a negative real part
-        or an imaginary part, of all that the mesh has (of those found, where it is too large for
-        :class:`~rodfem.stability.spectrum.Spectrum`), and that of free motions.
+        or an imaginary part, of all that the mesh has (of those found, if it is too large), and that of free motions.
     values, vectors, errors
         Left-most eigenvalues ``mu = omega^2`` without symmetry modes (under non-conservative loads those nearest zero),
-        their vectors (without multipliers where constraints were reduced), and backward errors.  No vectors where mu is
-        complex.
-    band
-        Half width of the interval about zero, relative to the system's metric, in which inertia alone decides nothing.
-    inside, uncertainty
-        Rayleigh quotients of the eigenvalues inside the band, and their round-off.
+        vectors (without multipliers if constraints were reduced; none if mu is complex), and backward errors.
+    band, inside, uncertainty
+        Half width of the interval about zero, in the metric, in which inertia alone decides nothing; Rayleigh quotients
+        of the eigenvalues in it, and their round-off.
     certified
         Whether counts prove that none is missing among the values.
-    seconds, factorisations
-        Cost of the verdict.
-    method, reason
-        How it was done, and why so.
-    soft
-        Eigenvalues near zero in the metric, by name: those of :meth:`rodfem.Solver.assess`.
-    kink
-        What has a kink at the very state, the equations, by :meth:`rodfem.Solver.assess`: the numbers are those
-        of one side, and stability is undecided.
-    uncompared
-        Why :meth:`rodfem.Solver.assess` could not compare the index with that of a richer mesh; empty where it did.
+    seconds, factorisations, method, reason
+        Cost of the verdict, how it was done, and why so.
+    soft, kink, uncompared
+        Of :meth:`rodfem.Solver.assess`: eigenvalues near zero in the metric, by name; what has a kink at the very
+        state, where the numbers are those of one side; why the index was not compared with that of a richer mesh.
     """
 
     negative: int
@@ -94,7 +85,6 @@ class Verdict:
         return replace(counts, soft=tuple(point.soft))
 
     def __str__(self) -> str:
-        """One line for the terminal."""
         values = ", ".join(f"{v:.10g}" for v in self.values) or "none computed"
         proof = ", none missing" if self.certified and len(self.values) else ""
         alone = f"; not compared with a richer mesh: {self.uncompared}" if self.uncompared else ""
@@ -112,7 +102,6 @@ class Assessor(Workspace):
     """Judges states of one system; keeps matrices, symbolic factorisations and the last modes for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Keep a :class:`~rodfem.fem.system.System`, given itself or by its solver."""
         super().__init__(source)
         self._methods: dict[str, Method] = {}
 
@@ -132,13 +121,11 @@ class Assessor(Workspace):
         return name, "as asked"
 
     def __call__(self, x: PETSc.Vec, method: str = AUTO, number: int = 4, interval: Any = None) -> Verdict:
-        """Assess the equilibrium ``x``.
+        """Assess the equilibrium ``x`` by a ``method`` of :mod:`rodfem.stability.registry`, or ``auto``.
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
-        :class:`InputError` for a method that does not exist or apply, for dependent constraints, and on a small mesh
-        for more eigenvalues than it has,
-        :class:`ConvergenceError` where an eigensolver fails.  ``method`` is a name of :mod:`rodfem.stability.registry`,
-        or ``auto``.
+        :class:`InputError` for a method that does not exist or apply, for dependent constraints, and for more
+        eigenvalues than a small mesh has, :class:`ConvergenceError` if an eigensolver fails.
         """
         name, reason = self.choose(method, number)
         if number < 0:
@@ -174,10 +161,7 @@ class Assessor(Workspace):
         )
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Found:
-        """The ``number`` left-most eigenpairs of the conservative state ``x`` alone, without its index.
-
-        Raises :class:`ConvergenceError` where the eigensolver fails.
-        """
+        """The ``number`` left-most eigenpairs of the conservative state ``x`` alone, without its index."""
         name, _ = self.choose(AUTO, number)
         with as_failure(self.system.comm):
             return self._method(name).leftmost(x, number, None)
@@ -194,14 +178,13 @@ class Assessor(Workspace):
         try:
             return decide(self.inertia.at(x))
         except ConvergenceError:
-            rank_of(Blocks(self.system).assemble(x), length=self.system.scene.length)
+            require_independent_constraints(Shape(self.system), x)
             raise
 
 
 def assess(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
     """Assess one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch.
 
-    ``source`` is the system or solver, ``x`` its equilibrium; ``method`` and ``number`` are those of
-    :meth:`Assessor.__call__`.
+    ``source``, ``x``, ``method`` and ``number`` are as there.
     """
     return Assessor(source)(x, method, number)

@@ -12,14 +12,13 @@ from rodfem.stability.inertia import inertia_factors
 
 
 class Bordered:
-    """A square ``matrix`` of a system with dense borders, a column and a row each, and its factors.
+    """A square ``matrix`` of a system with a number of dense ``borders``, a column and a row each, and its factors.
 
-    Those of a symmetric one, ``constraints`` of whose eigenvalues are negative whatever the state, count the rest; with
-    None it is not symmetric, and nothing is counted.
+    Those of a symmetric one, ``constraints`` of whose eigenvalues are negative whatever the state, count the rest;
+    None: it is not symmetric, and nothing is counted.
     """
 
     def __init__(self, system: System, matrix: PETSc.Mat, borders: int, constraints: int | None) -> None:
-        """Allocate for a number of borders of a matrix that was assembled once."""
         self.system, self.k, self.constraints = system, borders, constraints
         self.comm, self.last = system.comm, system.has_scalars
         self.extra = borders if self.last else 0
@@ -58,8 +57,8 @@ class Bordered:
     def factor(self, matrix: PETSc.Mat, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
         """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count.
 
-        The ``rows`` of the borders are the same as the ``columns`` unless given.  Raises :class:`ConvergenceError`
-        where the bordered matrix is singular, too.
+        The ``rows`` of the borders are the ``columns`` unless given.  Raises :class:`ConvergenceError` if it is
+        singular.
         """
         self.values[: self.own][~self._border] = matrix.getValuesCSR()[2].real
         local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]

@@ -36,9 +36,8 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import local_rows
-from rodfem.stability.frequencies import REAL, STILL, Frequencies
 from rodfem.stability.inertia import EPS, NOISE
-from rodfem.stability.nonsymmetric import NonsymmetricPencil
+from rodfem.stability.nonsymmetric import REAL, STILL, Frequencies, NonsymmetricPencil, squares
 from rodfem.tolerances import TINY
 
 BESIDE = 1e-3
@@ -100,10 +99,10 @@ def members(
 ) -> tuple[Frequencies, list[int], np.ndarray]:
     """Eigenvalues of a ``pencil`` near the mean of a ``cluster`` that are its own, by shares in its ``basis``.
 
-    Their vectors are right ones, or ``left`` ones.  Returns what was found, the places of its own in that, and their
-    values.  Of left vectors, which are orthogonal to the right ones of all other eigenvalues, any share tells.  Right
-    vectors are not orthogonal: those of rigid motions, zero at all loads of a rod that floats, may have a greater share
-    in the subspace than its own.  They are none of a cluster away from zero.  Raises :class:`ConvergenceError`.
+    Vectors are right ones, or ``left`` ones.  Returns what was found, the places of its own in that, and their values.
+    Of left vectors, orthogonal to the right ones of all other eigenvalues, any share tells.  Right vectors are not
+    orthogonal: rigid motions of a floating rod may have a greater share than its own, and belong to no cluster away
+    from zero.  Raises :class:`ConvergenceError`.
     """
     size, beside = cluster.size, BESIDE * pencil.system.scene.units.omega2
     least = REAL if left else LEAST
@@ -111,7 +110,7 @@ def members(
     for number, times in ((size + 2, 1.0), (3 * size + 10, FARTHER)):  # one beside the shift takes digits from others
         found = pencil.near(number, cluster.mean + times * (shift - cluster.mean), left=left)
         inside = pencil.product(basis, found.weighed)
-        energy = pencil.squares(found.vectors, found.weighed)
+        energy = squares(pencil.system.comm, found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
         if found.floating and abs(cluster.mean) > beside:
             share[abs(found.values) < STILL * found.far] = 0.0
@@ -123,10 +122,9 @@ def members(
 
 
 def closed(values: np.ndarray, share: np.ndarray, size: int) -> list[int]:
-    """Places of the ``size`` ones of eigenvalues (k,) with the greatest shares (k,), closed under conjugation.
+    """Places of the ``size`` eigenvalues (k,) with the greatest shares (k,), closed under conjugation, or fewer.
 
-    Where a third one comes by it may have a greater share than one of a complex pair.  Fewer are returned where there
-    are not as many.
+    Where a third one comes by it may have a greater share than one of a complex pair.
     """
     order = np.argsort(-share, kind="stable")
     above, real = (order[of[order]] for of in (values.imag > 0, values.imag == 0))
@@ -161,9 +159,9 @@ def real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
 class ClusterNoise(NamedTuple):
     """Uncertainty of the ``mean`` and of the ``discriminant`` of a cluster by round-off in the matrix.
 
-    What the eigensolver left open of the two, ``mean_left`` and ``discriminant_left``, is added to it.  The ``square``
-    is ``|B|^2 / k``: the magnitude of ``D`` where vectors are orthogonal, much more where they are nearly one.
-    ``two_sided`` is ``D`` by both bases, which has less of that error than the eigenvalues have.
+    ``mean_left`` and ``discriminant_left`` are what the eigensolver left open.  The ``square`` is ``|B|^2 / k``: the
+    magnitude of ``D`` if vectors are orthogonal, much more if they are nearly one.  ``two_sided`` is ``D`` by both
+    bases.
     """
 
     mean: float
@@ -185,10 +183,7 @@ class ClusterNoise(NamedTuple):
 
 
 def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
-    """Uncertainties of a cluster by round-off, at the state of its pencil.
-
-    Raises :class:`ConvergenceError` where the left vectors of its eigenvalues are not found.
-    """
+    """Uncertainties of a cluster by round-off; :class:`ConvergenceError` if its left vectors are not found."""
     V, size = measured.cluster.basis, measured.cluster.size
     found, chosen, _ = members(pencil, V, measured.cluster, left=True)
     weighed = pencil.weighed(V)

@@ -1,4 +1,4 @@
-r"""The rank of the constraints, and whether they depend on one another at a state, which is known to some digits only.
+r"""Whether the constraints depend on one another at a state, which is known to some digits only.
 
 The index and all eigenvalues rest on the constraints' gradients ``C`` (m, p) having full column rank.  Its smallest
 singular value ``sigma`` says how far it is from losing it; for pointwise constraints on linear elements it shrinks like
@@ -10,20 +10,17 @@ greatest eigenvalue of ``(C^t C)^-1``, found by Lanczos' method.  Products with 
 
 the condition number of this sparse matrix is that of ``C``, where ``C^t C`` would square it.
 
-Where ``C`` loses rank multipliers are not unique, and no index is defined.  That is so
+Where ``C`` loses rank multipliers are not unique, and no index is defined: if a constraint follows from others, or at
+single states.  A rod that cannot stretch, between ends as far apart as it is long, is *taut*: turned by ``theta``
+across its axis it shortens by ``int theta^2 / 2``, to first order not at all.  A tension that is the same all along is
+in the kernel of ``C``, on any mesh: any balances the straight rod.  From each thrust at which it buckles a branch
+begins there, and which of them Newton's method finds round-off decides.
 
-* where a constraint follows from others, at all states that fulfil them;
-* at single states.  A rod that cannot stretch, between ends as far apart as it is long, is *taut*: turned by ``theta``
-  across its axis it shortens by ``int theta^2 / 2``, to first order not at all.  A tension that is the same all along
-  is in the kernel of ``C``, of the rod and on any mesh: any balances the straight rod.  At this one load a branch
-  begins from each tension, a thrust, at which it buckles, and which of them Newton's method finds round-off decides.
-
-The smallest singular value ``sigma`` of ``C`` is zero there, but Newton's method converges by halves to such a state
-and ends some ``1e-8`` beside, where ``sigma`` is as small; so it is where factors without pivots are round-off.  With
+Newton's method converges by halves to such a state and ends some ``1e-8`` beside, where ``sigma`` is as small.  With
 the unit vectors ``C w = sigma u`` the derivative of ``sigma`` is ``H u``, where ``H`` is the second derivative of
 ``w . c``, the part of the Lagrangian's that belongs to the multipliers ``w``.  ``sigma / |H u|`` is, to first order,
-the least distance of a state at which constraints depend, whatever their units and the mesh.  Where it is within the
-accuracy of states, the constraints depend on one another.
+the least distance of a state at which constraints depend, whatever their units and the mesh.  Within the accuracy of
+states the constraints depend on one another.
 """
 
 from __future__ import annotations
@@ -39,17 +36,11 @@ from rodfem.errors import SceneError
 from rodfem.fem.newton import STALLED
 from rodfem.fem.shape import Shape
 from rodfem.linalg.orthogonal import generic
-from rodfem.stability.blocks import Blocks, Pencil
+from rodfem.stability.pencil import Blocks, Pencil
 from rodfem.tolerances import NEGLIGIBLE
 
 DIRECTION = 1e-6
 """Relative tolerance of ARPACK for the vector of the least singular value."""
-PASSES = 8
-"""Number of times that rows and columns are scaled by the roots of their norms: each halves what is left in digits."""
-SMALL = 300
-"""Number of columns up to which the singular values are computed by LAPACK."""
-REMEDY = "remove those that follow from the others."
-"""What to do about constraints that depend on one another."""
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 DOUBTFUL = 1e-5
 """A singular value above this, relative to the greatest column, is far from zero."""
@@ -57,44 +48,38 @@ ROUND = 1e-9
 """Distance from the scene's start, in the metric, below which a state is that start: Newton's tolerance."""
 TAUT = 1e-9
 """Slack over length below which a rod may be taut, and the part of a direction that counts as none."""
-SLACKEN = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let it stretch."
-"""What to do about a taut rod."""
 
 
 def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec | None = None) -> None:
     """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others.
 
-    Where ``x`` is the scene's ``start`` but for round-off they are taken there, where gradients that vanish are zero.
+    If ``x`` is the scene's ``start`` but for round-off they are taken there, where gradients that vanish are zero.
     ``shape`` is that of the states of the system.
     """
     system = shape.system
     if start is not None and system.norm(start - x) < ROUND:
         x = start
-    words = [u.group.equation.format(u.component + 1) for u in system.fields.unknown_scalars if u.multiplier]
-    remedy = SLACKEN if taut(shape, x) else REMEDY
     blocks = Blocks(system)
     pencil = blocks.assemble(x)
-    sigma = rank_of(pencil, words, system.scene.length, remedy)
-    if np.isinf(sigma) or sigma > DOUBTFUL * greatest(pencil.C, 0):
-        return
-    for w in _doubtful(pencil, system.scene.length):
-        if _distance(blocks, x, pencil, w) < STALLED:
-            raise SceneError(dependent(pencil, words, w, sigma, remedy))
+    for sigma, w in weak_combinations(pencil, system.scene.length):
+        if sigma < NEGLIGIBLE or (sigma < DOUBTFUL and _distance(blocks, x, pencil, w) < STALLED):
+            equations = [
+                u.group.equation.format(u.component + 1) for u in system.fields.unknown_scalars if u.multiplier
+            ]
+            remedy = "remove those that follow from the others."
+            if taut(shape, x):
+                remedy = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let "
+                remedy += "it stretch."
+            raise SceneError(f"Constraints depend on one another ({named(pencil, equations, w)}): {remedy}")
 
 
 def may_depend(shape: Shape, x: PETSc.Vec) -> bool:
-    """Whether constraints may depend on one another at the state ``x``: a scene has some, or the rod is taut.
-
-    ``shape`` is that of the states of the system.
-    """
+    """Whether constraints may depend on one another at the state ``x``: a scene has some, or the rod is taut."""
     return bool(shape.system.scene.constraints) or taut(shape, x)
 
 
 def taut(shape: Shape, x: PETSc.Vec) -> bool:
-    """Whether a rod that cannot stretch is straight at the state ``x``, and both ends are held along it.
-
-    ``shape`` is that of the states of the system.
-    """
+    """Whether a rod that cannot stretch is straight at the state ``x``, and both ends are held along it."""
     scene = shape.system.scene
     if scene.closed or 2 in scene.free_strains:
         return False
@@ -105,31 +90,29 @@ def taut(shape: Shape, x: PETSc.Vec) -> bool:
     return min(held) > 1.0 - TAUT
 
 
-def _doubtful(pencil: Pencil, length: float) -> Iterator[np.ndarray]:
-    """Multipliers (p,) along which the gradients nearly cancel, of columns as they are, and of unit ones.
+def weak_combinations(pencil: Pencil, length: float) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield what is left where gradients cancel best, over the greatest, and their multipliers (p,).
 
-    Parameters
-    ----------
-    pencil
-        Blocks of the state.
-    length
-        Of the rod: positions are measured by it.
+    Of unit gradients, and of gradients as they are: one that nearly vanishes is a unit one all the same, but it may be
+    small for its unit alone, so that its size is at least :data:`NEGLIGIBLE`.  Positions are over the ``length``.
     """
-    C = sp.diags(units(pencil, length)) @ pencil.C
-    for scale in (np.ones(C.shape[1]), 1.0 / norms(C, 0)):
-        scaled = C @ sp.diags(scale)
-        sigma, vector = smallest_singular(scaled)
-        if sigma < DOUBTFUL * greatest(scaled, 0):
-            yield scale * vector
+    C = sp.diags(_units(pencil, length)) @ pencil.C
+    norms = np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).ravel())
+    if not len(norms):
+        return
+    scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
+    sigma, vector = smallest_singular(C @ sp.diags(scale))
+    yield sigma, scale * vector
+    sigma, vector = smallest_singular(C)
+    yield max(sigma / norms.max(), NEGLIGIBLE), vector
 
 
 def _distance(blocks: Blocks, x: PETSc.Vec, pencil: Pencil, w: np.ndarray) -> float:
     """Distance of the state ``x`` from one where the gradients cancel along multipliers ``w`` (p,), to first order.
 
-    It is the root mean square over the unknowns, positions over the rod's length; ``pencil`` is that of the state, made
-    by ``blocks``.
+    It is the root mean square over the unknowns, positions over the rod's length.
     """
-    change, unit = pencil.C @ w, units(pencil, blocks.system.scene.length)
+    change, unit = pencil.C @ w, _units(pencil, blocks.system.scene.length)
     sigma = float(np.linalg.norm(unit * change))
     change *= unit**2 / (sigma or 1.0)
     # the blocks are linear in the multipliers: of this many both parts have entries of one size
@@ -143,11 +126,19 @@ def _distance(blocks: Blocks, x: PETSc.Vec, pencil: Pencil, w: np.ndarray) -> fl
     return sigma / steepness
 
 
+def _units(pencil: Pencil, length: float) -> np.ndarray:
+    """Natural size of each row (m,) of a pencil: that of a position is the ``length`` of the rod."""
+    found = np.ones(pencil.C.shape[0])
+    for name in {"r", "ends"} & set(pencil.where):
+        found[pencil.where[name]] = length
+    return found
+
+
 def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     """Smallest singular value of ``C`` (m, p), p > 0, and its right vector (p,); zero where C is exactly singular."""
     C = sp.csr_matrix(C)
     m, p = C.shape
-    if p <= SMALL or p > m:
+    if p <= 300 or p > m:  # LAPACK takes no time
         _, s, vt = np.linalg.svd(C.toarray(), full_matrices=p > m)
         return (float(s[-1]) if p <= m else 0.0), vt[-1]
     size = float(np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()))
@@ -159,115 +150,26 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     def product(b: np.ndarray) -> np.ndarray:
         return np.asarray(lu.solve(np.append(np.zeros(m), -b.ravel()))[m:] / size)
 
-    start = generic(np.arange(p))
-    start = product(product(start))
+    start = product(product(generic(np.arange(p))))
     if not np.isfinite(start).all():
         return 0.0, np.full(p, p**-0.5)
-    start /= np.linalg.norm(start)
     operator = spl.LinearOperator((p, p), matvec=product, dtype=float)
-    _, vectors = spl.eigsh(operator, k=1, which="LM", v0=start, tol=DIRECTION, ncv=min(20, p - 1))
+    _, vectors = spl.eigsh(
+        operator, k=1, which="LM", v0=start / np.linalg.norm(start), tol=DIRECTION, ncv=min(20, p - 1)
+    )
     vector = vectors[:, 0] / np.linalg.norm(vectors[:, 0])
     return float(np.linalg.norm(C @ vector)), vector
 
 
-def norms(C: sp.spmatrix, axis: int) -> np.ndarray:
-    """Norms of columns (``axis`` 0) or rows; one for those that are zero."""
-    squares = np.asarray(C.multiply(C).sum(axis=axis)).ravel()
-    return np.asarray(np.sqrt(np.where(squares > 0, squares, 1.0)))
-
-
-def greatest(C: sp.spmatrix, axis: int) -> float:
-    """Greatest norm of columns (``axis`` 0) or rows."""
-    return float(norms(C, axis).max())
-
-
-def _equilibrated(C: sp.spmatrix) -> sp.spmatrix:
-    """Matrix of the same rank whose rows and columns have norms near one (D. Ruiz, RAL-TR-2001-034)."""
-    for _ in range(PASSES):
-        rows, columns = (1 / np.sqrt(norms(C, axis)) for axis in (1, 0))
-        C = sp.diags(rows) @ C @ sp.diags(columns)
-    return C
-
-
-def units(pencil: Pencil, length: float) -> np.ndarray:
-    """Natural size of each row (m,) of a pencil: that of a position is the ``length`` of the rod."""
-    found = np.ones(pencil.C.shape[0])
-    for name in {"r", "ends"} & set(pencil.where):
-        found[pencil.where[name]] = length
-    return found
-
-
-def _without_noise(pencil: Pencil, C: sp.spmatrix, length: float) -> sp.spmatrix:
-    """``C`` without the entries that are round-off beside the largest one of their column.
-
-    A row of nothing else would be one of norm one when it is equilibrated.  Derivatives in a position are those in
-    ``length``, so that none of the two kinds of entries is small for its unit.
-    """
-    C = sp.csc_matrix(sp.diags(units(pencil, length)) @ C)
-    largest = np.asarray(abs(C).max(axis=0).todense()).ravel()
-    C.data[abs(C.data) <= NEGLIGIBLE * np.repeat(largest, np.diff(C.indptr))] = 0.0
-    C.eliminate_zeros()
-    return C
-
-
-def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0, remedy: str = REMEDY) -> float:
-    """``sigma_min(C)`` of a pencil; infinite without constraints.
-
-    Parameters
-    ----------
-    pencil
-        Blocks of a state.
-    scalars
-        Words for its scalar multipliers.
-    length
-        Of the rod: positions are measured by it where units must not count.
-    remedy
-        What to do about constraints that depend on one another.
-
-    Raises :class:`SceneError` that names the constraints which depend on one another.
-    """
-    C = pencil.C
-    if not C.shape[1]:
-        return np.inf
-    sigma, vector = smallest_singular(C)
-    if sigma > NEGLIGIBLE * greatest(C, 0):
-        return sigma
-    # in metres and newtons of a molecule, say, columns are of very different sizes
-    equal = _equilibrated(_without_noise(pencil, C, length))
-    least, vector = smallest_singular(equal)
-    if least > NEGLIGIBLE * greatest(equal, 0):
-        return sigma
-    raise SceneError(dependent(pencil, scalars, vector, sigma, remedy))
-
-
-def dependent(pencil: Pencil, scalars: Sequence[str], vector: np.ndarray, sigma: float, remedy: str) -> str:
-    """Sentence on constraints whose gradients cancel.
-
-    Parameters
-    ----------
-    pencil
-        Blocks of the state.
-    scalars
-        Words for its scalar multipliers.
-    vector
-        Multipliers (p,) with which they cancel.
-    sigma
-        Smallest singular value of ``C``.
-    remedy
-        What to do about them.
-    """
-    vector, shares = vector / np.linalg.norm(vector), {}
-    for name in NAMES:
+def named(pencil: Pencil, equations: Sequence[str], w: np.ndarray) -> str:
+    """Constraints whose gradients cancel with multipliers ``w`` (p,); ``equations`` are words for the scalar ones."""
+    w, words = w / np.linalg.norm(w), list[str]()
+    for name, what in NAMES.items():
         columns = pencil.where.get(name, np.zeros(0, dtype=int))
-        shares[name] = (float((vector[columns] ** 2).sum()), columns)
-    blocks = [name for name, (share, _) in shares.items() if share > 0.01]
-    words = []
-    for name in blocks or list(NAMES)[:1]:
-        columns = shares[name][1]
+        if not (w[columns] ** 2).sum() > 0.01:
+            continue
         if name == "scalars":
-            which = np.flatnonzero(abs(vector[columns]) > 0.1)
-            words += [scalars[i] if i < len(scalars) else f"{NAMES[name]}, component {i + 1}" for i in which]
+            words += [equations[i] for i in np.flatnonzero(abs(w[columns]) > 0.1)]
         else:
-            place = pencil.place[columns[np.argmax(abs(vector[columns]))]] if len(columns) else np.nan
-            words.append(f"{NAMES[name]} (most of all at s = {place:.4g})")
-    return f"Constraints depend on one another ({' and '.join(words)}; smallest singular value {sigma:.1e}): {remedy}"
+            words.append(f"{what} (most of all at s = {pencil.place[columns[np.argmax(abs(w[columns]))]]:.4g})")
+    return " and ".join(words)

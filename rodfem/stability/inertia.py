@@ -53,10 +53,9 @@ FAR = 0.1
 
 @dataclass(frozen=True)
 class Index:
-    """Numbers ``negative`` and ``zero`` of eigenvalues of the constrained second variation, symmetry modes among these.
+    """Numbers ``negative`` and ``zero`` of eigenvalues of the constrained second variation; symmetries are zero ones.
 
-    ``nearest`` is an estimate of the distance of the nearest eigenvalue from zero, symmetry modes left out; 0 where
-    there is none.
+    ``nearest`` estimates the distance of the nearest other eigenvalue from zero; 0 where there is no estimate.
     """
 
     negative: int
@@ -67,14 +66,11 @@ class Index:
 def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
     """LDL^t factors that report the inertia, of matrices of ``unknowns`` rows, the last ``scalars`` perhaps dense.
 
-    The matrices are those of a communicator ``comm``; ``sizes`` are the natural sizes of the unknowns, None where they
-    are one.
-
-    ICNTL(24) = 1 is what makes MUMPS report it; CNTL(3) is so small that no pivot is taken for zero: the matrices are
-    shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's own scaling of saddle matrices solutions were seen to
-    lose ten digits, and factorisations take up to ten times as long.  CNTL(1) is ten times below MUMPS's own threshold:
-    the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the hundred thousand, to
-    the few rows of the scalars, which cost several times the factorisation itself.
+    ``sizes`` are the natural sizes of the unknowns, None where they are one.  ICNTL(24) = 1 makes MUMPS report it.
+    CNTL(3) is so small that no pivot is taken for zero: the matrices are shifted off their eigenvalues.  ICNTL(8) = 0:
+    with MUMPS's own scaling of saddle matrices solutions lost ten digits.  CNTL(1) is ten times below MUMPS's
+    threshold: the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the hundred
+    thousand, to the few rows of the scalars.  The matrices are those of a communicator ``comm``.
     """
     return factors_of("cholesky", comm, unknowns, scalars, sizes)
 
@@ -88,7 +84,6 @@ class Inertia:
     """
 
     def __init__(self, system: System) -> None:
-        """Allocate the matrix and its LDL^t factors once."""
         self.system = system
         self.matrix = system.state_matrix(load=True)
         self.border = system.new_vector()
@@ -117,10 +112,7 @@ class Inertia:
             self.compiled = CompiledNewton(system, self.matrix, self.factors)
 
     def at(self, x: PETSc.Vec) -> Factored:
-        """Assemble ``S`` at an equilibrium ``x``, with its phase conditions, unless the matrix is that one.
-
-        The symmetries are verified there.
-        """
+        """Assemble ``S`` at an equilibrium ``x``, with its phase conditions, and verify the symmetries there."""
         self.system.set_phase(x)
         state = self.system.at(x)
         if not self._holds(state):
@@ -135,7 +127,6 @@ class Inertia:
         return Factored(self)
 
     def _holds(self, state: State) -> bool:
-        """Whether the matrix is ``S`` at a state, with its phase conditions."""
         held, phase, changes = self._held or (None, None, 0)
         return held is state and phase is self.system.phase and changes == self.matrix.stateGet()
 
@@ -214,7 +205,7 @@ class Inertia:
         return np.asarray(self._weights @ own) if self._weights is not None else self._products(self.metric, own)
 
     def times(self, own: np.ndarray) -> np.ndarray:
-        """The matrix that is held now times vectors, the columns of ``own`` (own rows, count)."""
+        """The matrix times vectors, the columns of ``own`` (own rows, count)."""
         known = self._shared
         return np.asarray(known.matrix @ own) if known is not None else self._products(self.matrix, own)
 
@@ -227,8 +218,7 @@ class Inertia:
     def across(self, own: np.ndarray, basis: np.ndarray, duals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Basis of what vectors (own rows, k) span besides a ``basis``, and its products with the metric.
 
-        Both are orthonormal in the metric, ``duals`` are its products with the ``basis``.  What is less than
-        :data:`DEPENDENT` of a vector spans nothing new.
+        Both are orthonormal in the metric, ``duals`` are its products with the ``basis``.
         """
         size = self.sizes(own)
         own = own[:, size > 0] / size[size > 0]
@@ -257,7 +247,7 @@ class Inertia:
         return own if self.system.comm.size == 1 else np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
 
     def seed(self, i: int) -> PETSc.Vec:
-        """Generic vector: components along all unknowns of fields, none along scalars."""
+        """Generic vector with components along all unknowns of fields, none along scalars."""
         vector = self.system.new_vector()
         begin, end = vector.getOwnershipRange()
         numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))
@@ -268,23 +258,21 @@ class Inertia:
 class Factored:
     """``S`` at one state, and the results of its factors: a count, the eigenvalues nearest zero, solutions.
 
-    Raises :class:`RuntimeError` where the matrix holds another state by now, or what is asked for needs factors
-    (:meth:`below`, :meth:`count`) that were not made: a number of another state is never returned.
+    Raises :class:`RuntimeError` where the matrix holds another state by now, or before :meth:`below` or :meth:`count`
+    have made factors.
     """
 
     def __init__(self, inertia: Inertia) -> None:
-        """Stand for the state that the matrix was just filled for."""
         self.inertia, self._filled, self.drifts = inertia, inertia.filled, inertia.system.phase.count
 
     def _own(self) -> Inertia:
-        """Matrix and factors, while they are those of this state."""
         if self.inertia.filled != self._filled:
             raise RuntimeError("The matrix holds another state by now: ask for this one again, by Inertia.at.")
         return self.inertia
 
     @property
     def factors(self) -> Factors:
-        """Factors of ``S - shift M``; raises :class:`RuntimeError` before a count has made them."""
+        """Factors of ``S - shift M``; raises :class:`RuntimeError` before a count."""
         inertia = self._own()
         if inertia.factored != self._filled:
             raise RuntimeError("The matrix of this state was not factored: count first.")
@@ -306,10 +294,7 @@ class Factored:
         return self._own().shift
 
     def below(self, sigma: float) -> int:
-        """Number of eigenvalues below ``sigma``; symmetry modes not counted.
-
-        Raises :class:`ConvergenceError` where the count breaks down.
-        """
+        """Number of eigenvalues below ``sigma``, symmetries left out; :class:`ConvergenceError` if the count fails."""
         own = self._own()
         with own.system.clock("stability"):
             if own.factored != self._filled or own.shift != sigma:
@@ -319,10 +304,7 @@ class Factored:
         return self.counted()
 
     def counted(self) -> int:
-        """Number of eigenvalues below the shift that was factored; symmetry modes not counted.
-
-        Raises :class:`ConvergenceError` where the count breaks down.
-        """
+        """The same below the shift that was factored; raises :class:`ConvergenceError` if the count breaks down."""
         own, (negative, zero) = self._own(), self.factors.inertia()
         # Sylvester's law: each constraint, and each phase condition, has one negative eigenvalue of the saddle matrix
         below = negative - own.constraints - self.drifts
@@ -347,8 +329,7 @@ class Factored:
         Block Lanczos for the largest eigenvalues ``nu`` of ``A = S^-1 M`` with full orthogonalisation, restarted with a
         block of ``spare`` vectors more than the ``number`` wanted, first those of the last call, until each has the
         relative ``accuracy``, or what the arithmetic resolves, by its residual in the metric or by its last change.
-        Values are the quotients of ``S`` then.  Factors of a count at the edge of a wide band of round-off are replaced
-        by others.
+        Values are the quotients of ``S`` then.  Factors at the edge of a wide band of round-off are replaced by others.
         """
         own, block = self._own(), number + spare
         if own.factored == self._filled and abs(own.shift) > FAR * own.scale:
@@ -374,8 +355,8 @@ class Factored:
     def _settled(self, nu: np.ndarray, before: np.ndarray, residuals: np.ndarray, accuracy: float) -> bool:
         """Whether the first k eigenvalues ``nu`` have an ``accuracy``, of 1 / nu relative to itself.
 
-        Each is known to within its residual ``r``, and to ``r^2`` over its distance from the others (Kato 1949, Temple
-        1928), or by what it was ``before`` (k,).
+        Each is known to its residual ``r``, to ``r^2`` over its distance from the others (Kato 1949, Temple 1928), or
+        to its change since it was ``before`` (k,).
         """
         wanted, others = np.split(nu, [len(before)])
         before, residuals = before[: len(wanted)], residuals[: len(wanted)]
@@ -391,8 +372,7 @@ class Factored:
         """Eigenvalues of ``A`` in the space of ``block, A block, ...``, the largest in size first.
 
         Of as many as there are vectors, returns ``A`` times theirs, orthonormalised, and the residuals of these, both
-        in the metric.  The projection is that of ``A``, whose eigenvalues of interest are outermost: one of ``S`` would
-        have values near zero that are nobody's.
+        in the metric.  The projection is that of ``A``, whose eigenvalues of interest are outermost.
         """
         own, size = self.inertia, block.shape[1]
         basis = duals = images = np.zeros((len(block), 0))
@@ -413,9 +393,9 @@ class Factored:
         return nu, own.across(vectors, basis[:, :0], basis[:, :0])[0], residuals
 
     def noise(self, mode: PETSc.Vec) -> float:
-        r"""Round-off in the eigenvalue of a ``mode`` of metric norm 1.
+        """Round-off in the eigenvalue of a ``mode`` of metric norm 1, to first order.
 
-        First-order perturbation theory: entries ``S_ij`` that err by ``eps |S_ij|`` each, at random, move it by
-        ``eps sqrt(sum (S_ij mode_i mode_j)^2)``; :data:`NOISE` times that is returned.
+        Entries ``S_ij`` that err by ``eps |S_ij|`` each, at random, move it by ``eps sqrt(sum (S_ij mode_i
+        mode_j)^2)``; :data:`NOISE` times that is returned.
         """
         return NOISE * rounding(self.matrix, mode, mode)

@@ -1,4 +1,4 @@
-"""What a method for stability offers, what all methods share, and those that need no reduction of the pencil.
+"""What a method for stability offers, and those that need no reduction of the pencil.
 
 ``count`` is the inertia of the saddle matrix alone; ``shift-invert`` a Krylov space of the singular pencil; ``slicing``
 all eigenvalues in an interval; ``dense`` all there are.  A method is a class here or in another room, and a name in
@@ -8,7 +8,7 @@ all eigenvalues in an interval; ``dense`` all there are.  A method is a class he
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -17,48 +17,30 @@ from slepc4py import SLEPc
 from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import PETSC_ERR_LIB
+from rodfem.linalg.factorization import PETSC_ERR_LIB, ordering, preferred
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.stability.pencil import in_interval
 from rodfem.stability.spectrum import FINITE, condensed
-from rodfem.stability.symmetric import SymmetricPencil, SymmetricSolver
+from rodfem.stability.symmetric import Found, SymmetricPencil, SymmetricSolver, eigensolver
 
 Interval = tuple[float, float]
 NEAR_ZERO = 1e-3
 """Target of the eigenvalues nearest zero, relative to the scale of the stiffness."""
+SLICED = 1e-10
+"""Relative tolerance of SLEPc for all eigenvalues of an interval."""
 WIDER = (0.0, 1e-9, 1e-7, 1e-5)
 """By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
-PETSC_ERR_PLIB = 77
-"""PETSc's error code for that."""
 ROOMS = (100, 400, 1600)
 """Percentages of room beyond MUMPS's estimate: where rotations have no mass many pivots of the pencil are delayed."""
-STEP = 1.0371
-"""Factor of the ends tried, no simple number: an end on an eigenvalue is unlikely."""
 LARGEST = 3000
 """Unknowns that dense matrices may have."""
-
-
-class Found(NamedTuple):
-    """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
-
-    ``factorisations`` are those besides the workspace's own; a ``note`` goes after the reason for the method.
-    """
-
-    values: np.ndarray
-    vectors: list[PETSc.Vec]
-    errors: np.ndarray
-    certified: bool = False
-    factorisations: int = 0
-    note: str = ""
 
 
 class Workspace:
     """Matrices and factorisations on one system, made when they are asked for and kept for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Keep a :class:`~rodfem.fem.system.System`, given itself or by its solver."""
         self.system: System = source if isinstance(source, System) else source.system
         self.conservative, self.one = self.system.scene.conservative, self.system.scene.units.omega2
         given = getattr(source, "inertia", None)
@@ -99,7 +81,6 @@ class Method:
     """Whether it finds eigenvalues and vectors."""
 
     def __init__(self, work: Workspace) -> None:
-        """Work with matrices that are kept from state to state."""
         self.work = work
 
     @staticmethod
@@ -141,8 +122,7 @@ class ShiftInvert(Method):
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """By the Lanczos method, with a shift below the spectrum."""
-        modes = self.work.symmetric.at(x).leftmost(number)
-        return Found(modes.values, modes.vectors, modes.errors, modes.certified)
+        return self.work.symmetric.at(x).leftmost(number)
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """By the Arnoldi method."""
@@ -161,13 +141,13 @@ class Dense(Method):
         return "" if unknowns <= LARGEST else f"is for at most {LARGEST} unknowns, not {unknowns}"
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
-        """By ``T`` of :mod:`rodfem.stability.spectrum`, which is symmetric and positive for a shift below all of them.
+        """By the symmetric ``T`` of :mod:`rodfem.stability.spectrum`, positive for a shift below all eigenvalues.
 
-        Raises :class:`InputError` where fewer than ``number`` are finite.
+        Raises :class:`InputError` if fewer than ``number`` are finite.
         """
         below = self.work.below(x)
-        stiffness, mass = (gathered(A).real for A in below.scaled)
-        pencil = condensed(stiffness, mass, below.shift)
+        stiffness, mass = (gathered(A).real for A in below.solver.scaled)
+        pencil = condensed(stiffness, mass, below.solver.shift)
         T = pencil.dual.T @ pencil.inverse
         nu, w = np.linalg.eigh((T + T.T) / 2)
         if number > (finite := int((nu > FINITE * nu[-1]).sum())):
@@ -180,7 +160,7 @@ class Dense(Method):
         for column in (pencil.images @ w / nu).T:
             vectors.append(self.work.system.new_vector())
             vectors[-1].array[:] = column[own]
-        values = below.shift + 1.0 / nu
+        values = below.solver.shift + 1.0 / nu
         errors = below.backward_errors(values, vectors)
         return Found(self.work.one * values, below.unscaled(vectors), errors, below.certifies(values))
 
@@ -198,7 +178,7 @@ class Slicing(SymmetricMethod):
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """In the ``interval``, or in one found by counting that holds ``number`` of them and few more.
 
-        Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` where an end is an eigenvalue.
+        Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` if an end is an eigenvalue.
         """
         pencil, one = self.work.below(x), self.work.one
         low, high = (interval[0] / one, interval[1] / one) if interval else enclosed(pencil, number)
@@ -224,17 +204,17 @@ class Slicing(SymmetricMethod):
 
 
 def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None:
-    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None where they do not match the counts at these ends.
+    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None if they do not match the counts at these ends.
 
     Raises :class:`PETSc.Error` where PETSc gives up, MUMPS with the largest of :data:`ROOMS`.
     """
     for room in ROOMS:
         try:
-            solver = in_interval(*pencil.scaled, low, high, room)
+            solver = in_interval(*pencil.solver.scaled, low, high, room)
             with slepc_errors():
                 solver.solve()
         except PETSc.Error as trouble:
-            if trouble.ierr == PETSC_ERR_PLIB:
+            if trouble.ierr == 77:  # PETSC_ERR_PLIB: what it finds does not match the counts at the ends
                 return None
             if trouble.ierr != PETSC_ERR_LIB or room == ROOMS[-1]:
                 raise
@@ -243,12 +223,33 @@ def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None
     return None
 
 
-def enclosed(pencil: SymmetricPencil, number: int) -> Interval:
-    """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more.
+def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
+    """Set up spectrum slicing for all eigenvalues of a pencil ``matrix - mu mass`` between ``low`` and ``high``.
 
-    Eigenvalues of bending grow like the fourth power of their number: twice as far there are few more.
+    ``room`` is what MUMPS has beyond its estimate, a percentage.  Options: ``-rodfem_slicing_eps_...``,
+    ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is an eigenvalue.
     """
-    low, step = pencil.shift, max(abs(pencil.shift), pencil.scale) * STEP
+    solver = eigensolver(matrix, mass, "rodfem_slicing_")
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    solver.setInterval(low, high)
+    solver.setTolerances(tol=SLICED)
+    solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    with slepc_errors():
+        solver.setFromOptions()
+        ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
+        ksp.setType("preonly")
+        ksp.getPC().setType("cholesky")
+        ksp.getPC().setFactorSolverType("mumps")
+        controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
+        with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
+            solver.setUp()
+    return solver
+
+
+def enclosed(pencil: SymmetricPencil, number: int) -> Interval:
+    """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
+    # no simple factor: an end on an eigenvalue is unlikely
+    low, step = pencil.solver.shift, max(abs(pencil.solver.shift), pencil.solver.scale) * 1.0371
     while pencil.below(low + step) < number:
         step *= 2
     return low, low + step

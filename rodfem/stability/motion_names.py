@@ -1,14 +1,13 @@
-r"""Names of modes of vibration and of soft modes.
+"""Names of modes of vibration and of soft modes.
 
-A mode of vibration is named after the directors about which the rod turns in it: bending about one or the other,
-torsion, mixed, or without rotation.
+A mode of vibration is named after the directors about which the rod turns: bending about one or the other, torsion,
+mixed, or without rotation.
 
-A soft mode is a motion that costs the rod little energy.  Its vector ``v`` of metric norm 1 is named after the first
-group of generators ``g_j`` of the state in whose span it lies, nearly: its share there is ``b . G^+ b`` with ``G_ij =
-g_i . M g_j`` and ``b_j = g_j . M v``.  Groups are, in this order, the rigid motions, turning of the cross-sections
-about one director, and the motion along the rod, whose generator is the derivative of the state in arclength; a rod
-that is twisted, or a helix, has to turn as it slides.  Any other vector is named as a mode of vibration.  Symmetries of
-the state are no part of any generator here.
+A soft mode costs the rod little energy.  Its vector ``v`` of metric norm 1 is named after the first group of generators
+``g_j`` of the state in whose span it lies, nearly: its share there is ``b . G^+ b`` with ``G_ij = g_i . M g_j`` and
+``b_j = g_j . M v``.  Groups are the rigid motions, turning of the cross-sections about one director, and the motion
+along the rod, the derivative of the state in arclength; a twisted rod, or a helix, turns as it slides.  Any other
+vector is named as a mode of vibration.  Symmetries of the state are no part of any generator here.
 """
 
 from __future__ import annotations
@@ -26,8 +25,6 @@ from rodfem.tolerances import TINY
 
 SHARE = 0.9
 """Share of a vector in the span of a group above which it is named after it."""
-LARGEST_PART = 0.5
-"""Part of a rigid motion, relative to the largest one, above which it is named."""
 DEPENDENT = 1e-8
 """Eigenvalue of a Gram matrix of unit vectors below which they are dependent; square of a negligible generator."""
 PURE = 0.99
@@ -67,7 +64,7 @@ class MotionNames:
     def generators(self, x: PETSc.Vec, state: State) -> tuple[Group, Group, Group]:
         """Turning of the cross-sections, rigid motions, and the motion along the rod at a ``state``, which is ``x``.
 
-        They are of metric norm 1 and across the symmetries of the state; those that vanish are left out.
+        They are of metric norm 1 and across the symmetries of the state, without those that vanish.
         """
         vector = self.system.generators.vector
         turning, rigid, along = (
@@ -100,14 +97,13 @@ class MotionNames:
 
     @cached_property
     def _motions(self) -> Generators:
-        """Changes of state by all the motions, made when one is first asked for."""
         return Generators(self.system, [*self._turning.values(), *self._rigid.values(), self._along])
 
     def _name(self, state: State, v: PETSc.Vec, groups: tuple[Group, Group, Group]) -> str:
         turning, rigid, along = groups
         share, weights = self.share(v, rigid)
         if share > SHARE:
-            named = abs(weights) > LARGEST_PART * abs(weights).max()
+            named = abs(weights) > abs(weights).max() / 2
             return " with ".join(name for (name, _), chosen in zip(rigid, named, strict=True) if chosen)
         for motion in turning:
             if self.share(v, [motion])[0] > SHARE:
@@ -129,7 +125,7 @@ class MotionNames:
 def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
     """Share of a vector (metric norm 1) in the span of others, and their weights in its projection.
 
-    ``gram`` (number, number) and ``b`` (number,) are the products of those in the metric, with each other and with it.
+    ``gram`` and ``b`` are the products of those in the metric, with each other and with it.
     """
     weights = np.linalg.pinv(gram, rcond=DEPENDENT, hermitian=True) @ b
     return float(weights @ b), weights
@@ -138,7 +134,7 @@ def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
 def turning_shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
     """Shares of the rotations about the three directors in a mode, (3,), summing to one, or to zero without rotation.
 
-    Collective.  ``turned`` and ``parts``, the real and the imaginary part of the mode, as in :func:`squares`.
+    ``turned`` and ``parts``, the real and the imaginary part of the mode, as in :func:`squares`.  Collective.
     """
     columns = np.stack(parts, axis=1)
     square, moved = squares(system, turned, columns).sum(axis=0), displacements(system, columns).sum()
@@ -152,11 +148,10 @@ def of_all(squares: np.ndarray, moved: np.ndarray) -> np.ndarray:
 
 
 def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Integrals of the squared rotations about the three directors in each of some perturbations, (k, 3); collective.
+    """Integrals of the squared rotations about the three directors in perturbations, (k, 3); collective.
 
-    ``turned`` (cells, nodes, components) is the rotation field of the state; ``columns`` (n, k) are the perturbations
-    as values of this rank's unknowns.  The rotation is
-    the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
+    ``turned`` (cells, nodes, components) is the rotation field of the state, ``columns`` (n, k) are values of this
+    rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
     """
     f = system.fields
     cells = slice(0, f.owned_cells)
@@ -172,10 +167,7 @@ def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarr
 
 
 def displacements(system: System, columns: np.ndarray) -> np.ndarray:
-    """Integrals of the squared displacements, over the rod's length, in each of some perturbations (k,); collective.
-
-    They are summed as rotations are: see :func:`squares`.  Without a centreline there are none.
-    """
+    """Integrals of the squared displacements, over the rod's length, in perturbations (k,); collective."""
     f = system.fields
     if "r" not in f.dofs:
         return np.zeros(columns.shape[1])

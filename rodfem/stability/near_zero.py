@@ -1,18 +1,17 @@
-r"""The eigenvalues near zero at a state: their values, and what round-off leaves open of each.
+"""The eigenvalues near zero at a state: their values, and what round-off leaves open of each.
 
-The factors of ``S`` are the exact ones of a matrix that differs by about ``eps |S|``.  An eigenvalue relative to the
-metric is then uncertain by that over the smallest mass: ``|S| ~ 1/h``, ``m ~ h`` for linear elements of size h, so that
-a count decides nothing within the *band* ``10 eps |S| / m ~ eps/h^2``.  That is the bound for the roughest vector.
-For one smooth vector y of metric norm 1 independent errors of the entries of S change the quotient ``y.Sy`` by about
+The factors of ``S`` are those of a matrix that differs by about ``eps |S|``: within the *band* ``10 eps |S| / m``, for
+the smallest mass m, a count decides nothing.  That is the bound for the roughest vector.  For one smooth vector y of
+metric norm 1 independent errors of the entries of S change the quotient ``y.Sy`` by about
 
     eps (sum_ij (S_ij y_i y_j)^2)^(1/2),
 
-smaller by some powers of h.  Eigenvalues inside the band are therefore decided by their quotients, and count as zero
-only where ten times this exceeds their magnitude.
+smaller by some powers of an element's size.  Eigenvalues inside the band are decided by their quotients, and count as
+zero if ten times this exceeds their magnitude.
 
 Those nearer to zero than a part of the lowest bending eigenvalue are *soft*.  Their uncertainty on one mesh is at least
-what Newton's method leaves of the state, :data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh adds to that a richer one
-tells (:mod:`rodfem.adaptivity.soft_states`).
+what Newton's method leaves of the state, :data:`~rodfem.fem.newton.TOLERANCE`.  A richer mesh tells what the mesh adds
+(:mod:`rodfem.adaptivity.soft_states`).
 """
 
 from __future__ import annotations
@@ -31,8 +30,6 @@ from rodfem.stability.soft_mode import Judgement, SoftMode
 
 MANY = 100
 """Most eigenvalues near zero that are decided one by one."""
-WILD = 1e6
-"""Half width of the band, over the lowest bending eigenvalue, above which nothing is decided."""
 DECIDED = 1e-3
 """Relative accuracy of eigenvalues that decide a sign."""
 FAR = 1e-2
@@ -66,17 +63,7 @@ class Quotients:
 
 @dataclass(frozen=True)
 class Decision:
-    """An ``index``, the half width of what counted as zero, and the eigenvalues inside the band of the count.
-
-    Attributes
-    ----------
-    band
-        Half width of the band in which the inertia alone decides nothing, relative to the system's metric.
-    inside
-        Rayleigh quotients of the eigenvalues inside the band, symmetry modes left out.
-    uncertainty
-        What round-off in the matrix may make of each of them: those smaller than theirs are counted as zero.
-    """
+    """An ``index``, the half width of the count's ``band``, and quotients ``inside`` it with their ``uncertainty``."""
 
     index: Index
     band: float
@@ -94,6 +81,11 @@ class NearZero(Quotients):
     firm: int
     rest: int
 
+    def at(self, places: list[int], rest: int) -> NearZero:
+        """Those at some places, and another number of other zeros."""
+        vectors = [self.vectors[i] for i in places]
+        return NearZero(self.values[places], vectors, self.uncertainty[places], self.firm, rest)
+
 
 def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
     """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
@@ -107,10 +99,10 @@ def quotients(found: Factored, vectors: list[PETSc.Vec], least: float = 0.0) -> 
 
 
 def inside_band(found: Factored, number: int, accuracy: float = DECIDED, least: float = 0.0) -> Quotients:
-    """The ``number`` eigenvalues inside the band of the count, which were ``found``.
+    """The ``number`` eigenvalues inside the band of the count, which were ``found``, of uncertainty ``least`` at least.
 
-    Those near zero have the relative ``accuracy``, the others are accurate enough for their signs; ``least`` is the
-    smallest uncertainty.  Raises :class:`ConvergenceError` where others are found than were counted.
+    Those near zero have the relative ``accuracy``, the signs of the others are right.  Raises :class:`ConvergenceError`
+    if others are found than were counted.
     """
     inertia = found.inertia
     theta, vectors = found.nearest(number + SPARE, DECIDED)
@@ -129,17 +121,16 @@ def inside_band(found: Factored, number: int, accuracy: float = DECIDED, least: 
 
 
 def decide(found: Factored) -> Decision:
-    """Count at a state; eigenvalues within the band are decided by their Rayleigh quotients.
+    """Count at a state, and decide eigenvalues within the band by their Rayleigh quotients.
 
-    Raises :class:`ConvergenceError` where there are too many of those.
-
-    Factorisations are those of the count alone, the last of which serves :meth:`~Factored.nearest` here and afterwards.
+    Raises :class:`ConvergenceError` for too many of those.  The factors of the count serve
+    :meth:`~rodfem.stability.inertia.Factored.nearest` afterwards.
     """
     index, inertia = found.count(), found.inertia
     inside, least = index.zero - found.drifts, ZERO_BAND * inertia.scale
     if inside == 0 or inertia.resolution <= least:
         return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
-    if inertia.resolution > WILD * inertia.scale:
+    if inertia.resolution > 1e6 * inertia.scale:
         raise ConvergenceError(
             f"Eigenvalues up to {inertia.resolution:.2g} are within round-off of the count, {inertia.scale:.2g} is the "
             "lowest of bending: the state, or a stiffness, is out of all proportion to it."
@@ -155,11 +146,7 @@ def decide(found: Factored) -> Decision:
 
 
 def resolve(found: Factored) -> tuple[int, int]:
-    """Least and greatest index of a state, small eigenvalues judged by their Rayleigh quotients.
-
-    Those within the tolerance of zero are told from zero down to their round-off; what is left open between the two
-    numbers is zero to working accuracy.  Modes of symmetries are left out.
-    """
+    """Least and greatest index of a state: between the two is what is zero to working accuracy."""
     index = found.count()
     if (near := index.zero - found.drifts) <= 0:
         return index.negative, index.negative
@@ -173,10 +160,10 @@ def soft_limit(inertia: Inertia) -> float:
 
 
 def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> NearZero:
-    """Soft eigenvalues at a state, symmetries left out; the vectors that the next state starts from stay.
+    """Soft eigenvalues at a state, and the ``least`` number nearest zero whatever their size; symmetries are left out.
 
-    ``index`` is the count that made the factors, None before it; the ``least`` number of eigenvalues nearest zero are
-    soft whatever their size.  Raises :class:`ConvergenceError` where there are too many of them.
+    ``index`` is the count that made the factors, None before it.  The vectors that the next state starts from stay.
+    Raises :class:`ConvergenceError` if there are too many.
     """
     inertia = found.inertia
     index, limit = index or found.count(), soft_limit(inertia)
@@ -199,10 +186,7 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
 
 
 def _candidates(found: Factored, limit: float, inside: int, least: int) -> list[PETSc.Vec] | None:
-    """Vectors of the eigenvalues within the ``limit``, ``inside`` of them in a count, and of the ``least`` number.
-
-    None where a rough estimate is far from it.
-    """
+    """Vectors of eigenvalues within the ``limit``, ``inside`` in a count, or ``least``; None if all are far off."""
     inertia, number = found.inertia, max(inside, least) + SPARE
     with inertia.afresh():  # whatever was computed before, the same result
         if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
@@ -226,10 +210,9 @@ def _candidates(found: Factored, limit: float, inside: int, least: int) -> list[
 
 
 def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judgement:
-    """Numbers of eigenvalues of a state with its ``modes``, decided or not.
+    """Count the eigenvalues of a state with its ``modes``, which are ``found`` on the mesh.
 
-    ``found`` are these modes as the mesh has them.  Those that are decided have a sign; others are undecided, and zero,
-    too, within the ``tolerance`` of a count, as in every count.
+    Those that are decided have a sign; others are undecided, and zero, too, within the ``tolerance`` of a count.
     """
     told = [m for m in modes if m.decided]
     negative = found.firm + sum(m.value < 0 for m in told)

@@ -1,15 +1,12 @@
-r"""Eigenvalues ``mu = omega^2`` of a rod under loads without a potential: a non-symmetric pencil ``S x = mu M x``.
+"""Eigenvalues ``mu = omega^2`` of a rod under loads without a potential: a non-symmetric pencil ``S x = mu M x``.
 
-A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load
-couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
-axis: flutter.
-
+A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load couples
+the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real axis: flutter.
 The finite eigenvalues are those of the pencil on its unknowns with mass: :mod:`~rodfem.stability.spectrum`.
 
-What round-off makes of an eigenvalue that is zero is bounded by 1e-7 of the natural size of bending, whatever the rod.
-Where it has motions far slower than bending, as a stiff rod on soft supports, that is too much: theirs may be as small.
-It is measured for them then, by independent relative errors of all entries of the matrix, and they are solved for to
-what a state leaves open of them.
+What round-off makes of an eigenvalue that is zero is bounded by 1e-7 of the natural size of bending.  For a rod with
+motions far slower than bending, as a stiff rod on soft supports, it is measured: independent relative errors of all
+entries of the matrix, and what a state leaves open.
 
 A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
 ``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
@@ -17,11 +14,12 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
@@ -29,7 +27,6 @@ from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered, local_rows, rounding_of, shared
 from rodfem.problem.local_state import floats
 from rodfem.stability import motion_names
-from rodfem.stability.frequencies import REAL, Frequencies, in_order, named, orthonormal, product, squares
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.pencil import (
     PencilMatrices,
@@ -39,9 +36,16 @@ from rodfem.stability.pencil import (
     symmetry_modes,
     weighed_modes,
 )
-from rodfem.stability.spectrum import SHIFT, Condensed, Eigenpairs, Spectrum, condensed, inside, times
+from rodfem.stability.spectrum import REAL, SHIFT, Condensed, Eigenpairs, Spectrum, condensed, inside, times
 from rodfem.tolerances import NEGLIGIBLE
 
+MULTIPLE = 1e-8
+"""Eigenvalues that differ by less than this, relative, are one that is multiple."""
+ALIKE = 1e-6
+"""Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
+STILL = 1e-10
+"""Share of the farthest eigenvalue below which one is zero."""
+EPS = float(np.finfo(float).eps)
 BEYOND = 6
 """Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
 SPARE = 2
@@ -56,14 +60,138 @@ PILE = 64
 """States after which what PETSc keeps of matrices that are not used any more is destroyed."""
 
 
+@dataclass(frozen=True)
+class Frequencies:
+    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
+
+    Errors are those of ``1 / (mu - shift)`` over the greatest.  ``kinds`` names the motions
+    (:mod:`rodfem.stability.motion_names`).  ``vectors`` (n, k), n unknowns of this rank, are complex, or real if all
+    eigenvalues are; ``weighed`` (n, k) are their products with the mass.  ``one`` is the natural size of the
+    eigenvalues. A ``floating`` rod, which nothing holds, has zero ones.  Of a rod that is held and has slow motions
+    ``floor`` is what round-off makes of zero; it is infinite otherwise.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    kinds: tuple[str, ...] = ()
+    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    one: float = 1.0
+    floating: bool = False
+    floor: float = np.inf
+
+    @property
+    def far(self) -> float:
+        """Size of an eigenvalue beside which others are zero: the greatest, but for a light rod with heavy bodies.
+
+        That has a few slow motions, and others whose eigenvalues are 1e10 times as great.
+        """
+        sizes = np.sort(abs(self.values))
+        greatest = float(sizes[-1]) if len(sizes) else 0.0
+        return greatest if self.floating else min(greatest, 1e4 * self.natural)
+
+    @property
+    def natural(self) -> float:
+        """Natural size of the slowest motions: that of the two slowest eigenvalues, and of bending at least."""
+        slowest = float(np.sort(abs(self.values))[:2].max(initial=0.0))
+        return max(slowest, self.one if np.isinf(self.floor) else self.floor)
+
+    @property
+    def noise(self) -> float:
+        """Magnitude below which an eigenvalue counts as zero."""
+        least = REAL * float(abs(self.values).min(initial=np.inf))
+        return min(max(REAL * self.one, least), max(self.floor, least))
+
+    def still(self) -> int:
+        """Number of eigenvalues that are zero: of rigid motions, and their partners in Jordan blocks."""
+        return int((abs(self.values) < STILL * self.far).sum())
+
+
+def in_order(found: Frequencies) -> Frequencies:
+    """Frequencies by their real parts."""
+    values = found.values
+    order = np.lexsort((values.imag, np.round(values.real / min(found.one, found.natural), 6)))
+    kinds = tuple(found.kinds[i] for i in order) if found.kinds else ()
+    vectors, weighed = found.vectors[:, order], found.weighed[:, order]
+    return replace(
+        found, values=values[order], errors=found.errors[order], kinds=kinds, vectors=vectors, weighed=weighed
+    )
+
+
+def named(system: System, found: Frequencies, turned: np.ndarray, number: int | None = None) -> Frequencies:
+    """Frequencies ``found`` at a state of a ``system``, the first ``number`` named; ``turned`` is its rotation field.
+
+    A multiple eigenvalue has one name, that of its invariant subspace: its vectors are any in it.
+    """
+    together = [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number]
+    owner = np.repeat(np.arange(len(together)), list(map(len, together)))
+    vectors = np.concatenate([_span(system, found, group) for group in together], axis=1)
+    squares, moved = np.zeros((len(together), 3)), np.zeros(len(together))
+    for part in (vectors.real, vectors.imag) if np.iscomplexobj(vectors) else (vectors,):
+        np.add.at(squares, owner, motion_names.squares(system, turned, part))
+        np.add.at(moved, owner, motion_names.displacements(system, part))
+    names, floating = motion_names.names_of(motion_names.of_all(squares, moved)), floats(system.scene)
+    kinds = dict.fromkeys(range(len(found.values)), "")
+    for group, name in zip(together, names, strict=True):
+        rigid = floating and abs(found.values[group]).max() < STILL * found.far
+        kinds |= dict.fromkeys(group, motion_names.RIGID if rigid else name)
+    return replace(found, kinds=tuple(kinds.values()))
+
+
+def _span(system: System, found: Frequencies, group: list[int]) -> np.ndarray:
+    vectors = found.vectors[:, group]
+    return orthonormal(system.comm, vectors, found.weighed[:, group]) if len(group) > 1 else vectors
+
+
+def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[list[int]]:
+    """Places of equal eigenvalues, which differ by less than a relative ``tolerance``, in order of the first of each.
+
+    Those near zero are compared with what is ``far`` from it.
+    """
+    out: list[list[int]] = []
+    least = min(abs(values).max(initial=0.0), far) / 100
+    sizes = tolerance * np.maximum(abs(values), least)
+    if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
+        return [[i] for i in range(len(values))]
+    for i, value in enumerate(values):
+        for group in out:
+            if abs(value - values[group[0]]) < tolerance * max(abs(value), least):
+                group.append(i)
+                break
+        else:
+            out.append([i])
+    return out
+
+
+def product(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """``a^* b`` of the rows of all ranks of ``comm``: (k, m) for (n, k) and (n, m)."""
+    mine = a.conj().T @ b
+    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
+
+
+def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (k,) of each column of ``a`` (n, k) with the same of ``b``, real parts, of all ranks of ``comm``."""
+    mine = np.sum(a.conj() * b, axis=0).real
+    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
+
+
+def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
+    """Basis of the span of complex ``vectors`` (n, k), orthonormal in the mass; zero for what has no mass.
+
+    ``weighed`` are their products with the mass; the ranks of ``comm`` share the rows.
+    """
+    parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
+    sizes = np.maximum(parts, EPS * parts[-1])
+    return np.asarray(vectors @ (turn / np.sqrt(np.where(sizes > 0.0, sizes, np.inf))))
+
+
 class NonsymmetricSolver(PencilMatrices):
     """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
 
-    ``slow`` says whether the rod has motions far slower than bending at its first state, whose round-off is asked for.
+    The rod is ``slow`` if it has motions far slower than bending at its first state: their round-off is measured.
     """
 
     def __init__(self, system: System) -> None:
-        """Allocate the matrices of the pencil once."""
         super().__init__(system)
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
         self._rows: sp.csr_matrix | None = None
@@ -80,10 +208,7 @@ class NonsymmetricSolver(PencilMatrices):
         return self._rows
 
     def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
-        """Assemble the pencil at the state ``x``.
-
-        Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
-        """
+        """Assemble the pencil at the state ``x``, without the motions of symmetries, which may make it singular."""
         self.filled += 1
         if self.filled % PILE == 0:
             compat.destroy_garbage(self.system.comm)
@@ -102,7 +227,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     """The pencil of one state: eigenvalues near a shift, and products in its mass."""
 
     def __init__(self, shared: NonsymmetricSolver) -> None:
-        """Be the state that the matrices were just filled for."""
         super().__init__(shared)
         self.turned, self._free, self._own, self.slow = shared.turned, shared.free, slice(None), shared.slow
         if self.system.comm.size > 1:
@@ -127,11 +251,10 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(used) else (0, 0.0)
 
     def near(self, number: int, target: float, *, left: bool = False) -> Frequencies:
-        """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
+        """Return eigenvalues nearest to ``target``: ``number``, or more where they come; fewer if there are no more.
 
-        Fewer are returned only where the discretisation has no more finite ones.  ``vectors`` are ``left`` ones where
-        these are asked for, ``z.S = mu z.M`` without conjugation.  They have no parts along free motions ``g``: of
-        ``S g = 0`` follows ``z.Mg = 0``.
+        ``left`` vectors have ``z.S = mu z.M`` without conjugation, and no parts along free motions ``g``, where ``z.Mg
+        = 0``.
         """
         with self.system.clock("stability"):
             pencil = self.condensed(target)
@@ -160,7 +283,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if self.floating or not len(slow) or not (self.slow or several):
             return np.inf
         found = self.of(spectrum, slow)
-        energy = abs(self.squares(found.vectors, found.weighed))
+        energy = abs(squares(self.system.comm, found.vectors, found.weighed))
         columns = zip(found.vectors.T, energy.tolist(), strict=True)
         rounded = [rounding_of(self.matrix, v, v) / e for v, e in columns if e > 0]
         return max(SOLVED * one, float(spectrum.noise[slow].max()), NOISE * max(rounded, default=0.0))
@@ -183,19 +306,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def shares(self, basis: np.ndarray) -> np.ndarray:
         """Share (k,) of the vector of each eigenvalue of the spectrum in the span of a real ``basis`` (n, m)."""
-        whole = np.concatenate(self.system.comm.allgather(basis / self.sizes.array_r.real[:, None]))
+        whole = np.concatenate(self.system.comm.allgather(basis / self.solver.sizes.array_r.real[:, None]))
         condensed = self.spectrum.condensed
         return inside(condensed.dual.T @ whole[condensed.heavy], condensed.pairs.right)
 
     def condensed(self, target: float) -> Condensed:
-        """The pencil on its unknowns with mass, about a shift; raises :class:`ConvergenceError` where it is singular.
-
-        On several ranks each of them has all of it.
-        """
-        self._held()
+        """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""
+        shift = target / self.solver.system.scene.units.omega2  # of this state alone
         if target not in self._condensed:
             stiffness, mass = (gathered(A).real for A in self.in_units())
-            shift = target / self.system.scene.units.omega2
             self._condensed = {target: condensed(stiffness, mass, shift)}  # factors are those of one shift
         return self._condensed[target]
 
@@ -205,7 +324,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         vectors = condensed.vectors(pairs, left=left)[self._own]
         weighed = condensed.spread(pairs.right)[self._own] if units.ordinary and not (self._free or left) else None
         if not units.ordinary:
-            values, vectors = values * units.omega2, vectors * self.sizes.array_r.real[:, None]
+            values, vectors = values * units.omega2, vectors * self.solver.sizes.array_r.real[:, None]
         if self._free and not left:
             vectors = vectors.astype(complex)
             self._complete(values, vectors)
@@ -221,26 +340,16 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k)."""
         comm = self.system.comm
-        return times(self._held().rows, vectors if comm.size == 1 else np.concatenate(comm.allgather(vectors)))
+        return times(self.solver.rows, vectors if comm.size == 1 else np.concatenate(comm.allgather(vectors)))
 
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """``a^* b`` of all ranks' rows."""
         return product(self.system.comm, a, b)
 
-    def squares(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Products of each column of ``a`` with the same of ``b``, real parts."""
-        return squares(self.system.comm, a, b)
-
-    def orthonormal(self, vectors: np.ndarray) -> np.ndarray:
-        """Basis of the span of complex vectors (n, k), orthonormal in the mass."""
-        return orthonormal(self.system.comm, vectors, self.weighed(vectors))
-
     def _complete(self, values: np.ndarray, vectors: np.ndarray) -> None:
         """Add to vectors, in place, their parts along free motions ``g``: ``g . S x / mu``, of ``g . Mx = 0`` before.
 
-        From ``S (x + c g) = mu M (x + c g)``, with ``S g = 0``.  The multiplier of ``g . Mx = 0`` is ``-mu c`` as well,
-        but that of a vector which was predicted belongs to the basis ``g`` at the loads that it was predicted from.
-        Where ``mu`` is zero to round-off any part is as good, and none is taken.
+        From ``S (x + c g) = mu M (x + c g)``, with ``S g = 0``.  Where ``mu`` is zero to round-off none is taken.
         """
         begin, end = self.matrix.getOwnershipRange()
         drifts = [index - begin for index in self.system.drifts if begin <= index < end]

@@ -1,41 +1,32 @@
-"""The pencil of a state, and SLEPc set up to find its eigenvalues.
+"""The pencil of a state, ``(K C; C^t 0) x = mu (M 0; 0 0) x``, and its blocks.
 
-SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
-and overrule what is set here.
+``K`` (m, m) is the second derivative of the whole Lagrangian in rotation, strain and centreline, ``C`` (m, p) its
+derivative in those and the multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinetic metric.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
+import scipy.sparse as sp
 from petsc4py import PETSc
-from slepc4py import SLEPc
 
-from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import Factors, ordering, preferred
+from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.validation import trouble_with_inertia
 from rodfem.tolerances import NEGLIGIBLE
-
-SLICED = 1e-10
-"""Relative tolerance of SLEPc for all eigenvalues of an interval."""
-OF_VECTORS = 1e-9
-"""The same for vectors of the left-most ones: the error of the eigenvalues is the square."""
-LEAST = 6
-"""How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
 
 class PencilMatrices:
     """Matrices of a pencil, allocated once, which the states of one system share; ``filled`` counts those states."""
 
     def __init__(self, system: System) -> None:
-        """Hold no state yet."""
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         self.filled = 0
@@ -52,18 +43,14 @@ Matrices = TypeVar("Matrices", bound=PencilMatrices)
 
 
 class StatePencil(Generic[Matrices]):
-    """The pencil of one state.
-
-    Raises :class:`RuntimeError` where the matrices hold another state by now: a number of another state is never
-    returned.
-    """
+    """The pencil of one state; raises :class:`RuntimeError` where the matrices hold another state by now."""
 
     def __init__(self, shared: Matrices) -> None:
-        """Be the state that the matrices were just filled for."""
         self.system, self._shared, self._filled = shared.system, shared, shared.filled
 
-    def _held(self) -> Matrices:
-        """Matrices, while they are those of this state."""
+    @property
+    def solver(self) -> Matrices:
+        """What made it; raises :class:`RuntimeError` where the matrices hold another state by now."""
         if self._shared.filled != self._filled:
             raise RuntimeError("The matrices hold another state by now: ask for this one again, by the solver's at().")
         return self._shared
@@ -71,28 +58,23 @@ class StatePencil(Generic[Matrices]):
     @property
     def matrix(self) -> PETSc.Mat:
         """Tangent matrix ``S``, and constraints against motions of symmetries."""
-        return self._held().matrix
+        return self.solver.matrix
 
     @property
     def mass(self) -> PETSc.Mat:
         """Kinetic metric ``M``."""
-        return self._held().mass
-
-    @property
-    def sizes(self) -> PETSc.Vec:
-        """Natural size of each unknown."""
-        return self._held().sizes
+        return self.solver.mass
 
     def in_units(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """The pencil for unknowns and eigenvalues in units of their natural sizes: see :func:`in_units`."""
-        return in_units(self.system, self.matrix, self.mass, self.sizes)
+        return in_units(self.system, self.matrix, self.mass, self.solver.sizes)
 
 
 def in_units(system: System, matrix: PETSc.Mat, mass: PETSc.Mat, sizes: PETSc.Vec) -> tuple[PETSc.Mat, PETSc.Mat]:
     """Matrices of a ``system``'s pencil for unknowns and eigenvalues in units of their natural ``sizes``.
 
-    Round-off makes finite eigenvalues of the infinite ones, among the others where multipliers have large units; and
-    what is near, far or zero is a number of order one.  Where all units are one they are ``matrix`` and ``mass``.
+    Round-off makes finite eigenvalues of the infinite ones if multipliers have large units; and what is near, far or
+    zero is a number of order one.  Where all units are one they are ``matrix`` and ``mass``.
     """
     units = system.scene.units
     if units.ordinary:
@@ -117,12 +99,10 @@ def least_eigenvalue(system: System) -> float:
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:
-    """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.
+    """Assemble tangent ``matrix`` and kinetic ``mass`` of a ``system`` at the state ``x``, without phase conditions.
 
     Returns the state.  Raises :class:`SceneError` for a rod without any inertia, :class:`ConvergenceError` where one
     that depends on the load is negative or vanishes.
-
-    They are written into ``matrix`` and ``mass``, both of the ``system``.
     """
     if system.equations.massless:
         raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
@@ -166,7 +146,7 @@ def weighed_modes(
 ) -> dict[int, tuple[PETSc.Vec, PETSc.Vec]]:
     """Basis ``g`` of the symmetry modes that is orthonormal in the mass, and ``M g``.
 
-    What moves nothing that has inertia is orthonormal in the metric instead, and comes with the metric's product.
+    What moves nothing that has inertia is orthonormal in the metric instead, with the metric's product.
     """
     given, scaled = list(modes.values()), mass
     if given and not system.scene.units.ordinary:  # rotations and positions have masses of different units
@@ -190,13 +170,11 @@ def weighed_modes(
 
 
 def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat, mass: PETSc.Mat) -> list[PETSc.Vec]:
-    """Add to an assembled pencil the constraints ``g.Mx = 0`` for symmetry modes ``g``, one for each drift scalar.
+    """Add to a pencil ``matrix``, ``mass`` the constraints ``g.Mx = 0`` for symmetry ``modes`` g, by drift scalars.
 
-    ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged; and
-    the inertia counts it.  Returns the modes that have mass, orthonormal in it: a Krylov space is kept off them by
-    deflation, too, or round-off adds them where ``mu`` is large beside the rest.
-
-    ``modes`` are by the number of the drift scalar of the ``system``; ``matrix`` and ``mass`` are its pencil.
+    ``g`` being an eigenvector of ``mu = 0``, the rest of the spectrum is unchanged, and the inertia counts it.  Returns
+    the modes that have mass, orthonormal in it: a Krylov space of the ``system`` is deflated by them, too, or round-off
+    adds them if ``mu`` is large.
     """
     deflated = []
     for index, (mode, image) in weighed_modes(system, modes, mass).items():
@@ -212,86 +190,81 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
     return deflated
 
 
-def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
-    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite.
+@dataclass(frozen=True)
+class Pencil:
+    """Blocks ``K`` (m, m), ``C`` (m, p), ``M`` (m, m) of a state; every rank has all of them.
 
-    Its options begin with ``prefix``.
+    For each field ``where`` has its rows in ``K`` and ``C`` (``q``, ``v``, ``r``, ``ends``: positions of ends that
+    move), or columns of ``C`` (``eta``, ``n``, and ``scalars``: a constant contact force, moments at ends, multipliers
+    of integral constraints).  ``place`` (p,) is the arclength of the middle of a constraint's cell, nan for one of the
+    whole rod.
     """
-    solver = SLEPc.EPS().create(matrix.comm)
-    solver.setOptionsPrefix(prefix)
-    solver.setOperators(matrix, mass)
-    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-    solver.getST().setType(SLEPc.ST.Type.SINVERT)
-    return solver
+
+    K: sp.csr_matrix
+    C: sp.csr_matrix
+    M: sp.csr_matrix
+    where: dict[str, np.ndarray]
+    place: np.ndarray
 
 
-class Inverse:
-    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
+class Blocks:
+    """Makes the :class:`Pencil` of states of one system, with multipliers of the ``norms`` of quaternions or without.
 
-    def __init__(self, factors: Factors) -> None:
-        """Keep the factors."""
-        self.factors = factors
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
-        """Solve for ``z``."""
-        self.factors.solve(b, z)
-
-
-def with_factors(
-    matrix: PETSc.Mat,
-    mass: PETSc.Mat,
-    number: int,
-    target: complex,
-    inverse: Inverse,
-    start: PETSc.Vec | None = None,
-    deflated: Sequence[PETSc.Vec] = (),
-) -> SLEPc.EPS:
-    """Set up shift-invert for the ``number`` eigenvalues nearest to ``target`` of a symmetric pencil.
-
-    It is ``matrix - mu mass``.  The ``inverse`` of ``matrix - target mass`` is from factors made elsewhere.  Vectors
-    are right up to massless unknowns: purification corrects all of them at once.  Eigenvectors that are ``deflated``
-    are not found; ``start`` is the first vector.
+    ``rows`` and ``columns`` are the global numbers of unknowns and multipliers, ascending, ``numbers`` those of each
+    field.
     """
-    solver = eigensolver(matrix, mass, "rodfem_")
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    solver.setTarget(target)
-    solver.setDimensions(number, number + max(number, LEAST))
-    solver.setTolerances(tol=OF_VECTORS, max_it=300)
-    solver.setPurify(False)
-    if start is not None:
-        solver.setInitialSpace([start])
-    if deflated:
-        solver.setDeflationSpace(list(deflated))
-    transform = solver.getST()
-    transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
-    ksp = transform.getKSP()
-    ksp.setType("preonly")
-    ksp.getPC().setType("python")
-    ksp.getPC().setPythonContext(inverse)
-    with slepc_errors():
-        solver.setFromOptions()
-    return solver
 
+    def __init__(self, system: System, *, norms: bool = True) -> None:
+        self.system = system
+        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
+        self.numbers: dict[str, np.ndarray] = {}
+        self.where: dict[str, np.ndarray] = {}
+        self.rows = self._numbered("ends", multiplier=False)
+        self.columns = self._numbered("scalars", multiplier=True, left_out="" if norms else "eta")
+        self.place = self._places()
 
-def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
-    """Set up spectrum slicing for all eigenvalues of a symmetric pencil between two numbers that are none themselves.
+    def _numbered(self, last: str, *, multiplier: bool, left_out: str = "") -> np.ndarray:
+        """Global numbers of the unknowns, or multipliers, but for a field ``left_out``; ``last`` names the scalars."""
+        f = self.system.fields
+        names = [b.name for b in f.blocks if b.multiplier == multiplier and b.name != left_out]
+        numbers = {name: np.unique(self.gathered(f.number[f.dofs[name]].ravel())) for name in names}
+        numbers = {name: n[n >= 0] for name, n in numbers.items()}
+        scalars = [f.scalars[x.name] for x in f.unknown_scalars if x.multiplier == multiplier]
+        numbers[last] = np.array(scalars, dtype=int)
+        out = np.sort(np.concatenate(list(numbers.values()))).astype(int)
+        self.numbers |= numbers
+        self.where |= {name: np.searchsorted(out, n) for name, n in numbers.items()}
+        return out
 
-    Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is one.
-    The pencil is ``matrix - mu mass``, the two numbers are ``low`` and ``high``; ``room`` is what MUMPS has beyond its
-    estimate, a percentage.
-    """
-    solver = eigensolver(matrix, mass, "rodfem_slicing_")
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
-    solver.setInterval(low, high)
-    solver.setTolerances(tol=SLICED)
-    solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    with slepc_errors():
-        solver.setFromOptions()
-        ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
-        ksp.setType("preonly")
-        ksp.getPC().setType("cholesky")
-        ksp.getPC().setFactorSolverType("mumps")
-        controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
-        with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
-            solver.setUp()
-    return solver
+    def gathered(self, own: np.ndarray) -> np.ndarray:
+        """Rows of all ranks."""
+        comm = self.system.comm
+        return own if comm.size == 1 else np.concatenate(comm.allgather(own))
+
+    def own(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which of some global ``numbers`` are rows of this rank, and their places in its part of a vector."""
+        begin, end = self.matrix.getOwnershipRange()
+        mine = (numbers >= begin) & (numbers < end)
+        return mine, numbers[mine] - begin
+
+    def _places(self) -> np.ndarray:
+        """Arclength of the middle of the first cell of each constraint, nan for a scalar force, (p,)."""
+        f = self.system.fields
+        place = np.full(len(self.columns), np.inf)
+        for name in (b.name for b in f.blocks if b.multiplier):
+            numbers = f.number[f.dofs[name]]
+            middle = np.broadcast_to(f.vertices.mean(axis=1)[:, None, None], numbers.shape)
+            mine = np.isin(numbers, self.columns)
+            np.minimum.at(place, np.searchsorted(self.columns, numbers[mine]), middle[mine])
+        place = np.min(self.system.comm.allgather(place), axis=0)
+        place[np.isinf(place)] = np.nan
+        return np.asarray(place)
+
+    def assemble(self, x: PETSc.Vec, sizes: PETSc.Vec | None = None) -> Pencil:
+        """Blocks at the state ``x``, in units of natural ``sizes`` of the unknowns if these are given."""
+        assemble_pencil(self.system, x, self.matrix, self.mass)
+        matrix, mass = self.matrix, self.mass
+        if sizes is not None:
+            matrix, mass = in_units(self.system, matrix, mass, sizes)
+        S, M = (gathered(A).real[self.rows] for A in (matrix, mass))
+        return Pencil(S[:, self.rows], S[:, self.columns], M[:, self.rows], dict(self.where), self.place)

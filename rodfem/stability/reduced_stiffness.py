@@ -50,8 +50,8 @@ MODES = 6
 class ReducedStiffness:
     """Matrix ``H`` of a state with a border, ``rate`` its derivative along the unit tangent, both (k, k), and W (n, k).
 
-    ``far`` is the index across the border, ``rotated`` how far the amplitudes are from those of the border's modes, and
-    eigenvalues within the ``doubt`` are zero to what round-off and Newton's method leave of them.
+    ``far`` is the index across the border, ``rotated`` how far the amplitudes are from those of the border's modes;
+    eigenvalues within the ``doubt`` are zero to working accuracy.
     """
 
     H: np.ndarray

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 AUTO = "auto"
 """Not a method: one is chosen."""
 MODULES = {
-    "cayley": "rodfem.kumar_healey.methods",
+    "cayley": "rodfem.kumar_healey.reduction",
     "count": "rodfem.stability.methods",
     "dense": "rodfem.stability.methods",
-    "reduction": "rodfem.kumar_healey.methods",
+    "reduction": "rodfem.kumar_healey.reduction",
     "shift-invert": "rodfem.stability.methods",
     "slicing": "rodfem.stability.methods",
 }

@@ -1,7 +1,7 @@
-"""A soft mode: an eigenvalue so near zero that its sign may be undecided, with its name and uncertainty.
+"""A soft mode: an eigenvalue so near zero that its sign may be undecided.
 
-One whose value is within its uncertainty is undecided: it is not among the negative eigenvalues, and the index is one
-of two numbers.  Symmetries are no soft modes: their eigenvalue is zero.
+One within its uncertainty is undecided: the index is one of two numbers.  Symmetries, whose eigenvalue is zero, are no
+soft modes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ class SoftMode:
         return abs(self.value) > self.uncertainty
 
     def __str__(self) -> str:
-        """Name, value and uncertainty, and whether the sign is decided."""
         doubt = "" if self.decided else ", sign undecided"
         return f"{self.name}, mu = {self.value:.2g} +- {self.uncertainty:.0e}{doubt}"
 
@@ -34,7 +33,7 @@ class SoftMode:
 class Judgement:
     """Numbers of ``negative``, ``zero`` and ``undecided`` eigenvalues of a state, with its ``soft`` modes.
 
-    Undecided ones within the tolerance of a count are among the zero ones, too.
+    An undecided one within the tolerance of a count is a zero one, too.
     """
 
     negative: int
@@ -49,10 +48,7 @@ def is_stable(negative: int, undecided: int, kink: str = "") -> bool | None:
 
 
 def index_range(negative: int, undecided: int, kink: str = "") -> str:
-    """Index in words, of which some eigenvalues may be undecided: ``2``, ``0 or 1``, ``0 to 2``.
-
-    On a ``kink`` of the functions of that name it is that of one side.
-    """
+    """Index in words, some eigenvalues undecided: ``2``, ``0 or 1``, ``0 to 2``; on a ``kink`` that of one side."""
     words = {0: "", 1: f" or {negative + 1}"}
     index = f"{negative}" + words.get(undecided, f" to {negative + undecided}")
     return f"{index} {ONE_SIDE}" if kink else index

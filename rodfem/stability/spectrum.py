@@ -45,12 +45,8 @@ REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 ALL = 1000
 """Rank of the mass up to which all eigenvalues are found: LAPACK takes some seconds there."""
-LARGEST = 2000
-"""Unknowns with mass up to which it is factored by dense matrices."""
 SOME = 40
 """Eigenvalues that are found where the rank is greater."""
-DENSE = 80
-"""Rank of the mass up to which all eigenvalues cost no more than some by a Krylov space."""
 RANK = 1e-13
 """Pivot of the mass below which it is round-off, relative to its diagonal: a quaternion's own length has no mass."""
 FINITE = 1e-13
@@ -70,7 +66,7 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
     """Rows with mass (h,), and ``L`` and ``R`` in them (h, r): by Cholesky's method with pivots of a unit diagonal."""
     size = np.sqrt(np.maximum(mass.diagonal(), 0.0))
     heavy = np.flatnonzero(size)
-    if len(heavy) > LARGEST:
+    if len(heavy) > 2000:  # too many for dense matrices
         return heavy, mass[heavy][:, heavy].tocsr(), sp.identity(len(heavy), format="csr")
     scale = size[heavy]
     block = mass[heavy][:, heavy].toarray() / np.outer(scale, scale)
@@ -86,9 +82,9 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
 class Eigenpairs:
     """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, and their ``right`` vectors (r, k), or those of ``T^t``.
 
-    ``noise`` (k,) is what round-off may make of ``nu``, ``error`` (k,) the residual over the size of ``T``; where two
-    meet the former is its root.  Of all eigenvalues ``left`` vectors (k, r) are known, too: both are biorthonormal, and
-    right ones have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
+    ``noise`` (k,) is what round-off may make of ``nu``, its root where two meet; ``error`` (k,) the residual over the
+    size of ``T``.  Of all eigenvalues there are ``left`` vectors (k, r), too: both are biorthonormal, and right ones
+    have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
     """
 
     nu: np.ndarray
@@ -110,9 +106,9 @@ class Condensed:
     """A pencil on its unknowns with mass, in units of natural sizes, about a ``shift``."""
 
     def __init__(self, mass: sp.csr_matrix, solve: Solve, solve_transposed: Solve, shift: float) -> None:
-        """Take the ``mass``, and what solves with ``S - shift M`` for arrays (n, k): ``solve``, ``solve_transposed``.
+        """``solve`` and ``solve_transposed`` solve with ``S - shift M`` for arrays (n, k).
 
-        Raises :class:`~rodfem.errors.ConvergenceError` where nothing has mass.
+        Raises :class:`~rodfem.errors.ConvergenceError` if nothing has ``mass``.
         """
         self.solve, self.solve_transposed, self.shift, self.rows = solve, solve_transposed, shift, mass.shape[0]
         self.heavy, self.lower, self.dual = factors_of_mass(mass)
@@ -167,11 +163,12 @@ class Condensed:
         return times(self.inverse, pairs.right) / pairs.nu if pairs.vectors is None else pairs.vectors[self.heavy]
 
     def greatest(self, number: int, *, left: bool = False) -> Eigenpairs:
-        """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones where these are fewer.
+        """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones if these are fewer.
 
-        LAPACK finds them where it costs no more, or where SLEPc gives up: at times it cannot sort equal complex ones.
+        By LAPACK where it costs no more, or SLEPc gives up: at times it cannot sort equal complex ones.
         """
-        if self.rank > max(DENSE, 3 * number) and (self.rank > ALL or "pairs" not in vars(self)):
+        # all eigenvalues of a rank of 80 cost no more than some by a Krylov space
+        if self.rank > max(80, 3 * number) and (self.rank > ALL or "pairs" not in vars(self)):
             try:
                 return self._nearest(number, left=left)
             except ConvergenceError:
@@ -214,7 +211,7 @@ class Condensed:
 class Spectrum:
     """Eigenvalues of a ``condensed`` pencil, nearest to its shift first; ``one`` is their natural size.
 
-    What round-off makes of zero is ``floor``, where it is known (:mod:`rodfem.stability.nonsymmetric`).
+    ``floor`` is what round-off makes of zero, where it is known (:mod:`rodfem.stability.nonsymmetric`).
     """
 
     condensed: Condensed
@@ -318,9 +315,8 @@ class Operator:
 def krylov(apply: Solve, size: int, number: int, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` greatest eigenvalues, and vectors, of a real matrix (size, size) that ``apply`` multiplies with.
 
-    The Krylov space begins with the vector ``start`` (size,), or with any.
-
-    Raises :class:`~rodfem.errors.ConvergenceError` where SLEPc gives up.  Its options begin with ``rodfem_``.
+    The Krylov space begins with ``start`` (size,), or with any vector.  Raises
+    :class:`~rodfem.errors.ConvergenceError` if SLEPc gives up.  Its options begin with ``rodfem_``.
     """
     matrix = PETSc.Mat().createPython((size, size), Operator(apply), comm=PETSc.COMM_SELF)
     matrix.setUp()

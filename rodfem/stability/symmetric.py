@@ -2,25 +2,27 @@
 
     (K C; C^t 0) x = mu (M 0; 0 0) x
 
-with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and
-(45)).  ``M`` is singular, so that only shift-invert is free of spurious eigenvalues: its image ``(S - sigma M)^-1
-M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  A symmetry mode, whose
-eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0`` and by deflation (``EPSSetDeflationSpace``),
-and is not among those returned.
+with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and (45)).
+``M`` is singular, so that only shift-invert is free of spurious eigenvalues: ``(S - sigma M)^-1 M`` is zero on all that
+has no inertia.  A symmetry mode, of eigenvalue zero, is excluded by the constraint ``g.Mx = 0`` and by deflation.
 
-The shift is put below the spectrum: the nearest eigenvalues to it are then the left-most ones.  A count just above the
-last of them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the
-modes that are returned.  Along a branch the shift, the symbolic factorisations
-and a first vector, the sum of the modes, are those of the point before: two numeric factorisations a point, one to
-solve with and one to count.
+The shift is below the spectrum: the nearest eigenvalues to it are the left-most ones.  A count just above the last of
+them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the modes that are
+returned.  Along a branch the shift, the symbolic factorisations and a first vector, the sum of the modes, are those of
+the point before: two numeric factorisations a point, one to solve with and one to count.
+
+SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
+and overrule what is set here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
+from slepc4py import SLEPc
 
 from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
@@ -28,7 +30,6 @@ from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import places_in, shared
 from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import (
-    Inverse,
     PencilMatrices,
     StatePencil,
     assemble_pencil,
@@ -36,13 +37,14 @@ from rodfem.stability.pencil import (
     in_units,
     scale_in_units,
     symmetry_modes,
-    with_factors,
 )
 from rodfem.tolerances import SAME_EIGENVALUE
 
 HIT = 1e-8
 """A shift nearer to an eigenvalue than this, relative to the farthest one found, or to itself, is one: but for
 round-off, which spoils the others, and the count there."""
+OF_VECTORS = 1e-9
+"""Relative tolerance of SLEPc for vectors of the left-most ones: the error of the eigenvalues is the square."""
 EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
@@ -54,25 +56,25 @@ NOISE = 1e-6
 """Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
 
 
-@dataclass(frozen=True)
-class Modes:
-    """Left-most eigenvalues, symmetry modes left out.
+class Found(NamedTuple):
+    """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
 
-    ``values`` are ascending, ``vectors`` theirs, ``errors`` backward errors; they are ``certified`` where
-    counts prove that none is missing.
+    ``factorisations`` are those besides the workspace's own; a ``note`` goes after the reason for the method.
     """
 
     values: np.ndarray
     vectors: list[PETSc.Vec]
     errors: np.ndarray
-    certified: bool
+    certified: bool = False
+    factorisations: int = 0
+    note: str = ""
 
     def negative(self, tolerance: float) -> int:
         """Number of eigenvalues below ``-tolerance``."""
         return int((self.values < -tolerance).sum())
 
 
-NOTHING = Modes(np.zeros(0), [], np.zeros(0), False)
+NOTHING = Found(np.zeros(0), [], np.zeros(0))
 
 
 @dataclass
@@ -87,21 +89,12 @@ class _Shifted:
 class SymmetricSolver(PencilMatrices):
     """Matrices and factorisations of the pencil, which the states of one system share: see :meth:`at`.
 
-    Attributes
-    ----------
-    scale
-        Size of the least eigenvalue.
-    scaled
-        Matrix and mass of the state.
-    shift
-        Where the next computation starts; the first one, and one whose count finds any missing, moves it to the left
-        until no eigenvalue is below it.
-    factorisations
-        Number of numeric factorisations made so far.
+    ``scale`` is the size of the least eigenvalue, ``scaled`` matrix and mass in natural units.  The next computation
+    starts at ``shift``: the first one, and one whose count finds any missing, moves it below all eigenvalues.
+    ``factorisations`` counts the numeric ones.
     """
 
     def __init__(self, inertia: Inertia) -> None:
-        """Allocate the matrices of the pencil once."""
         super().__init__(inertia.system)
         self.inertia = inertia
         system, sizes = self.system, (self.system.fields.along, self.system.fields.dense_rows)
@@ -157,33 +150,14 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
     """The pencil of one state: its left-most eigenvalues, and counts below a number."""
 
     def __init__(self, shared: SymmetricSolver) -> None:
-        """Be the state that the matrices were just filled for."""
         super().__init__(shared)
         self.inertia, self._drifts = shared.inertia, shared.system.phase.count
 
-    @property
-    def shift(self) -> float:
-        """Where the next computation starts."""
-        return self._held().shift
-
-    @property
-    def scale(self) -> float:
-        """Size of the least eigenvalue."""
-        return self._held().scale
-
-    @property
-    def scaled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Matrix and mass."""
-        return self._held().scaled
-
-    def leftmost(self, number: int) -> Modes:
-        """Return the ``number`` left-most eigenvalues; raises :class:`ConvergenceError` where SLEPc finds fewer.
-
-        They, and their vectors, are not in units of natural sizes.
-        """
-        held = self._held()
+    def leftmost(self, number: int) -> Found:
+        """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer."""
+        own = self.solver
         with self.system.clock("stability"):
-            modes = self._solve(number, EXTRA[0]) if len(held.last) else NOTHING
+            modes = self._solve(number, EXTRA[0]) if len(own.last) else NOTHING
             if not modes.certified:
                 self.go_below()
                 for extra in EXTRA:
@@ -196,26 +170,25 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
                 "richer discretisation."
             )
         spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
-        held.shift = modes.values[0] - 0.1 * spread
-        return replace(
-            modes, values=self.system.scene.units.omega2 * modes.values, vectors=self.unscaled(modes.vectors)
-        )
+        own.shift = modes.values[0] - 0.1 * spread
+        values, vectors = self.system.scene.units.omega2 * modes.values, self.unscaled(modes.vectors)
+        return modes._replace(values=values, vectors=vectors)
 
     def unscaled(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
-        """The same vectors, in units of natural sizes before and in those of the rod now."""
+        """The same vectors in the rod's units, in place."""
         if not self.system.scene.units.ordinary:
             for vector in vectors:
-                vector.pointwiseMult(vector, self.sizes)
+                vector.pointwiseMult(vector, self.solver.sizes)
         return vectors
 
     def go_below(self) -> None:
-        """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""
-        held = self._held()
-        step = max(abs(held.shift), held.scale)
+        """Move the shift below the spectrum; raises :class:`ConvergenceError` if it has no lower end."""
+        own = self.solver
+        step = max(abs(own.shift), own.scale)
         for _ in range(40):
-            if self.below(held.shift) == 0 and not self._shift_is_an_eigenvalue():
+            if self.below(own.shift) == 0 and not self._shift_is_an_eigenvalue():
                 return
-            held.shift -= step
+            own.shift -= step
             step *= 3
         raise ConvergenceError(
             "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness; give the rod a "
@@ -224,20 +197,17 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def _shift_is_an_eigenvalue(self) -> bool:
         """Whether that is so but for round-off, which a count does not tell: a step of inverse iteration does."""
-        held, mode = self._held(), self.inertia.seed(0)
+        own, mode = self.solver, self.inertia.seed(0)
         mode.scale(1.0 / self.system.norm(mode))
         grown = mode.duplicate()
-        held.shifted.factors.solve(held.scaled[1] * mode, grown)
-        return not self.system.norm(grown) * HIT * abs(held.shift) < 1.0
+        own.shifted.factors.solve(own.scaled[1] * mode, grown)
+        return not self.system.norm(grown) * HIT * abs(own.shift) < 1.0
 
     def below(self, sigma: float) -> int:
-        """Number of eigenvalues below ``sigma``, symmetry modes not included.
-
-        Raises :class:`ConvergenceError` where the count breaks down: constraints depend on each other.
-        """
-        held = self._held()
-        held.factor(sigma)
-        negative, zero = held.shifted.factors.inertia()
+        """Number of eigenvalues below ``sigma``; :class:`ConvergenceError` if the count breaks down."""
+        own = self.solver
+        own.factor(sigma)
+        negative, zero = own.shifted.factors.inertia()
         below = negative - self.inertia.constraints - self._drifts
         if zero or below < 0:
             raise ConvergenceError(
@@ -248,7 +218,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def certifies(self, values: np.ndarray) -> bool:
         """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
-        small = SAME_EIGENVALUE * max(abs(values).max(), self.scale)
+        small = SAME_EIGENVALUE * max(abs(values).max(), self.solver.scale)
         distinct = values < values[-1] - small
         return (
             self.below(values[0] - small) == 0
@@ -256,40 +226,38 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             and self.below(values[-1] + small) >= len(values)
         )
 
-    def _solve(self, number: int, extra: int) -> Modes:
+    def _solve(self, number: int, extra: int) -> Found:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
 
-        A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
-        asked for.
+        A Krylov method finds the second of two equal eigenvalues late, by round-off.
         """
-        held = self._held()
-        held.factor(held.shift)
-        if not held.shifted.factors.regular:
-            held.shift -= held.scale
+        own = self.solver
+        own.factor(own.shift)
+        if not own.shifted.factors.regular:
+            own.shift -= own.scale
             return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
-        reach = max(values[-1] - held.shift, held.scale) if len(values) else np.inf
-        if len(values) and values[0] - held.shift < HIT * reach:
-            held.shift -= reach
+        reach = max(values[-1] - own.shift, own.scale) if len(values) else np.inf
+        if len(values) and values[0] - own.shift < HIT * reach:
+            own.shift -= reach
             return self._solve(number, extra)
         if len(values) < number:
-            return Modes(values, vectors, errors, False)
-        held.last = sum(vector.array_r for vector in vectors)
-        cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), held.scale)
+            return Found(values, vectors, errors)
+        own.last = sum(vector.array_r for vector in vectors)
+        cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), own.scale)
         known = int((values < cut).sum())
-        return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
+        return Found(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 
     def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
-        """Solve by SLEPc, for ``number`` eigenvalues or all there are: with their vectors and backward errors.
+        """``number`` eigenvalues or all there are, with vectors and backward errors, without what is no eigenpair.
 
-        Where it asks for more than there are finite ones, the Krylov space breaks down, and what comes is no eigenpair.
+        More than there are finite ones break the Krylov space down.
         """
-        held, start = self._held(), self.inertia.seed(1)
-        if len(held.last):  # a space that is invariant already would miss all else
+        own, start = self.solver, self.inertia.seed(1)
+        if len(own.last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
-            start.array[:] += held.last
-        inverse = Inverse(held.shifted.factors)
-        solver = with_factors(*held.scaled, number, held.shift, inverse, start, held.deflated)
+            start.array[:] += own.last
+        solver = self.eigensolver(number, start)
         with slepc_errors():
             solver.solve()
         found = solver.getConverged()
@@ -310,26 +278,69 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         true = [i for i in range(len(values)) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
         return values[true], [vectors[i] for i in true], errors[true]
 
+    def eigensolver(self, number: int, start: PETSc.Vec) -> SLEPc.EPS:
+        """Set up shift-invert for the ``number`` eigenvalues nearest to the shift that was factored.
+
+        Vectors are right up to massless unknowns: purification corrects all of them at once.
+        """
+        own = self.solver
+        solver = eigensolver(*own.scaled, "rodfem_")
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        solver.setTarget(own.shift)
+        # in a Krylov space with fewer vectors restarts cost more
+        solver.setDimensions(number, number + max(number, 6))
+        solver.setTolerances(tol=OF_VECTORS, max_it=300)
+        solver.setPurify(False)
+        solver.setInitialSpace([start])
+        if own.deflated:
+            solver.setDeflationSpace(own.deflated)
+        transform = solver.getST()
+        transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
+        ksp = transform.getKSP()
+        ksp.setType("preonly")
+        ksp.getPC().setType("python")
+        ksp.getPC().setPythonContext(_Inverse(own.shifted.factors))
+        with slepc_errors():
+            solver.setFromOptions()
+        return solver
+
     def _norms(self) -> tuple[float, float]:
-        """Greatest sums of magnitudes of rows of stiffness and mass."""
-        stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self._held().scaled)
+        stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self.solver.scaled)
         return stiffness, mass
 
     def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
-        """Purification: replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts.
-
-        All at once: the cost is that of the call, hardly of a column.
-        """
-        held = self._held()
-        right = np.stack([(held.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
-        for value, vector, column in zip(values, vectors, held.shifted.factors.solve_all(right).T, strict=True):
-            vector.array[:] = (value - held.shift) * column
+        """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts, all at once."""
+        own = self.solver
+        right = np.stack([(own.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
+        for value, vector, column in zip(values, vectors, own.shifted.factors.solve_all(right).T, strict=True):
+            vector.array[:] = (value - own.shift) * column
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
         stiffness, mass = self._norms()
-        errors, (S, M) = [], self._held().scaled
+        errors, (S, M) = [], self.solver.scaled
         for value, vector in zip(values, vectors, strict=True):
             residual = S * vector - M * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
         return np.array(errors)
+
+
+def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
+    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite."""
+    solver = SLEPc.EPS().create(matrix.comm)
+    solver.setOptionsPrefix(prefix)
+    solver.setOperators(matrix, mass)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.getST().setType(SLEPc.ST.Type.SINVERT)
+    return solver
+
+
+class _Inverse:
+    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
+
+    def __init__(self, factors: Factors) -> None:
+        self.factors = factors
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
+        """Solve for ``z``."""
+        self.factors.solve(b, z)

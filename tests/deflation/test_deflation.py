@@ -20,11 +20,9 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.deflation.deflated_newton import DeflatedNewton
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
-from rodfem.deflation.known import equilibria_at
-from rodfem.deflation.search import NEW, Deflation, find_equilibria, turned_state
+from rodfem.deflation.search import NEW, Deflation, equilibria_at, turned_state
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
@@ -87,7 +85,7 @@ def test_cord_beyond_what_was_explored() -> None:
     """With all explored states given, only others are found: they are on branches that exploring did not reach."""
     found = cord()
     known = equilibria_at(found.follower, found.branches, 40.0)
-    for p in find_equilibria(found.follower, 40.0, known, tries=12):
+    for p in Deflation(found.follower, 40.0, known).run(12):
         assert min(abs(p.energy - k.energy) for k in known) > 1e-3
         assert (p.load, p.error < 1e-9) == (40.0, True)
 
@@ -169,7 +167,7 @@ def test_nothing_to_find() -> None:
     """Under a small load there is one equilibrium: it is found, nothing else is, and the report says so."""
     follower = Solver(scene("ruler", direction="e2"), Discretization()).equilibria
     out = StringIO()
-    (only_one,) = find_equilibria(follower, 0.2, tries=1)
+    (only_one,) = Deflation(follower, 0.2).run(1)
     search = Deflation(follower, 0.2, [only_one])
     assert search.run(10) == []
     assert len(search.tally.tries) == 10
@@ -226,7 +224,7 @@ def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
         counts.append([])
         for number in range(12):
             x = turned_state(solver.system, solver.start(25.0), 0.1 + 0.12 * number, [1, number])
-            newton = DeflatedNewton(solver)
+            newton = Deflation(solver, 25.0)
             newton.flow(x)
             counts[-1].append(newton.approach(x).iterations)
     assert counts[0] == counts[1] == counts[2]

@@ -157,7 +157,6 @@ def test_a_stale_pencil_refuses() -> None:
         "near": lambda: first.near(2, 0.0),
         "left": lambda: first.near(2, 0.0, left=True),
         "weighed": lambda: first.weighed(found.vectors),
-        "orthonormal": lambda: first.orthonormal(found.vectors),
         "asymmetry": first.asymmetry,
         "matrix": lambda: first.matrix,
     }

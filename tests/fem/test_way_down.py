@@ -11,7 +11,7 @@ from rodfem import Discretization, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import beside_saddle
 from rodfem.fem.newton import along, linear_step
-from rodfem.stability.blocks import Blocks
+from rodfem.stability.pencil import Blocks
 
 
 @pytest.fixture(scope="module")

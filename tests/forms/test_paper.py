@@ -23,7 +23,7 @@ from rodfem.forms.kinematics import RODS, UNDEFORMED, curvature, strain
 from rodfem.forms.lagrangian import pointwise, reduced
 from rodfem.forms.rotation import product, rotation
 from rodfem.kumar_healey.coordinates import Coordinates
-from rodfem.stability.blocks import Blocks
+from rodfem.stability.pencil import Blocks
 
 pytestmark = pytest.mark.alone
 

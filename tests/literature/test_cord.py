@@ -127,14 +127,3 @@ def test_work_of_the_tension(name: str) -> None:
     a, middle, b = (user_points(default()[name], load)[0] for load in AT)
     integral = (b.load - a.load) / 6 * (a.ordinate + 4 * middle.ordinate + b.ordinate)  # dE = -lam dx
     assert b.energy - a.energy + b.load * b.ordinate - a.load * a.ordinate == pytest.approx(integral, abs=1e-9)
-
-
-@pytest.mark.long
-def test_formulations_agree() -> None:
-    assert [b.name for b in default().branches] == ["straight", "branch 1", "branch 2", "branch 1.1", "branch 1.2"]
-    for one, other in zip(default().branches, default("pointwise").branches, strict=True):
-        assert (one.name, one.ended) == (other.name, other.ended)
-        for s, t in zip(one.special, other.special, strict=True):
-            assert (s.kind, s.negative_before, s.negative_after) == (t.kind, t.negative_before, t.negative_after)
-            assert abs(s.point.load - t.point.load) <= s.error_estimate + t.error_estimate
-            assert abs(s.point.ordinate - t.point.ordinate) <= s.ordinate_error + t.ordinate_error

@@ -159,12 +159,6 @@ def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: f
             assert np.nanmin([abs(mu - e) for e in exact]) < (1e-6 if elements * degree > 8 else 0.1) * abs(mu)
 
 
-def test_dense_reductions_find_what_slepc_finds() -> None:
-    dense, krylov = (vibration(15.0, elements).near(4, 1.0) for elements in (2, 8))
-    assert dense.values[:3] == pytest.approx(krylov.values[:3], rel=2e-4)
-    assert dense.kinds[:3] == krylov.kinds[:3]
-
-
 @pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts a process of its own")
 def test_complex_petsc(tmp_path: Path) -> None:
     """With the complex build, where it is installed beside the real one, the demo gives the same numbers."""

@@ -28,7 +28,7 @@ from rodfem import (
 )
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.modes.eigenmotions import Eigenmotions
+from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import RIGID
 
 pytestmark = pytest.mark.alone
@@ -271,7 +271,7 @@ def test_states_of_a_rod_that_a_thrust_accelerates() -> None:
     assert others == pytest.approx(squares[: len(others)], rel=1e-6) and len(others) > 1
     modes = solver.modes(point, 4)
     assert modes.value.real == pytest.approx(squares, rel=1e-6) and abs(modes.value.imag).max() < 1e-6
-    few = Eigenmotions(solver.equilibria).few(point.x, 4)
+    few = ModeFinder(solver.equilibria).few(point.x, 4)
     moving = [i for i, motion in enumerate(few.motion) if motion != RIGID]
     assert few.value[moving] == pytest.approx(squares, rel=1e-6)
     assert moving == [0, 1, 2, 3] and not few.value[4:].any()

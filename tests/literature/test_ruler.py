@@ -114,13 +114,3 @@ def test_inextensible_limit() -> None:
     limit = (loads * stretchings @ [-1, 1]) / (stretchings @ [-1, 1])  # the error of each falls as 1/E
     assert limit == pytest.approx(4.62463226448, abs=1e-9)
     assert limit == pytest.approx(lateral_buckling(4.62, inf), abs=1e-9)
-
-
-@pytest.mark.long
-def test_formulations_agree() -> None:
-    for one, other in zip(default("reduced").branches, default("pointwise").branches, strict=True):
-        assert (one.name, one.ended) == (other.name, other.ended)
-        for s, t in zip(one.special, other.special, strict=True):
-            assert (s.kind, s.negative_before, s.negative_after) == (t.kind, t.negative_before, t.negative_after)
-            assert abs(s.point.load - t.point.load) <= s.error_estimate + t.error_estimate
-            assert abs(s.point.ordinate - t.point.ordinate) <= s.ordinate_error + t.ordinate_error

@@ -268,12 +268,6 @@ def test_planar_rod_stays_in_its_plane() -> None:
     assert abs(modes.displacement[..., 1]).max() == abs(modes.rotation[..., [0, 2]]).max() == 0.0
 
 
-def test_counting_finds_no_modes() -> None:
-    solver, x = state(classics.planar_column(), FINE, 6.0)
-    with pytest.raises(InputError, match="another method than 'count'"):
-        modes_of(solver, x, 2, "count")
-
-
 # --- files and pictures ------------------------------------------------------------------------------------------
 
 

@@ -18,10 +18,8 @@ import rodfem
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
-from rodfem.modes.eigenmotions import Eigenmotions
-from rodfem.modes.modes import SYMMETRY
-from rodfem.modes.recorded import Typical, read
-from rodfem.modes.typical import EVENLY, FEWEST, typical_rows
+from rodfem.modes.finder import FEWEST, ModeFinder
+from rodfem.modes.modes import SYMMETRY, Typical, typical_of
 from rodfem.problem.scene import Inertia, Scene
 from rodfem.ranks import in_words
 from rodfem.report.page import payload_of
@@ -34,7 +32,7 @@ def recorded(scene: Scene, plan: Plan, folder: Path, mesh: Discretization = MESH
     """Modes in the file of a run, by branch."""
     rodfem.run(scene, mesh, plan, folder, figures=False, quiet=True)
     with h5py.File(folder / "states.h5") as file:
-        return {name: list(read(group)) for name, group in file["branches"].items()}
+        return {name: list(typical_of(group)) for name, group in file["branches"].items()}
 
 
 @pytest.mark.short
@@ -93,18 +91,6 @@ def test_symmetries_come_last(folder: Path) -> None:
         assert abs(turning[:, :2]).max() < 1e-9 * abs(turning[0, 2])
 
 
-def test_rows_that_are_typical(folder: Path) -> None:
-    """Both ends, evenly between by arclength, and each special point once."""
-    diagram = rodfem.trace(classics.euler("clamped-free"), MESH, Plan((0.0, 12.0), depth=1, error_bars=False))
-    for branch in diagram:
-        rows, along = typical_rows(branch), np.array([p.arclength for p in branch.points])
-        assert set(rows) >= {0, len(along) - 1} | {s.row for s in branch.special}
-        assert len(rows) <= EVENLY + len(branch.special)
-        largest = np.diff(along).max()
-        gaps = np.diff(along[sorted(rows)])
-        assert gaps.max() <= along[-1] / (EVENLY - 1) + largest
-
-
 @pytest.mark.long
 def test_a_trace_is_the_same_with_and_without_them(folder: Path) -> None:
     """Modes are computed between two branches: nothing of the next one may depend on that, not even its last bit."""
@@ -122,15 +108,15 @@ def test_where_they_are_not_found_the_file_says_why(
     folder: Path, monkeypatch: pytest.MonkeyPatch, fault: Callable[[], Exception], often: int
 ) -> None:
     """At one state or at all: the run goes on, and its report has the sentence."""
-    whole, failed = Eigenmotions.few, []
+    whole, failed = ModeFinder.few, []
 
-    def few(self: Eigenmotions, *what: object) -> object:
+    def few(self: ModeFinder, *what: object) -> object:
         if len(failed) < often:
             failed.append(what)
             raise fault()
         return whole(self, *what)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Eigenmotions, "few", few)
+    monkeypatch.setattr(ModeFinder, "few", few)
     found = recorded(classics.euler("clamped-free"), Plan((0.0, 2.0), depth=0, error_bars=False), folder)["straight"]
     sentence = in_words(fault()) if fault is MemoryError else str(fault())
     assert [each.trouble for each in found] == [sentence if i < often else "" for i in range(len(found))]

@@ -1,4 +1,4 @@
-"""One verdict from all methods; nasty pencils; the band of the count and the rank of the constraints."""
+"""One verdict from all methods, the paper's among them; nasty pencils; the band of the count; the constraints' rank."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import classics
 import demo_cases
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -20,18 +21,20 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.fields import Discretization
-from rodfem.kumar_healey.coordinates import Coordinates
-from rodfem.kumar_healey.reduction import INVERSES, Reduction
-from rodfem.linalg.chain import factors_of
+from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
+from rodfem.kumar_healey.null_space import kernel
+from rodfem.kumar_healey.reduction import INVERSES, ReducedPencil, cayley_shift
 from rodfem.problem.scene import Inertia
 from rodfem.stability.assessment import Assessor, assess
-from rodfem.stability.blocks import Blocks, Pencil
-from rodfem.stability.dependence import rank_of, smallest_singular
+from rodfem.stability.dependence import named, smallest_singular, weak_combinations
 from rodfem.stability.inertia import Factored
 from rodfem.stability.inertia import Inertia as Count
 from rodfem.stability.methods import Method
 from rodfem.stability.near_zero import decide
-from rodfem.stability.pencil import Inverse, assemble_pencil, symmetry_modes, weighed_modes, with_factors
+from rodfem.stability.pencil import (
+    Blocks,
+    Pencil,
+)
 from rodfem.stability.registry import METHODS, find
 
 pytestmark = pytest.mark.alone
@@ -47,6 +50,8 @@ STATES = [
     ("ruler", 2.0, False),
     ("ruler", 6.0, True),
 ]
+WITHOUT_POTENTIAL = [("follower", 10.0, False), ("follower", 40.0, False)]
+"""Before and past flutter: the latter has a complex pair."""
 REFERENCE = [-341.416740999, 467.908344864, 735.029226438]
 SERIAL = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="long on several ranks")
 
@@ -119,6 +124,14 @@ def test_methods_agree_without_symmetry(load: float) -> None:
 
 
 def test_names() -> None:
+    """Ten nodes that turn have 30 eigenvalues at most; the README says what each method does."""
+    page = (Path(__file__).parents[2] / "README.md").read_text()
+    assert all(issubclass(find(name), Method) and f"`{name}`" in page for name in METHODS)
+    held = classics.clamped(), classics.free(lambda c: (0.0, 0.0, -c.P))
+    solver = Solver(classics.column("ten nodes", held, (0.0, 1.0)), Discretization("reduced", 3, 3))
+    for ask in (solver.modes, solver.assess):
+        with pytest.raises(InputError, match="no more than 30 eigenvalues, not 1000000: give number=30 or less"):
+            ask(solver.equilibria.system.new_vector(), number=10**6)
     assessor, x = at("cord", "reduced", 20.0, False)
     with pytest.raises(
         InputError,
@@ -159,39 +172,8 @@ def test_reference_values(method: str) -> None:
     np.testing.assert_allclose(assessor(x, method, 3).values, REFERENCE, rtol=1e-9)
 
 
-def test_no_more_eigenvalues_than_a_mesh_has() -> None:
-    """Ten nodes that turn have 30 at most, which is told of any state before anything is computed."""
-    solver = Solver(
-        classics.column("ten nodes", (classics.clamped(), classics.free(lambda c: (0.0, 0.0, -c.P))), (0.0, 1.0)),
-        Discretization("reduced", 3, 3),
-    )
-    at = solver.equilibria.system.new_vector()  # no equilibrium
-    for ask in (solver.modes, solver.assess):
-        with pytest.raises(InputError, match="no more than 30 eigenvalues, not 1000000: give number=30 or less"):
-            ask(at, number=10**6)
-
-
-def test_a_method_has_a_class() -> None:
-    """docs/running.md says what each does."""
-    page = (Path(__file__).parents[2] / "docs" / "running.md").read_text()
-    assert all(issubclass(find(name), Method) and f"`{name}`" in page for name in METHODS)
-
-
-def test_parameters_of_cayley_follow_a_branch() -> None:
-    solver = Solver(scene("cord"), Discretization("reduced", *SMALL)).equilibria
-    assessor = Assessor(solver.system)
-    work = []
-    for load in (30.0, 31.0, 32.0, 48.0, 60.0):
-        solver.system.set_phase(None)
-        x, _ = solver.at_load(solver.start(load), load)
-        found, other = assessor(x, "cayley", 3), assessor(x, "shift-invert", 3)
-        np.testing.assert_allclose(found.values, other.values, rtol=1e-9)
-        assert found.certified
-        work.append(found.factorisations)
-    assert work[1] < work[0]
-
-
 def test_interval() -> None:
+    """An end on an eigenvalue belongs to the interval or not, what is inside is found."""
     assessor, x = at("cord", "reduced", 20.0, False)
     every = assessor(x, "shift-invert", 8).values
     low, high = (every[1] + every[2]) / 2, (every[5] + every[6]) / 2
@@ -200,29 +182,8 @@ def test_interval() -> None:
     assert found.certified
     with pytest.raises(InputError, match="is empty"):
         assessor(x, "slicing", interval=(high, low))
-
-
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-def test_deflation_alone(formulation: str) -> None:
-    """Without the constraint that keeps it out, the symmetry mode is found as mu = 0, unless it is deflated."""
-    assessor, x = at("hemitropic", formulation, 0.2, True)
-    expected, system = assessor(x, "shift-invert", 4).values, assessor.system
-    matrix, mass = system.state_matrix(), system.metric_matrix()
-    assemble_pencil(system, x, matrix, mass)
-    ((mode, _),) = weighed_modes(system, symmetry_modes(system, x), mass).values()
-    shift = float(expected[0]) - 1.0
-    shifted = matrix.copy()
-    shifted.axpy(-shift, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    factors = factors_of("lu", system.comm, 0, 0)
-    factors(shifted)
-    assert assessor.inertia is not None
-    for deflated, zeros in (((), 1), ([mode], 0)):
-        solver = with_factors(matrix, mass, 6, shift, Inverse(factors), assessor.inertia.seed(1), deflated)
-        solver.solve()
-        values = np.sort([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
-        vanish = abs(values) < 1e-9 * abs(expected).max()
-        assert vanish.sum() == zeros
-        np.testing.assert_allclose(values[~vanish][:4], expected, rtol=1e-9)
+    values = assessor(x, "slicing", interval=(every[1], every[4])).values
+    assert {2, 3} <= {int(np.argmin(abs(every - v))) for v in values} <= {1, 2, 3, 4}
 
 
 # --- nasty -----------------------------------------------------------------------------------------------------
@@ -245,7 +206,7 @@ def test_shift_of_the_reduction_on_an_eigenvalue() -> None:
     system, x = plain("cord", "reduced", *SMALL, 20.0)
     expected = at("cord", "reduced", 20.0, False)[0](x, "dense", 3).values
     for inverse in INVERSES:
-        reduction = Reduction(Coordinates(system).assemble(x), inverse)
+        reduction = ReducedPencil(Coordinates(system).assemble(x), inverse)
         for value in expected:
             try:
                 found = reduction.near(3, value)
@@ -253,15 +214,6 @@ def test_shift_of_the_reduction_on_an_eigenvalue() -> None:
                 assert "elsewhere" in str(trouble) or (inverse != "saddle" and "the inverse 'saddle'" in str(trouble))
                 continue
             assert abs(found.values - value).min() < 1e-9 * abs(expected).max()
-
-
-def test_interval_between_eigenvalues() -> None:
-    """An end on an eigenvalue belongs to the interval or not, what is inside is found."""
-    assessor, x = at("cord", "reduced", 20.0, False)
-    every = assessor(x, "dense", 6).values
-    found = assessor(x, "slicing", interval=(every[1], every[4])).values
-    np.testing.assert_allclose(found[np.isclose(found, every[2])][0], every[2], rtol=1e-9)
-    assert {2, 3} <= {int(np.argmin(abs(every - v))) for v in found} <= {1, 2, 3, 4}
 
 
 @pytest.mark.few(1)
@@ -329,18 +281,6 @@ def test_no_mass_at_all(method: str) -> None:
     with pytest.raises(SceneError, match="give it a mass or a rotary inertia"):
         Assessor(solver.system)(x, method, 2)
     assert Assessor(solver.system)(x, "count").stable
-
-
-def test_more_constraints_than_half_the_unknowns() -> None:
-    """In full coordinates the pointwise formulation has p > m/2 with free strains none: the reduction still holds."""
-    system, x = plain("cord", "pointwise", *SMALL, 20.0)
-    pencil = Coordinates(system, "full").assemble(x)
-    m, p = pencil.C.shape
-    assert p > m / 2
-    expected = assess(system, x, number=3)
-    assert expected.certified
-    found = Reduction(pencil).near(3, expected.values[0] - 10.0)
-    np.testing.assert_allclose(found.values, expected.values, rtol=1e-9)
 
 
 def test_exact_zero() -> None:
@@ -428,7 +368,7 @@ def test_smallest_singular_value(formulation: str) -> None:
     for coordinates in ("full", "tangent"):
         pencil = Coordinates(system, coordinates).assemble(x)
         C = pencil.C.toarray()
-        assert rank_of(pencil) == pytest.approx(np.linalg.svd(C, compute_uv=False)[-1], rel=1e-9)
+        assert smallest_singular(pencil.C)[0] == pytest.approx(np.linalg.svd(C, compute_uv=False)[-1], rel=1e-9)
 
 
 def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
@@ -436,7 +376,7 @@ def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
     for n in (50, 100, 200):
         solver = Solver(scene("cord"), Discretization("pointwise", n, 1)).equilibria
         pencil = Coordinates(solver.system).assemble(solver.start(20.0))
-        ratios.append(rank_of(pencil) * n)
+        ratios.append(smallest_singular(pencil.C)[0] * n)
     assert abs(np.diff(ratios)).max() < 0.05 * ratios[-1]
 
 
@@ -444,13 +384,13 @@ def test_round_off_is_no_independence() -> None:
     """Two constraints on one unknown differ by round-off of another one; in a tiny rod by what is none."""
     unit, where = sp.identity(3, format="csr"), {"q": np.array([0, 1]), "r": np.array([2])}
 
-    def pencil(C: list[list[float]]) -> Pencil:
-        return Pencil(unit, sp.csr_matrix(np.array(C)), unit, where, np.zeros(2))
+    def least(C: list[list[float]], length: float) -> float:
+        pencil = Pencil(unit, sp.csr_matrix(np.array(C)), unit, where, np.zeros(2))
+        return next(weak_combinations(pencil, length))[0]
 
-    with pytest.raises(SceneError, match="depend on one another"):
-        rank_of(pencil([[1.0, 1.0], [0.0, 1e-16], [0.0, 0.0]]))
-    tiny = pencil([[1.0, -1.0], [0.0, 0.0], [1e13, 1e13]])  # a rotation and a position, in a rod of the length 1e-13
-    assert rank_of(tiny, length=1e-13) == pytest.approx(2**0.5)
+    assert least([[1.0, 1.0], [0.0, 1e-16], [0.0, 0.0]], 1.0) < 1e-15
+    # a rotation and a position, in a rod of the length 1e-13
+    assert least([[1.0, -1.0], [0.0, 0.0], [1e13, 1e13]], 1e-13) == pytest.approx(1.0)
 
 
 def test_dependent_constraints_are_named() -> None:
@@ -462,5 +402,190 @@ def test_dependent_constraints_are_named() -> None:
     assert sigma < 1e-13
     np.testing.assert_allclose(abs(vector[last[:2]]), 2**-0.5, rtol=1e-6)
     twin = replace(pencil, C=C.tocsr(), where=pencil.where | {"eta": np.zeros(0, dtype=int)})
-    with pytest.raises(SceneError, match=r"component 1 and position of the ends, component 2.*remove those"):
-        rank_of(twin)
+    assert named(twin, ["one end", "the other", "none"], vector) == "one end and the other"
+
+
+# --- the method of Kumar and Healey (2010) ---------------------------------------------------------------------
+
+
+CASES = [
+    pytest.param(name, formulation, load, bent, coordinates, id=f"{name}-{formulation}-{load}-{bent}-{coordinates}")
+    for name, load, bent in (*STATES, *WITHOUT_POTENTIAL)
+    for formulation in ("reduced", "pointwise")
+    for coordinates in ("full", "tangent", "compatible")
+    if formulation == "pointwise" or (name != "follower" and coordinates != "compatible")
+]
+
+
+@cache
+def pencil(name: str, formulation: str, load: float, bent: bool, coordinates: str = "tangent") -> MappedPencil:
+    system, x = (buckled if bent else plain)(name, formulation, *SMALL, load)
+    return Coordinates(system, coordinates).assemble(x)
+
+
+def null_space_values(p: MappedPencil, target: float, number: int) -> np.ndarray:
+    """Finite eigenvalues nearest to ``target`` by dense linear algebra only: an SVD of C, and QZ.
+
+    QZ is applied to ``(M, K - target M)`` on the kernel: its values ``1/(mu - target)`` are most precise near there.
+    """
+    K, C, M = (a.toarray() for a in (p.K, p.C, p.M))
+    Z = scipy.linalg.null_space(C.T) if C.shape[1] else np.eye(len(K))
+    assert Z.shape[1] == C.shape[0] - C.shape[1]
+    a, b = scipy.linalg.eig(Z.T @ M @ Z, Z.T @ (K - target * M) @ Z, right=False, homogeneous_eigvals=True)
+    inverse = a / b
+    nearest = inverse[np.argsort(-abs(inverse))][:number]
+    values = target + 1 / nearest
+    return values[np.lexsort((np.round(values.imag, 6), np.round(values.real, 6)))]
+
+
+def below(p: MappedPencil) -> float:
+    """A shift below the spectrum of all these states."""
+    return -10.0 if p.symmetric else 1.0
+
+
+# --- blocks ----------------------------------------------------------------------------------------------------
+
+
+def sizes(name: str, formulation: str, coordinates: str, elements: int, degree: int) -> tuple[int, int]:
+    solver = Solver(scene(name), Discretization(formulation, elements, degree)).equilibria
+    found = Coordinates(solver.system, coordinates).assemble(solver.start(0.1))
+    assert found.K.shape == found.M.shape == (found.C.shape[0],) * 2
+    assert sum(len(found.where[n]) for n in ("theta", "q", "v", "r") if n in found.where) == found.K.shape[0]
+    return found.C.shape
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("n", [5])
+def test_sizes_for_linear_elements_are_those_of_the_paper(n: int) -> None:
+    assert sizes("cord", "pointwise", "tangent", n, 1) == (6 * n - 5, 3 * n)
+    assert sizes("cord", "reduced", "tangent", n, 1) == (3 * (n - 1), 2)
+    assert sizes("hemitropic", "pointwise", "compatible", n, 1) == (6 * (n - 1), 2 * n)
+    assert sizes("hemitropic", "reduced", "tangent", n, 1) == (4 * n - 3, 3)
+    assert sizes("ruler", "reduced", "tangent", n, 1) == (4 * n, 0)
+    assert sizes("follower", "pointwise", "tangent", n, 1) == (6 * n, 3 * n)
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_spins_fulfil_the_norm_conditions(formulation: str) -> None:
+    full, tangent = (pencil("cord", formulation, 40.0, True, c) for c in ("full", "tangent"))
+    C, T = full.C, tangent.T
+    K = T.T @ full.K @ T - tangent.K
+    assert abs(K).max() < 1e-12 * abs(full.K).max()
+    everywhere = PETSc.COMM_WORLD.tompi4py().allgather(full.where["eta"])
+    assert abs((T.T @ C)[:, np.concatenate(everywhere)]).max() < 1e-15
+
+
+# --- kernels ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("groups", [1, 2, 3, 8, 13])
+def test_kernel_of_random_chains(groups: int) -> None:
+    """Groups and links of any widths, rows without entries, and dense columns on top."""
+    rng = np.random.default_rng(groups)
+    widths = rng.integers(1, 4, groups)
+    starts = np.append(0, np.cumsum(widths))
+    rows = []
+    for link in range(groups + 1):
+        for _ in range(rng.integers(4, 9)):
+            row = np.zeros(starts[-1] + 2)
+            a, b = starts[max(link - 1, 0)], starts[min(link + 1, groups)]
+            row[a:b] = rng.normal(size=b - a)
+            row[-2:] = rng.normal(size=2)
+            rows.append(row)
+    rows += [np.zeros(starts[-1] + 2)] * 3
+    C = np.array(rows)[rng.permutation(len(rows))]
+    columns = rng.permutation(C.shape[1])
+    place = np.append(np.repeat(np.linspace(-2, 5, groups), widths), [np.nan, np.nan])
+    found = kernel(sp.csr_matrix(C[:, columns]), place[columns])
+    Z = found.expand(np.eye(found.dimension))
+    assert Z.shape == (C.shape[0], C.shape[0] - C.shape[1])
+    np.testing.assert_allclose(Z.T @ Z, np.eye(found.dimension), atol=1e-13)
+    np.testing.assert_allclose(C.T @ Z, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_dependent_constraints_are_an_error(formulation: str) -> None:
+    p = pencil("hemitropic", formulation, 0.2, True)
+    C = p.C.tolil()
+    C[:, 1] = C[:, 0] - 2 * C[:, 2]
+    with pytest.raises(InputError, match=r"depend on one another.*remove"):
+        kernel(C.tocsr(), p.place)
+
+
+def test_work_is_linear() -> None:
+    """Factors of twice as long a rod take twice the memory: that is what a product reads."""
+    kernels, sizes = [], []
+    for elements in (64, 128):
+        solver = Solver(scene("cord"), Discretization("pointwise", elements, 2)).equilibria
+        p = Coordinates(solver.system).assemble(solver.start(60.0))
+        kernels.append(kernel(p.C, p.place))
+        sizes.append(sum(rows.nbytes + Q.nbytes for rows, Q in kernels[-1].steps))
+    assert 1.9 < sizes[1] / sizes[0] < 2.1
+    assert sizes[1] < kernels[1].size ** 2  # a dense Q would take eight times that
+
+
+# --- eigenvalues -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.few(6)
+@pytest.mark.parametrize(("name", "formulation", "load", "bent", "coordinates"), CASES)
+def test_eigenvalues_are_those_of_dense_matrices(
+    name: str, formulation: str, load: float, bent: bool, coordinates: str
+) -> None:
+    p = pencil(name, formulation, load, bent, coordinates)
+    target, number = below(p), 4
+    expected = null_space_values(p, target, number)
+    reduction = ReducedPencil(p)
+    modes = reduction.near(number, target)
+    scale = abs(expected).max()
+    np.testing.assert_allclose(modes.values, expected, rtol=1e-9, atol=1e-11 * scale)
+    assert modes.errors.max() < 1e-12
+    assert np.iscomplexobj(modes.values) == (not p.symmetric)
+    np.testing.assert_allclose(p.C.T @ modes.vectors, 0, atol=1e-12 * abs(modes.vectors).max())
+
+
+def test_all_eigenvalues_of_a_small_rod() -> None:
+    """Strains have no mass: 9 of the 12 unknowns of the kernel move, the others are infinite eigenvalues."""
+    solver = Solver(scene("hemitropic"), Discretization("reduced", 4, 1)).equilibria
+    system = solver.system
+    p = Coordinates(system).assemble(solver.at_load(solver.start(0.1), 0.1)[0])
+    reduction = ReducedPencil(p)
+    n = reduction.kernel.dimension
+    rank = np.linalg.matrix_rank(reduction.kernel.project(reduction.M @ reduction.kernel.expand(np.eye(n))))
+    assert rank < n
+    found = reduction.near(rank, -1.0)
+    np.testing.assert_allclose(found.values, null_space_values(p, -1.0, rank), rtol=1e-9)
+    with pytest.raises(ConvergenceError, match="ask for fewer"):
+        reduction.near(n, -1.0)
+
+
+@pytest.mark.versions
+@pytest.mark.short
+@pytest.mark.parametrize("coordinates", ["full", "tangent"])
+def test_elimination_by_the_paper_s_formula(coordinates: str) -> None:
+    """In full coordinates a quaternion at rest has no stiffness along itself."""
+    assessor, x = reference()
+    reduction = ReducedPencil(Coordinates(assessor.system, coordinates).assemble(x), "elimination")
+    if coordinates == "full":
+        with pytest.raises(ConvergenceError, match="use the inverse 'saddle'"):
+            reduction.near(3, -400.0)
+        return
+    for shift in (-400.0, cayley_shift(np.array([-300.0, 500.0]))):
+        np.testing.assert_allclose(reduction.near(3, shift).values, REFERENCE, rtol=1e-9)
+
+
+def test_impossible_requests() -> None:
+    system, _ = plain("cord", "reduced", *SMALL, 20.0)
+    for coordinates, sentence in (("polar", "choose one of full, tangent, compatible"), ("compatible", "pointwise")):
+        with pytest.raises(InputError, match=sentence):
+            Coordinates(system, coordinates)
+    p = pencil("cord", "reduced", 20.0, False)
+    with pytest.raises(InputError, match="choose one of saddle, elimination"):
+        ReducedPencil(p, "magic")
+    with pytest.raises(InputError, match="ask for at most 49"):
+        ReducedPencil(p).near(50, -1.0)
+    for place in (np.full(5, np.nan), np.zeros(5)):
+        with pytest.raises(InputError, match="5 constraints on 4 unknowns"):
+            kernel(sp.csr_matrix(np.ones((4, 5))), place)
+    with pytest.raises(InputError, match="more than two neighbouring groups"):
+        kernel(sp.csr_matrix(np.ones((6, 3))), np.arange(3.0))

@@ -24,8 +24,8 @@ from rodfem import (
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import SceneError
-from rodfem.stability.blocks import Blocks
 from rodfem.stability.dependence import _distance, require_independent_constraints, smallest_singular
+from rodfem.stability.pencil import Blocks
 
 PLAN = Plan(depth=0, steps=StepControl(most=3), error_bars=False)
 

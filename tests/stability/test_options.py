@@ -12,10 +12,10 @@ from small_states import plain
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
-from rodfem.kumar_healey.reduction import Reduction
+from rodfem.kumar_healey.reduction import ReducedPencil
 from rodfem.stability.assessment import Assessor
+from rodfem.stability.methods import in_interval
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.stability.pencil import in_interval, with_factors
 
 pytestmark = pytest.mark.alone
 
@@ -69,7 +69,7 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
     assessor = Assessor(system)
     expected = assessor(x, "shift-invert", 3).values
     spectrum = assessor.symmetric
-    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum.shifted.factors, spectrum.inertia.seed(1))
+    solver = spectrum.at(x).eigensolver(3, spectrum.inertia.seed(1))
     assert (solver.getDimensions()[1], solver.getTolerances()[0]) == (17, 1e-7)
     options["rodfem_slicing_eps_tol"], options["rodfem_slicing_st_mat_mumps_icntl_7"] = 1e-8, ORDERING
     solver = in_interval(spectrum.matrix, spectrum.mass, -20.0, 30.0)
@@ -81,7 +81,7 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
 
 def test_reduced_pencil(options: PETSc.Options) -> None:
     system, x = cord()
-    reduction = Reduction(Coordinates(system).assemble(x))
+    reduction = ReducedPencil(Coordinates(system).assemble(x))
     expected = reduction.near(3, -30.0).values
     options["rodfem_eps_tol"] = 1e-11
     np.testing.assert_allclose(reduction.near(3, -30.0).values, expected, rtol=1e-9)

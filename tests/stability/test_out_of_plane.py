@@ -10,7 +10,7 @@ import pytest
 
 from rodfem import Discretization, Ordinate, Parameter, Scene, Solver, clamped
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.out_of_plane import InSpace
+from rodfem.stability.in_space import InSpace
 
 
 @pytest.mark.few(1)

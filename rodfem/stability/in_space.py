@@ -17,19 +17,16 @@ from rodfem.tolerances import same_place
 
 PUSHED = 1e-8
 """Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
-NEAR = 1e-2
-"""Distance, in the metric, within which the state in space that belongs to a planar one is sought."""
 
 
 class InSpace:
     """Counts the index of planar states among all perturbations in space.
 
-    The rod in space has the same mesh, but quaternions in the place of the angle: to them, rotations of space and of
-    the cross-sections are exact symmetries of the discrete rod, so that zero eigenvalues are zero.
+    The rod in space has the same mesh, and quaternions instead of the angle: rotations of space and of the
+    cross-sections are exact symmetries of the discrete rod, so that zero eigenvalues are zero.
     """
 
     def __init__(self, planar: System) -> None:
-        """Allocate the system of the same rod in space."""
         self.planar = planar
         fields = planar.fields
         self.system = System(planar.scene.in_space(), fields.discretization, planar.comm, planar.clock)
@@ -47,11 +44,11 @@ class InSpace:
         return self.at(x).count()
 
     def negative(self, x: PETSc.Vec) -> int:
-        """Number of negative eigenvalues in space of the planar equilibrium ``x``; raises as :meth:`count` does.
+        """Number of negative eigenvalues in space of the planar equilibrium ``x``; raises as :meth:`at` does.
 
-        Those out of the plane that the count has as zero are decided by their Rayleigh quotients: symmetries in space
-        are left out, and a rod that is nearly symmetric may fall out of its plane slowly.  Raises
-        :class:`ConvergenceError` where they are not told apart.
+        Those out of the plane that the count has as zero are decided by their Rayleigh quotients: symmetries are left
+        out, and a rod that is nearly symmetric may fall out of its plane slowly.  Raises :class:`ConvergenceError` if
+        they are not told apart.
         """
         found = self.at(x)
         index = found.count()
@@ -71,7 +68,7 @@ class InSpace:
         return float(self.system.comm.allreduce(own, op=MPI.SUM))
 
     def at(self, x: PETSc.Vec) -> Factored:
-        """Second variation in space at the planar equilibrium ``x``; raises :class:`SceneError` where it is none."""
+        """Second variation in space at the planar equilibrium ``x``; :class:`SceneError` if that is none in space."""
         state = self.lift(x)
         self.system.set_phase(state)
         residual = self.system.new_vector()
@@ -83,7 +80,8 @@ class InSpace:
                 "leave planar out of the scene."
             )
         settled = state.copy()
-        if correct(self.system, settled, self.system.load_axis(), NEAR).converged:
+        # within this distance, in the metric, of the planar state
+        if correct(self.system, settled, self.system.load_axis(), 0.01).converged:
             state = settled  # else the state is so near a singular one that its own error decides as well
         return self.inertia.at(state)
 
