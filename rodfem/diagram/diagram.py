@@ -310,8 +310,7 @@ class Diagram:
 
     def view(self) -> Page:
         """Make the page that ``rodfem view`` opens: a notebook shows it, ``.open()`` a browser; collective."""
-        from rodfem.report.page import Page, page_of
-        from rodfem.report.payload import payload_of
+        from rodfem.report.page import Page, page_of, payload_of
 
         comm = self.solvers[0].system.comm
         with TemporaryDirectory() as folder:

@@ -16,13 +16,13 @@ from rodfem.adaptivity.error_estimate import Enriched, bound
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.faults import as_failure
 from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.transfer import halved
 from rodfem.linalg.matrices import local_rows, rounding, rounding_of
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Few, Modes, Typical
 from rodfem.modes.perturbation import Motion, Motions
+from rodfem.ranks import as_failure
 from rodfem.stability import motion_names
 from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.cluster import DRAWN, as_vectors
