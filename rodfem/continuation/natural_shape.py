@@ -14,7 +14,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from rodfem.errors import SceneError
 from rodfem.forms.kinematics import UNDEFORMED
@@ -67,6 +66,8 @@ def _natural_strains(scene: Scene, load: float) -> Callable[[np.ndarray], np.nda
     values = np.array([*UNDEFORMED, 0.0, 0.0, 0.0]) + found
     if len(places) == 1:
         return lambda s: np.tile(values, (len(s), 1))
+    from scipy.interpolate import PchipInterpolator  # slow to load
+
     return PchipInterpolator(places, values, axis=0)
 
 

@@ -124,8 +124,8 @@ def test_methods_agree_without_symmetry(load: float) -> None:
 
 
 def test_names() -> None:
-    """Ten nodes that turn have 30 eigenvalues at most; the README says what each method does."""
-    page = (Path(__file__).parents[2] / "README.md").read_text()
+    """Ten nodes that turn have 30 eigenvalues at most; docs/running.md says what each method does."""
+    page = (Path(__file__).parents[2] / "docs" / "running.md").read_text()
     assert all(issubclass(find(name), Method) and f"`{name}`" in page for name in METHODS)
     held = classics.clamped(), classics.free(lambda c: (0.0, 0.0, -c.P))
     solver = Solver(classics.column("ten nodes", held, (0.0, 1.0)), Discretization("reduced", 3, 3))
