@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 36518,
+    "lines of Python": 36520,
     "files of Python": 233,
     "lines of C": 957,
     "module constants with a number": 447,
