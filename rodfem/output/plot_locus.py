@@ -48,7 +48,9 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     locus, or if they are not of the same two parameters.
     """
     if any(one["parameters"] != loci[0]["parameters"] for one in loci) or not loci:
-        raise ValueError("Give loci, one at least, of the same two parameters.")
+        raise ValueError(
+            "There is no locus, or they are of different parameters: give at least one, or draw them one by one."
+        )
     for one in loci:
         LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
     with matplotlib.rc_context(STYLE):
