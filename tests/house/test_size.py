@@ -14,13 +14,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 36589,
+    "lines of Python": 36602,
     "files of Python": 232,
     "lines of C": 957,
-    "module constants with a number": 474,
+    "module constants with a number": 475,
     "functions of a complexity above 10": 56,
     "functions of six parameters or more": 40,
-    "places that warn": 33,
+    "places that warn": 34,
     "files that import internals of UFL and FFCx": 11,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
