@@ -8,7 +8,7 @@ each by itself, since a rod that is pressed together much may turn by little.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import copysign, inf
 
@@ -23,6 +23,7 @@ from rodfem.continuation.prediction import ROWS, across_orbit, predict_at_load
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
+from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 
@@ -30,6 +31,8 @@ BENT = 1e-6
 """Distance from the chord, over the rod's length, and rotation from the scene's start, in radian, that are none."""
 AHEAD = 0.1
 """Distance along the first tangent, in the metric, at which the centreline is looked at as well."""
+NODES = 8
+"""Nodes for each unstable mode below which the index is compared."""
 HOPELESS, A_FEW = 0.9, 4
 """Index over the number of nodes above which it is that of the mesh; half-waves that a mesh of any size is allowed."""
 PARTS = (1, 2, 4, 8)
@@ -102,18 +105,28 @@ def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
         )
 
 
-def check_start(solver: BranchSolver, span: tuple[float, float]) -> None:
-    """Raise :class:`InputError` where the mesh of a ``solver`` cannot hold the half-waves at the ends of a ``span``.
+def check_start(solver: BranchSolver, span: tuple[float, float], warn: Callable[[str], None]) -> None:
+    """Compare the index at the ends of a ``span`` with that on twice as many elements, where a mesh has few.
 
-    Of a rod that bends from the start on, only the first load is looked at.  Raises :class:`SceneError` where
-    constraints depend on one another.  Collective.
+    Each unstable mode has half-waves: another index is that of the mesh, and ``warn`` gets a sentence.  Of a rod that
+    bends from the start on, only the first load is looked at.  Raises :class:`InputError` where the mesh of the
+    ``solver`` cannot hold the half-waves at all, :class:`SceneError` where constraints depend on one another.
+    Collective.
     """
-    mesh = solver.system.fields.discretization
+    scene, mesh = solver.system.scene, solver.system.fields.discretization
     for load in span if solver.conservative else ():
         index = _index(solver, load)
         if index is None:
             return
-        check_index(solver.system.scene, load, index, mesh.elements * mesh.degree)
+        check_index(scene, load, index, mesh.elements * mesh.degree)
+        if NODES * index > mesh.elements * mesh.degree:
+            there = _index(BranchSolver(System(scene, mesh.finer(2), solver.system.comm)), load)
+            if there not in (None, index):
+                warn(
+                    f"At {scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} elements "
+                    f"and {there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a higher "
+                    "degree."
+                )
 
 
 def _index(solver: BranchSolver, load: float) -> int | None:

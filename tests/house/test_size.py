@@ -14,6 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
+<<<<<<< HEAD
     "lines of Python": 36115,
     "files of Python": 233,
     "lines of C": 957,
@@ -22,6 +23,16 @@ MOST = {
     "functions of six parameters or more": 34,
     "places that warn": 36,
     "files that import internals of UFL and FFCx": 2,
+=======
+    "lines of Python": 36602,
+    "files of Python": 232,
+    "lines of C": 957,
+    "module constants with a number": 475,
+    "functions of a complexity above 10": 56,
+    "functions of six parameters or more": 40,
+    "places that warn": 34,
+    "files that import internals of UFL and FFCx": 11,
+>>>>>>> 9aa50ef7eebc3054a511fbd504a2b932e2520886
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
 INTERNALS = ("ufl.", "ffcx.")
