@@ -200,8 +200,8 @@ FAULTS = {
     ),
     "beyond-a-corner-the-tangent-is-that-before-it": Fault(
         "rodfem/continuation/follow.py",
-        "_moved(self.solver, point.x, self._beside)",
-        "_moved(self.solver, point.x, -self._beside)",
+        "_moved(self.solver, point.x, self._offset)",
+        "_moved(self.solver, point.x, -self._offset)",
         "tests/problem/test_tables.py",
     ),
     "out-of-the-range": Fault(
@@ -622,7 +622,10 @@ FAULTS = {
         "tests/problem/test_units.py",
     ),
     "what-is-free-on-the-trunk-stays-free": Fault(
-        f"{CONTINUATION}switching.py", "return None if still else index_beside(", "return index_beside(", CHAIN
+        f"{CONTINUATION}switching.py",
+        "return None if still else neighbouring_index(",
+        "return neighbouring_index(",
+        CHAIN,
     ),
     "detached-through-nothing": Fault(
         "rodfem/diagram/explorer.py", "and point.stretch > 0 and not", "and not", "tests/hard/test_fuzz.py"

@@ -94,8 +94,8 @@ class OrdinateBound:
         for s, weights, richer in self._tried:
             before, after = self.coarse.place(first, s, weights), self.richer.place(second, s, richer)
             turned = q + after[1] - before[1]
-            beside = of.of(r + after[0] - before[0], turned / np.sqrt(turned @ turned))
-            largest = max(largest, abs(float(beside) - value))
+            moved = of.of(r + after[0] - before[0], turned / np.sqrt(turned @ turned))
+            largest = max(largest, abs(float(moved) - value))
         return largest
 
 

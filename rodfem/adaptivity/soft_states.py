@@ -120,7 +120,7 @@ class SoftStates:
         point.soft = [m for m in found.soft if not m.decided or abs(m.value) < limit]
 
     def _doubtful(self, point: Point, fixed_load: bool, *, compare: bool) -> int | None:
-        """Number of eigenvalues nearest zero to be judged besides soft ones; None where there is nothing to judge.
+        """Number of eigenvalues nearest zero to be judged, soft ones apart; None if there is nothing to judge.
 
         Those of another sign on the richer mesh, and the one nearest zero if it has another value there.
         """
@@ -214,7 +214,7 @@ def _across_branch(metric: PETSc.Mat, near: NearZero, branch: Sequence[PETSc.Vec
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
     """Point on a richer mesh, and what was found when it was computed there.
 
-    Beside a ``soft`` mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere if it
+    Next to a ``soft`` mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere if it
     fails. Raises :class:`ConvergenceError` if the mesh has no such point, with a soft mode also if it has another
     state.
     """
@@ -318,7 +318,7 @@ class SoftRows:
         branch.special[:] = [s for s, out in zip(branch.special, left_out, strict=True) if not out]
 
     def _is_family(self, branch: Branch) -> bool:
-        """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
+        """Whether a branch is a family of equilibria at one load; the slope is small next to a fold, too."""
         span, singular = self.meshes.solvers[0].system.scene.span, {id(s.point) for s in branch.special}
         begin = 1 if branch.parent else 0  # a pitchfork begins without a slope
         rows = [p for p in branch.points[begin:] if id(p) not in singular]

@@ -301,7 +301,7 @@ class Constant(NamedTuple):
 
 
 class Statement:
-    """A rod as a function of its constants, of a scene alone the parameters beside its load."""
+    """A rod as a function of its constants, of a scene alone the parameters apart from its load."""
 
     def __init__(self, of: Callable[..., Scene] | Scene) -> None:
         """Read the constants; raises :class:`InputError` for one without a default, or of no type that has options."""

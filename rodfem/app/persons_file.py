@@ -1,6 +1,6 @@
 """A person's Python file, run by a command of the program: the module that it is, or one sentence on where it fails.
 
-It may import what stands beside it.  Its folder is the last one in which modules are looked for: a file ``json.py`` or
+It may import what stands next to it.  Its folder is the last one in which modules are looked for: a file ``json.py`` or
 ``h5py.py`` there is no module of those that compute.
 """
 

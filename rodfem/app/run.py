@@ -255,7 +255,7 @@ def _to_follow(branch: Branch) -> list[SpecialPoint]:
 
 
 def draw(output: Path, report: Report) -> None:
-    """Draw the diagram, and beside it in a second process the shape of a stable state if there is one."""
+    """Draw the diagram, and at the same time in a second process the shape of a stable state if there is one."""
     from concurrent.futures import ThreadPoolExecutor
 
     from rodfem.output.files import load_json
@@ -270,8 +270,8 @@ def draw(output: Path, report: Report) -> None:
         return
     branch, row, words = typical_state(data)
     caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"
-    with ThreadPoolExecutor(1) as beside:  # the shape is drawn by a process of its own, for which the thread waits
-        shape = beside.submit(
+    with ThreadPoolExecutor(1) as background:  # the shape is drawn by a process of its own, for which the thread waits
+        shape = background.submit(
             draw_shape_safely, output / "states.h5", branch, row, output / "shape.png", caption=caption
         )
         draw_diagram(data, output / "diagram.png")

@@ -299,7 +299,7 @@ class Collision:
     def _by_both_sides(self, found: Zero, slope: float) -> Zero:
         """Correct a zero of ``D`` that was ``found`` twice, by its ``slope``.
 
-        The uncertainty is the last change and the round-off of ``D``.  If left vectors are not found, as beside a
+        The uncertainty is the last change and the round-off of ``D``.  If left vectors are not found, as next to a
         double zero, the zero stays that of the eigenvalues.
         """
         t, _, now, x = found

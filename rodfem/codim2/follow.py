@@ -114,8 +114,8 @@ def errors_of(
             unresolved |= set() if resolved else {row}
         except ConvergenceError:
             error[row] = np.inf
-    beside = [{*rows[max(i - 1, 0) : i + 2]} for i in range(len(rows))]
-    doubtful = {row for row, near in zip(rows, beside, strict=True) if nodes[row].sought and near & unresolved}
+    neighbours = [{*rows[max(i - 1, 0) : i + 2]} for i in range(len(rows))]
+    doubtful = {row for row, near in zip(rows, neighbours, strict=True) if nodes[row].sought and near & unresolved}
     return Errors(error, sorted(unresolved | doubtful))
 
 
@@ -135,8 +135,8 @@ def not_integrated(solver: BranchSolver, plane: Plane, nodes: Sequence[LocusPoin
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
-BESIDE = 1e-3
-"""Distance of a load beside a divergence load at which the unstable eigenvalues are counted, over the bounds."""
+COUNT_OFFSET = 1e-3
+"""Distance of a load from a divergence load at which the unstable eigenvalues are counted, over the bounds."""
 COLUMNS = "p", "rest", "ordinate", "omega2", "located_to"
 """Of the points of a curve what its rows have."""
 
@@ -155,7 +155,7 @@ def locus(
 
     ``bounds`` are their intervals, on which the curve ends exactly; lengths of ``steps`` are relative to them.  Errors
     are estimated at the marked rows and so many others, ``error_bars``; 0: at none.  The ``solver`` is that of the
-    special point, and is left as it was; ``doubtful``: its mesh leaves the index beside the point open.  Raises
+    special point, and is left as it was; ``doubtful``: its mesh leaves the index next to the point open.  Raises
     :class:`InputError` for a parameter, bounds or a kind that make no sense, :class:`ConvergenceError` if the special
     point is not found again.
     """
@@ -297,13 +297,13 @@ class _Followed:
         return self.first.multiplicity
 
     def _lower_side(self) -> int:
-        """Side of the load, -1 or 1, on which the index is the lower one beside the special point; 0: unknown."""
+        """Side of the load, -1 or 1, on which the index is the lower one next to the special point; 0: unknown."""
         special, solver, node = self.special, self.solver, self.first
         if special.kind == FLUTTER:
             return node.lower
         if special.kind == DIVERGENCE:
             x = self.plane.at(node.p, node.x)
-            loads = node.p[0] + BESIDE * self.plane.width[0] * np.array([-1.0, 1.0])
+            loads = node.p[0] + COUNT_OFFSET * self.plane.width[0] * np.array([-1.0, 1.0])
             pencils = NonsymmetricSolver(solver.system)
             below, above = (unstable(pencils.at(solver.at_load(x, float(load))[0])) for load in loads)
             return int(np.sign(below - above))

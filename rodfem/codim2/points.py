@@ -49,7 +49,7 @@ NONE = 1e-10
 """Part of a unit tangent along one parameter, or of a coupling over that with the other one, that is round-off: it has
 no sign."""
 VANISHED, PASSED = 0.05, 1e-3
-"""Share that is left of a coupling where it vanishes, at an end and beside a cusp: its place is known to no more."""
+"""Share that is left of a coupling where it vanishes, at an end and next to a cusp: its place is known to no more."""
 TRIES = 8
 """Parabolas by which a least value in a step is sought, and times that a step is parted for more cusps than one."""
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
@@ -197,14 +197,14 @@ class Codim2Points:
     # --- rows ------------------------------------------------------------------------------------------------------
 
     def _rows(self, a: LocusPoint, b: LocusPoint, other: LocusPoint | None, depth: int) -> list[Row]:
-        """What is between two nodes, beside an ``other`` one, in a step that may be parted ``depth`` times."""
+        """What is between two nodes, next to an ``other`` one, in a step that may be parted ``depth`` times."""
         rows = list[Row]()
         for p, q in pairwise([a, *self._hidden(a, b, other), b]):
             rows += self._piece(p, q, depth) + [(q, "")] * (q is not b)
         return rows
 
     def _piece(self, a: LocusPoint, b: LocusPoint, depth: int) -> list[Row]:
-        """What is between two nodes where the curvature has another sign at most once, or by pieces beside that."""
+        """What is between two nodes where the curvature has another sign at most once, or by pieces next to that."""
         if a.curvature * b.curvature >= 0:
             turns = self._turns(a, b)
             for turn, _ in turns if depth else []:
@@ -226,7 +226,7 @@ class Codim2Points:
 
     def _sides(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
         """Points on both sides of a ``node`` between two others, none where these are as close."""
-        aside = (b.s - a.s) / 100  # the tangent has the direction that it has beside a cusp
+        aside = (b.s - a.s) / 100  # the tangent has the direction that it has next to a cusp
         both = node.s - aside, node.s + aside
         return [self._at(a, b, s) for s in both] if a.s < both[0] and both[1] < b.s else []
 

@@ -43,7 +43,7 @@ DIFFERENCE = 1e-5
 def corrected(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
     """Equilibrium on the plane through ``start`` across a ``row``; raises :class:`ConvergenceError`."""
     system, before = solver.system, solver.system.damping
-    try:  # beside a state that may move freely, where Newton's method slides away: with damping
+    try:  # next to a state that may move freely, where Newton's method slides away: with damping
         for system.damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
             x = start.copy()
             if correct(system, x, row).converged:
@@ -144,8 +144,8 @@ def lost_between(
     scales = convexity.scales(state(0.0), state(1.0))
     margin = cache(lambda t: convexity.margin(state(t), scales))
 
-    def node(t: float, beside: float) -> Node:
-        return Node(t, np.array([[margin(t)]]), np.array([[(margin(beside) - margin(t)) / (beside - t)]]), 0)
+    def node(t: float, other: float) -> Node:
+        return Node(t, np.array([[margin(t)]]), np.array([[(margin(other) - margin(t)) / (other - t)]]), 0)
 
     last = 0.0
     for t in [*places(node(0.0, DIFFERENCE), node(1.0, 1.0 - DIFFERENCE), 1), 1.0]:

@@ -56,7 +56,7 @@ SAME, ALIKE = 1e-12, 0.9
 class Node:
     """A state at a place ``s``: its reduced stiffness ``H``, the ``slope`` of that in s, both (k, k).
 
-    The index across the border is ``far``, and ``kept`` is what is to be known of the state besides.
+    The index across the border is ``far``, and ``kept`` is what is to be known of the state otherwise.
     """
 
     s: float

@@ -40,7 +40,7 @@ class End(NamedTuple):
     """An end of a piece, and what the functions of events receive there.
 
     It is the state ``x`` with its ``arclength`` and its unit ``tangent``; the ``samples`` are those of the state and of
-    three beside it: ahead, behind, and in a generic direction.
+    three next to it: ahead, behind, and in a generic direction.
     """
 
     arclength: float
@@ -124,7 +124,7 @@ class EventPiece(Chord):
         return 2 * level / max(abs(node.slope.item()), sqrt(bend * level), TINY)
 
     def _change(self, node: Node, sample: dict[str, Any]) -> float:
-        """Change of the number from a node to a state beside it; none where it has no value there."""
+        """Change of the number from a node to a state next to it; none where it has no value there."""
         try:
             with np.errstate(invalid="ignore"):
                 return self.event(sample) - float(node.H.item())

@@ -25,14 +25,14 @@ state; an equilibrium nearer than this to the start is the one that is meant."""
 HELD = 1e-8
 """Drift scalar, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
 ASIDE = 0.1
-"""How far beside a saddle the way down goes on, in the metric."""
+"""How far from a saddle the way down goes on, in the metric."""
 
 
 def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
     """First equilibrium at ``load``: the rod at rest if that is near one, else from the scene's start.
 
     From there by Newton's method, or else by going downhill.  Newton's method begins without forces.  Where it strays
-    from a start that has an equilibrium right beside it, found from the forces that balance the start best, that is the
+    from a start that has an equilibrium next to it, found from the forces that balance the start best, that is the
     first one, stable or not.  The way down is also taken where Newton's method ends at an unstable equilibrium that is
     nowhere near the start.  Of a family of equilibria it is the one next to the start, whatever round-off would make of
     it.
@@ -103,8 +103,8 @@ def downhill(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult
     assert saddle is not None
     if not saddle[1].converged:
         return saddle
-    beside, longest = beside_saddle(solver, saddle[0], solver.start(load))
-    found = _relaxed(solver, beside, longest, lambda x: examined(solver, x, saddle[1])[1])
+    displaced, longest = displaced_saddle(solver, saddle[0], solver.start(load))
+    found = _relaxed(solver, displaced, longest, lambda x: examined(solver, x, saddle[1])[1])
     return found if found[1].converged else saddle
 
 
@@ -154,14 +154,14 @@ def _may_move(solver: BranchSolver, x: PETSc.Vec) -> bool:
     return found.count().zero > found.drifts
 
 
-def beside_saddle(solver: BranchSolver, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
-    """State beside the saddle ``x``, along its most unstable mode on the side of ``start``.
+def displaced_saddle(solver: BranchSolver, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
+    """State next to the saddle ``x``, along its most unstable mode on the side of ``start``.
 
     Also the longest time step by which that mode grows: half of its time.
     """
     modes = SymmetricSolver(solver.inertia).at(x).leftmost(1)
-    beside, mode = x.copy(), modes.vectors[0]
+    displaced, mode = x.copy(), modes.vectors[0]
     size = ASIDE / solver.system.norm(mode)
-    beside.axpy(size if solver.row(mode).dot(start - x) >= 0 else -size, mode)
-    solver.system.set_load(beside, solver.system.scalar(x))
-    return beside, 0.5 / abs(float(modes.values[0]))
+    displaced.axpy(size if solver.row(mode).dot(start - x) >= 0 else -size, mode)
+    solver.system.set_load(displaced, solver.system.scalar(x))
+    return displaced, 0.5 / abs(float(modes.values[0]))

@@ -71,7 +71,7 @@ class _Walk:
         self.solver, self.points, self.steps, self.ends = solver, points, steps, bounds
         self.stops, self.span = scene.stops, abs(scene.span[1] - scene.span[0])
         self.ended, self._missed, self._failures = "", "", 0
-        self._step, self._next, self._beside = steps.begin(), 0.0, 0.0
+        self._step, self._next, self._offset = steps.begin(), 0.0, 0.0
 
     def attempt(self, reach: float) -> Point | None:
         """A point at most ``reach`` away from the last one; None where that was too far, or the branch has ended."""
@@ -90,9 +90,9 @@ class _Walk:
 
     def go_on(self, point: Point) -> None:
         """Go on from an accepted point: from one at a stop with the tangent, and the work of the load, ahead."""
-        if self._beside:
-            x = _moved(self.solver, point.x, self._beside)
-            point.tangent = self.solver.load_tangent(x, self._beside > 0)
+        if self._offset:
+            x = _moved(self.solver, point.x, self._offset)
+            point.tangent = self.solver.load_tangent(x, self._offset > 0)
             point.slope, point.conjugate = self.solver.system.scalar(point.tangent), self.solver.energies(x).conjugate
         self._step, self._missed, self._failures = self._next, "", 0
 
@@ -122,7 +122,7 @@ class _Walk:
         if not self._stays(known, point) or not self.steps.accepts(known[-1], point):
             return None
         order = 2 if len(known) == 1 else min(len(known), 3) + 1
-        self._next, self._beside = self.steps.after(self._step, made.outcome.moved, order), 0.0
+        self._next, self._offset = self.steps.after(self._step, made.outcome.moved, order), 0.0
         return point
 
     def _stays(self, known: list[Point], point: Point) -> bool:
@@ -137,7 +137,7 @@ class _Walk:
             self.ended = END_OF_RANGE  # the row is there, and the branch goes on out of the range
             return None
         end = bound in self.ends
-        self._next, self._beside = (
+        self._next, self._offset = (
             self.steps.begin(),
             0.0 if end else copysign(ON_BOUND * self.span, beyond - last.load),
         )
@@ -161,7 +161,7 @@ class _Walk:
         x, outcome = solver.at_load(x, load, reach=0.5 * max(fraction * self._step, self.steps.smallest))
         if not outcome.converged:
             return None
-        before = _moved(solver, x, -self._beside) if self._beside else x
+        before = _moved(solver, x, -self._offset) if self._offset else x
         tangent = solver.load_tangent(before, beyond > last.load)
         if not solver.row(direction).dot(tangent) > ALIGNED:
             return None

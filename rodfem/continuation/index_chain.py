@@ -27,7 +27,7 @@ def breaks(points: Sequence[Point], specials: Sequence[SpecialPoint], begins: in
     persistent = persistent_zeros(points)
     found = []
     for a, b in pairwise(points):
-        left, right = _beside(a, at, persistent, after=True), _beside(b, at, persistent, after=False)
+        left, right = _interval(a, at, persistent, after=True), _interval(b, at, persistent, after=False)
         if a is points[0] and begins is not None:
             left = begins, begins
         if left[1] < right[0] or right[1] < left[0]:
@@ -40,7 +40,7 @@ def persistent_zeros(points: Sequence[Point]) -> int:
     return min((p.zero for p in points), default=0)
 
 
-def _beside(point: Point, at: dict[int, SpecialPoint], persistent: int, after: bool) -> Interval:
+def _interval(point: Point, at: dict[int, SpecialPoint], persistent: int, after: bool) -> Interval:
     """Least and greatest index right before or after a row."""
     special = at.get(id(point))
     if special is not None:
@@ -64,9 +64,9 @@ def merge_doubles(branch: Branch) -> None:
     for p, q in list(pairwise(branch.special)):
         if not _double(branch, p, q, bars[id(p)] + bars[id(q)]):
             continue
-        apart, beside = abs(p.point.load - q.point.load), abs(p.point.ordinate - q.point.ordinate)
+        apart, ordinates = abs(p.point.load - q.point.load), abs(p.point.ordinate - q.point.ordinate)
         q.error_estimate = max(q.error_estimate, apart + p.error_estimate)
-        q.ordinate_error = max(q.ordinate_error, beside + p.ordinate_error)
+        q.ordinate_error = max(q.ordinate_error, ordinates + p.ordinate_error)
         q.null_vectors = p.null_vectors + q.null_vectors
         q.negative_before = p.negative_before
         q.point.zero += p.multiplicity

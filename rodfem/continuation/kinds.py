@@ -64,7 +64,7 @@ class Kind(str):
 
     @property
     def counted(self) -> bool:
-        """Whether the index before and after belongs to the segments of a branch beside it."""
+        """Whether the index before and after belongs to the segments of a branch next to it."""
         return self.test in (EIGENVALUE, UNFOLDING)
 
     @property

@@ -8,7 +8,7 @@ is the distance in the metric then.  A pitchfork is supercritical where the bran
 of the branch that it leaves is higher, else subcritical.
 
 The power series of a load in the amplitude converges up to the nearest other point at which the branch turns, or meets
-another one, and that may be near: of two branch points about to merge, or a fold beside a transcritical point.
+another one, and that may be near: of two branch points about to merge, or a fold next to a transcritical point.
 Amplitudes are made smaller until the series is resolved.
 
 Leading coefficients come from the states on both sides of a point.  Values at the amplitudes ``a`` and ``-a`` tell the
@@ -39,7 +39,7 @@ RESOLVED = 1e-3
 ordinate, of a resolved series."""
 ODD = 0.1
 """Part of the change of the load that is odd in the amplitude, from which on a branch is transcritical."""
-BESIDE = 1e-3
+OFFSET = 1e-3
 """Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 SEEN = 100
 """Ratio of a change of a load or an ordinate to the uncertainty of where it is measured from, for which it counts."""
@@ -167,8 +167,8 @@ def origin_of(solver: BranchSolver, special: SpecialPoint) -> Origin:
 
 def ordinate_along(solver: BranchSolver, x: PETSc.Vec, direction: PETSc.Vec) -> float:
     """Change of the ordinate of ``x`` along a direction, of unit size in the metric."""
-    beside = x + direction * (BESIDE / solver.system.norm(direction))
-    return (solver.shape.ordinate(beside) - solver.shape.ordinate(x)) / BESIDE
+    nearby = x + direction * (OFFSET / solver.system.norm(direction))
+    return (solver.shape.ordinate(nearby) - solver.shape.ordinate(x)) / OFFSET
 
 
 def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -> NormalForm | None:

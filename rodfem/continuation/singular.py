@@ -34,7 +34,7 @@ curve.  Without it the rows have a null vector ``(dlam, dt, xi)``, which is the 
 also at a *cusp*, where ``V.y = 0`` and neither parameter changes (Doedel, Keller & Kernevez, Int. J. Bifurcation Chaos
 1 (1991) 493-520); but not where ``b = 0`` for both parameters: there the fold ends on a branch point.  Along a curve of
 branch points ``lam`` leads across it, and ``b_z`` changes by minus the rate of the eigenvalue, times ``xi``: because of
-the symmetry ``s`` and ``w`` have no part along the null vectors.  No difference is taken in a parameter, which beside
+the symmetry ``s`` and ``w`` have no part along the null vectors.  No difference is taken in a parameter, which next to
 its bounds may make no sense.
 
 *Divergence* under loads without a potential: S is not symmetric.  The columns of the border are ``M`` times the left

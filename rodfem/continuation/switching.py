@@ -109,7 +109,7 @@ def start_branch(
     stay zero on the trunk without a symmetry need not on the branch.  The second one is nearer where the load has
     turned back before it, or its index is not that with which the branch begins: the fold, or the branch point, that
     says why is on the branch.  So it is where its load is out of the ``bounds``.  Nor is it farther away than the
-    branch that it leaves began, from a ``depth`` of 2 on: beside a nearly double point branches are short.  ``solver``
+    branch that it leaves began, from a ``depth`` of 2 on: next to a nearly double point branches are short.  ``solver``
     has the mesh.  None where no point is found.
     """
     amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
@@ -120,7 +120,7 @@ def start_branch(
     still = special.point.zero - special.multiplicity - solver.system.active_drifts(special.point.x)
 
     def begins(at: float) -> int | None:
-        return None if still else index_beside(special, at, ways)
+        return None if still else neighbouring_index(special, at, ways)
 
     while amplitude > NEAREST and _early(special, side, begins(first.load), first, bounds):
         amplitude /= 4
@@ -134,7 +134,7 @@ def start_branch(
     return [origin, first], None if vertical else begins(first.load)
 
 
-def index_beside(special: SpecialPoint, load: float, ways: int) -> int | None:
+def neighbouring_index(special: SpecialPoint, load: float, ways: int) -> int | None:
     """Index with which a branch begins that leaves towards ``load``; None where the trunk's does not determine it.
 
     By exchange of stability the eigenvalue that crosses zero has the sign opposite to that on the trunk at the same

@@ -6,7 +6,7 @@ the directors, and perhaps with a reversal of the rod (``sigma = -1``, otherwise
     R -> S R S,   r -> S r,   v -> sigma S v,   k -> sigma det(S) S k,   n -> sigma S n,   eta -> eta,
 
 in quaternions ``(q0, vec q) -> (q0, det(S) S vec q)``, fields being read from the other end where the rod is reversed.
-A stretch stays positive only if ``s3 = sigma``, which leaves seven candidates beside the identity.  Whether a scene
+A stretch stays positive only if ``s3 = sigma``, which leaves seven candidates other than the identity.  Whether a scene
 has one of them is not asked of the scene but of its equations: with ``F`` their residual and ``T`` the map, ``T`` is a
 symmetry of the discrete problem if and only if ``F(T x) . T y = F(x) . y`` for all ``x`` and ``y``.  One smooth state
 without any symmetry of its own and one direction decide that to round-off, at the cost of two residuals.
@@ -143,9 +143,9 @@ def mirrors(system: System, x: PETSc.Vec, among: Sequence[Mirror] | None = None)
         return []
     system.set_phase(None)
     base = generic_state(system, x, 0.2, 1)
-    beside = generic_state(system, base, 0.2, 2)
-    reference, scale = _work(system, base, beside)
-    works = ((mirror, _work(system, mirror(system, base), mirror(system, beside))[0]) for mirror in among)
+    other = generic_state(system, base, 0.2, 2)
+    reference, scale = _work(system, base, other)
+    works = ((mirror, _work(system, mirror(system, base), mirror(system, other))[0]) for mirror in among)
     return [mirror for mirror, work in works if abs(work - reference) < NEGLIGIBLE * scale]
 
 

@@ -82,7 +82,7 @@ class SearchLog:
 
 
 class Deflation:
-    """Search for equilibria at one ``load``, on the mesh of a ``solver``, beside the ``known`` ones at that load.
+    """Search for equilibria at one ``load``, on the mesh of a ``solver``, other than the ``known`` ones at that load.
 
     New ones are ``found``, one of each set that the symmetries carry into each other; the ``tally`` says how tries
     ended, ``mirrors`` are the discrete symmetries.  ``seed`` is that of the random guesses.  Raises :class:`InputError`
@@ -220,7 +220,7 @@ class Deflation:
         """Add the mirror image of an equilibrium to what is known; without it, if it is none, the mirror goes.
 
         An imperfection below what the test of the mirrors sees makes the image another equilibrium, with another
-        energy: a pole beside its root would hide it from Newton's method.
+        energy: a pole next to its root would hide it from Newton's method.
         """
         point, _ = self._judge(image)
         scale = max(abs(energy), self.solver.inertia.scale)
@@ -364,7 +364,7 @@ def _along(solver: BranchSolver, points: Sequence[Point], load: float, singular:
             x, outcome = solver.at_load(a.x, load, reach=1.0)
             if not outcome.converged:
                 raise ConvergenceError(
-                    f"No equilibrium was found at {solver.system.scene.load} = {load:g} beside a row there: use more "
+                    f"No equilibrium was found at {solver.system.scene.load} = {load:g} next to a row there: use more "
                     "elements, or another load."
                 )
             yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)

@@ -249,7 +249,7 @@ class Diagram:
         known = [name for name in self.scene.parameters if name != self.scene.load]
         if unknown := [name for name in constants if name not in known]:
             raise InputError(
-                f"A plan has no {unknown[0]!r}, nor has the scene beside its load: choose one of "
+                f"A plan has no {unknown[0]!r}, nor has the scene apart from its load: choose one of "
                 f"{', '.join([*(f.name for f in fields(Plan)), *known])}, or give a Discretization first."
             )
         if self.lacks and self.lacks not in in_plan:

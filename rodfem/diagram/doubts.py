@@ -28,7 +28,7 @@ class PersistentZeros:
         self.observer, self.width, self.reported = observer, width, False
 
     def extra(self, solver: BranchSolver, point: Point) -> int:
-        """Zero eigenvalues, beside symmetries' and the branch's own, of a point."""
+        """Zero eigenvalues, apart from symmetries' and the branch's own, of a point."""
         vertical = abs(point.slope) < VERTICAL * self.width  # the branch itself is a family at one load
         return point.zero - solver.system.active_drifts(point.x) - vertical
 
@@ -41,7 +41,7 @@ class PersistentZeros:
         """Damp Newton's method where eigenvalues stay zero, and say so once.
 
         With damping the tangent is one of other equations, by the tolerance of a count over the least eigenvalue: of
-        one that is not zero but within that tolerance, beside a fold, the load's part of it has no digit.
+        one that is not zero but within that tolerance, next to a fold, the load's part of it has no digit.
 
         ``history`` has the rows of a ``solver`` before the ``point``; a branch has had ``level`` zeros all along.
         """

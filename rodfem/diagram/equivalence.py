@@ -72,7 +72,7 @@ def are_images(solver: BranchSolver, special: SpecialPoint, a: Point, b: Point, 
     not share the symmetry: points at one distance in it need not be mirror images themselves.
     """
     if not equivalent(a, b, solver.units):
-        # one that turns at a fold just beside the branch point is there as near to the other side as round-off
+        # one that turns at a fold just next to the branch point is there as near to the other side as round-off
         load, width = special.point.load, LOCATED * special.located_to
         if min(a.load, b.load) < load - width and max(a.load, b.load) > load + width:
             return False

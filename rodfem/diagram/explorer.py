@@ -60,7 +60,7 @@ class Explorer(Tracer):
         self._branch_off(before)
 
     def _found(self, load: float) -> list[Point]:
-        """Equilibria at ``load`` that a search finds beside the branches."""
+        """Equilibria at ``load`` that a search finds on no branch."""
         self.observer.note("")
         self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
         with self.solver.system.clock.scope("search"):

@@ -1,4 +1,4 @@
-"""What to explore of a scene: range, loads to stop at, depth, steps, and what is wanted besides."""
+"""What to explore of a scene: range, loads to stop at, depth, steps, and what else is wanted."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Plan:
     error_bars
         Whether a second computation bounds the errors.
     spectrum
-        Number of left-most eigenvalues of every state, besides its index.
+        Number of left-most eigenvalues of every state, in addition to its index.
     tries
         Number of deflated iterations at each load of ``at``, which look for equilibria that no branch has reached.
     locus
@@ -142,7 +142,7 @@ class Plan:
     def _check_locus(scene: Scene, name: str, low: float, high: float) -> None:
         if name == scene.load or name not in scene.parameters:
             others = ", ".join(sorted(scene.parameters.keys() - {scene.load}))
-            choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
+            choose = f"choose one of {others}" if others else "the scene has none apart from its load, so add one"
             raise InputError(f"{name!r} is no second parameter: {choose}.")
         if name not in asked_for(scene):
             raise InputError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")

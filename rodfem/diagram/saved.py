@@ -28,7 +28,7 @@ from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
 
 NEEDED = ("scene", "parameter", "branches", "range", "accuracy", "constants", "discretization", "meshes")
-"""Entries of a diagram, beside those that all of its readers need."""
+"""Entries of a diagram, in addition to those that all of its readers need."""
 OF_BRANCH = ("name", "parent", "ended", "columns", "special")
 OF_SPECIAL = tuple(entry.name for entry in SPECIAL if entry.name not in ("energy", "resolved", "omega2_error_estimate"))
 
@@ -137,7 +137,7 @@ def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Bra
     x, load = load_state(states, branch, row, solver), values["load"]
     if abs(solver.system.scalar(x) - load) > NEGLIGIBLE * unit(load, one=solver.units.load):
         raise InputError(
-            f"{states} has another load in row {row} of the branch {branch!r} than diagram.json beside it: give the "
+            f"{states} has another load in row {row} of the branch {branch!r} than diagram.json next to it: give the "
             "two files of one run."
         )
     return Point(x=x, tangent=None, solver=solver, **values)

@@ -259,7 +259,7 @@ class Solver:
         load=number(1.0), known=each(a(Point, "a point, as diagram.at(load) returns")), tries=count(24), seed=count(0)
     )
     def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
-        """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
+        """Equilibria at ``load`` other than the ``known`` ones, by ``tries`` deflated Newton iterations.
 
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known equilibria at another
         one, and where a load has no potential.  ``seed`` is that of the random guesses.

@@ -245,7 +245,7 @@ class Sweep:
     def _point(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check it.
 
-        Beside a state whose matrix is singular Newton's method ends early by its own measure: where it fails
+        Next to a state whose matrix is singular Newton's method ends early by its own measure: where it fails
         the check the equations are solved once more.
         """
         point = self._evaluated(x)

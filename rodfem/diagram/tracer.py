@@ -255,7 +255,7 @@ class Tracer:
     def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
-            if not special.unfolding > ROUND_OFF:  # else the mesh has an equilibrium beside it only
+            if not special.unfolding > ROUND_OFF:  # else the mesh has an equilibrium next to it only
                 self._check(special.point)
             self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):

@@ -86,7 +86,7 @@ class Cells:
 
 
 class Assembler:
-    """A compiled ``form`` whose coefficients, where it has some, are the unknown and what is ``known`` besides.
+    """A compiled ``form`` whose coefficients, where it has some, are the unknown and what is ``known`` otherwise.
 
     It is assembled on the cells of this rank.
 
@@ -97,7 +97,7 @@ class Assembler:
     def __init__(self, form: Any, cells: Cells, known: Known, load: int, *, inside: bool = False) -> None:
         """Take the kernels of a dolfinx form; ``inside`` those of its integrals over cells alone, for all ``cells``.
 
-        Otherwise ``cells`` are those of this rank.  ``known`` is what the form reads beside the unknown, and ``load``
+        Otherwise ``cells`` are those of this rank.  ``known`` is what else the form reads, and ``load``
         the local degree of freedom of the load.
         """
         self.form, self._code = form, _code()

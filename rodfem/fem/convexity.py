@@ -22,7 +22,7 @@ from rodfem.forms.kinematics import curvature, strain
 from rodfem.problem.roles import derived
 
 GRID = 25
-"""Places of an element, at equal distances, at which a material that varies along it is looked at besides."""
+"""Places of an element, at equal distances, at which a material that varies along it is looked at as well."""
 
 
 def second_derivative(e: Equations) -> tuple[Any, bool, Any]:
@@ -43,7 +43,7 @@ class Convexity:
     """Evaluates the least eigenvalue of the second derivative of ``W`` along a state.
 
     At the Gauss points of each element and at its ends: strains are largest at a clamp or a joint more often than not.
-    A material that varies along the rod may be too soft between them: it is looked at on a grid besides, and at the
+    A material that varies along the rod may be too soft between them: it is looked at on a grid as well, and at the
     vertices of parabolas through the values there.
 
     Attributes

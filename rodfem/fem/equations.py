@@ -195,7 +195,7 @@ class Equations:
     def _nodal(self, sites: list[Any]) -> Any:
         """Constraints at nodes, zero at an equilibrium.
 
-        The potential does not have them: in a functional FFCx 0.5 takes, beside a rule of the same degree, the points
+        The potential does not have them: in a functional FFCx 0.5 takes, next to a rule of the same degree, the points
         of that rule for both.
         """
         f, rule = self.unknowns, {"quadrature_degree": 2 * self.fields.discretization.degree - 1}
@@ -225,7 +225,7 @@ class Equations:
 
     @classmethod
     def compile_ahead(cls, fields: Fields) -> None:
-        """Begin to compile beside this process what another instance finds then in the cache."""
+        """Begin to compile in the background what another instance finds then in the cache."""
         form_compiler.compile_ahead(list(cls.__new__(cls)._derive(fields).values()))
 
     def take(self, line: Line) -> None:

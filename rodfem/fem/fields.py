@@ -106,7 +106,7 @@ def turning_of(scene: Scene) -> Turning:
 def blocks_of(scene: Scene, formulation: Formulation, k: int) -> list[Block]:
     """Fields: ``q`` and ``eta``, in a plane ``angle``; ``v`` where strains are free; those of the formulation.
 
-    Besides what the parts of the scene bring: multipliers of constraints that hold all along the rod.
+    In addition to what the parts of the scene bring: multipliers of constraints that hold all along the rod.
     """
     turning = turning_of(scene)
     blocks = [Block(turning.name, turning.size, k, True, False)]

@@ -1,4 +1,4 @@
-"""Compilation of UFL forms by FFCx: together, beside this process, announced, into a cache that survives a kill.
+"""Compilation of UFL forms by FFCx: together, in the background, announced, into a cache that survives a kill.
 
 A module is compiled in a folder of its own, and moved to the cache when it is whole: nobody awaits a process that died,
 and two processes that compile the same module at once make the same file.
@@ -36,9 +36,9 @@ TOGETHER = re.compile("Failed (just-in-time|JIT) compilation|JIT compilation fai
 _LISTENERS: list[Callable[[], None]] = []
 """Who is told that something is compiled."""
 ALONE = MPI.COMM_WORLD.size == 1
-"""Whether there is one process alone: only then does anything work beside it."""
+"""Whether there is one process alone: only then does anything work in the background."""
 _JOBS: list[Job] = []
-"""What is compiled beside this process."""
+"""What is compiled in the background."""
 
 
 def _cached(module_name: str, object_names: Sequence[str], cache_dir: str | Path, timeout: int) -> Any:
@@ -152,7 +152,7 @@ def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable
 
 
 def compile_ahead(forms: Sequence[Any]) -> list[Any]:
-    """Compiled forms; None for those that the cache lacks, which are now compiled into it beside this process.
+    """Compiled forms; None for those that the cache lacks, which are now compiled into it in the background.
 
     One of several ranks begins nothing: there dolfinx compiles on the first rank, while the others wait.
     """
@@ -197,7 +197,7 @@ def _compiled(group: Sequence[Any]) -> list[Any]:
 
 
 def _wait() -> None:
-    """Await all that is compiled beside this process."""
+    """Await all that is compiled in the background."""
     while _JOBS:
         _JOBS.pop().wait()
 

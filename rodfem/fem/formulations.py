@@ -29,7 +29,7 @@ CONTACT_FORCE = "n"
 
 
 class Formulation(ABC):
-    """Which unknowns a rod has besides rotations and strains, its Lagrangian in them, and where they say it is.
+    """Which unknowns a rod has in addition to rotations and strains, its Lagrangian in them, and where they say it is.
 
     ``name`` is that in files and options, ``words`` are what is unknown, and ``centreline`` says whether that is a
     field, ``r``.
@@ -44,11 +44,11 @@ class Formulation(ABC):
         return ""
 
     def blocks(self, degree: int) -> list[Block]:
-        """Fields besides rotations and strains, for a rotation of this degree."""
+        """Fields in addition to rotations and strains, for a rotation of this degree."""
         return []
 
     def unknowns(self, scene: Scene) -> list[Unknown]:
-        """Scalar unknowns besides those of the parts of the scene."""
+        """Scalar unknowns in addition to those of the parts of the scene."""
         return []
 
     def left_out(self, scene: Scene) -> list[str]:

@@ -8,7 +8,7 @@ A combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmet
 for all ``x``; and where it moves nothing that an end holds.  The space of such ``a`` is the null space of a matrix with
 rows for each of a number of generic states.
 
-What acts on the rod, with a potential, has to be invariant by itself: beside a rod 1e12 times as stiff as the spring
+What acts on the rod, with a potential, has to be invariant by itself: next to a rod 1e12 times as stiff as the spring
 that holds it, the spring is round-off in ``F``.
 
 The motion of a closed rod along itself is a symmetry where no equation has the arclength in it.  Where one has, it may
@@ -50,7 +50,7 @@ EXACT = 1e-10
 INVARIANT = 1e-12
 """Round-off of the change of the functional, or of the equations, relative to the sum of magnitudes of its terms.
 
-Up to 4e-13 were measured for symmetries of rods with elements of 1e-6.  A rod that bends less alike than this, beside
+Up to 4e-13 were measured for symmetries of rods with elements of 1e-6.  A rod that bends less alike than this, next to
 the stiffest of its strains, is taken for one that bends alike.
 """
 NEARLY = 1e-6
@@ -64,8 +64,8 @@ SIMPLE = 1e-9
 RESIDUAL = 1e-8
 """Residual ``S g`` of a symmetry, relative to ``|S| |g|``."""
 ZERO = 1e-10
-"""Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, beside round-off: what Newton's method
-makes of a state."""
+"""Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, apart from round-off: what Newton's
+method makes of a state."""
 ROUND_OFF = 10.0
 """Times the effect of independent relative errors eps of all entries of ``S`` on the quotient: its round-off."""
 DECAY = 0.6
@@ -85,7 +85,7 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
         rows.append(row)
         sizes.append(size)
         # conditions on the weights a of a symmetry: invariance, and no motion of what an end holds
-        changes /= fields.sizes  # conditions and motions are beside others in other units
+        changes /= fields.sizes  # conditions and motions stand next to others in other units
         held.append(changes[:, dofs_held].T)
         free = changes[:, fields.number >= 0]
         moved += free @ free.T
@@ -214,7 +214,7 @@ def _change_of_equations(
     table += _summed(fields, np.array([A @ whole for A in back]))
     sizes = _summed(fields, np.array([abs(tangent) @ abs(g) for g in changes]), copies=True)
     sizes += _summed(fields, np.array([abs(A) @ abs(whole) for A in back]))
-    # each equation beside its own terms: that of a place has none as large as the stiffest strain's
+    # each equation relative to its own terms: that of a place has none as large as the stiffest strain's
     largest = sizes.max(axis=1, keepdims=True)
     table, sizes, closing = (x / np.where(largest > 0, largest, 1.0) for x in (table, sizes, _closing(fields, tangent)))
     across = np.linalg.qr(closing)[0]

@@ -1,4 +1,4 @@
-r"""What the compiled forms read beside the unknown: tables along the rod, and pieces of paths of the load.
+r"""What the compiled forms read in addition to the unknown: tables along the rod, and pieces of paths of the load.
 
 Both are values of one discontinuous function, of which a cell has its own.  A table ``f`` along the rod is its
 projection on polynomials on each element, of the degree ``p`` for which the rule of the element has ``p + 1`` points::

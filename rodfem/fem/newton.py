@@ -20,7 +20,7 @@ from rodfem.fem.system import System
 
 TOLERANCE = 1e-10
 """Size of the last correction of a converged state: rotations in radian, load over its span, all else relative, in
-natural sizes: reactions that vanish beside the stiffness of the rod are round-off of that."""
+natural sizes: reactions that vanish relative to the stiffness of the rod are round-off of that."""
 STALLED = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
 KEPT, SHRUNK = 0.02, 0.1

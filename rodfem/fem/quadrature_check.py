@@ -147,7 +147,7 @@ class QuadratureCheck:
         )
 
     def kink(self, x: PETSc.Vec) -> str:
-        """Return what has a kink at the very state ``x``, as beside a support to one side: the equations, or nothing.
+        """Return what has a kink at the very state ``x``, as next to a support to one side: the equations, or nothing.
 
         The changes of the residual in two opposite motions add up to what is proportional to the motion at a kink, and
         to its square elsewhere.  Where the residual jumps its changes are not proportional to the motion.

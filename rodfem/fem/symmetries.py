@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 SYMMETRIC_STATE = 1e-4
 """A generator smaller than this (in the metric) is zero: the state has the symmetry itself.
 
-Where symmetries are found an imperfection is round-off that is 1e-12 of the stiffest strain's terms: 1e-8 beside a
+Where symmetries are found an imperfection is round-off that is 1e-12 of the stiffest strain's terms: 1e-8 relative to a
 twist 1e4 times as stiff as bending.  At a state that it moves by 1e-8/mu, the eigenvalue mu of that motion is not zero:
 it is counted as it is down to 1e-8/SYMMETRIC_STATE.  At states that it moves farther the symmetry is verified
 to the round-off of its eigenvalue, and dropped.
@@ -56,7 +56,7 @@ NAMED = 1e-3
 ALONG = 1e-5
 """As :data:`SYMMETRIC_STATE`, of the part of a ring's motion along itself that exact symmetries leave over."""
 SHARE = 0.3
-"""Largest weight of a rigid motion of metric norm one in a drift's force, beside the symmetry of the same norm."""
+"""Largest weight of a rigid motion of metric norm one in a drift's force, relative to the symmetry of the same norm."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def richer_system(system: System) -> System:
 
 
 def compile_richer(system: System) -> None:
-    """Begin to compile the forms of that beside this process."""
+    """Begin to compile the forms of that in the background."""
     Equations.compile_ahead(Fields(system.scene, richer(system), system.comm))
 
 

@@ -1,4 +1,4 @@
-"""C code of the package: built with the wheel, or compiled once with cffi beside the kernels of FFCx; and its memory.
+"""C code of the package: built with the wheel, or compiled once with cffi next to the kernels of FFCx; and its memory.
 
 A file of C has structures, and functions marked ``PUBLIC``, which Python calls.  Like all others they are ``static``:
 cffi compiles them in one unit with what calls them, so that the only name a module exports is its init function.  An
@@ -42,7 +42,7 @@ STRUCTURE = re.compile(r"^typedef struct[^{;]*(?:\{.*?^\})?[^;]*;", re.MULTILINE
 FUNCTION = re.compile(r"^PUBLIC (.*?)\s*\{", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"^#define \w+ \d+(?=\s)", re.MULTILINE)
 _JOBS: dict[str, Job] = {}
-"""What is compiled beside this process, by name."""
+"""What is compiled in the background, by name."""
 
 
 class Memory:
@@ -140,7 +140,7 @@ def _full_name(name: str) -> str:
 
 
 def _found(name: str) -> Path | None:
-    """Compiled module beside its code, from the wheel, or in the cache: to list that takes long, it has many files."""
+    """Compiled module next to its code, from the wheel, or in the cache: to list that takes long, it has many files."""
     full = _full_name(name)
     places = ((PACKAGE / name).parent, code_cache.folder())
     files = (place / f"{full}{suffix}" for place in places for suffix in EXTENSION_SUFFIXES)

@@ -305,8 +305,8 @@ def typical_rows(branch: Branch) -> dict[int, int]:
     rows = [int(np.argmin(abs(along - place))) for place in np.linspace(along[0], along[-1], 5)]
     wanted = {row: branch.points[row].negative for row in rows}
     for special in branch.special:
-        beside = special.negative_before, special.negative_after
-        wanted[special.row] = max(wanted.get(special.row, 0), *beside)
+        indices = special.negative_before, special.negative_after
+        wanted[special.row] = max(wanted.get(special.row, 0), *indices)
     return {row: min(max(FEWEST, wanted[row]), MOST) for row in sorted(wanted)}
 
 

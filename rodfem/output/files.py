@@ -294,5 +294,5 @@ def _sample(path: Path, branch: str, row: int, formulation: str) -> dict[str, An
         if isinstance(trouble, InputError):
             raise
         raise InputError(
-            f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
+            f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json next to it."
         ) from trouble

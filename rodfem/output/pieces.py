@@ -36,7 +36,7 @@ class Piece(NamedTuple):
     """Rows ``first`` to ``last`` of a branch, with one index between them.
 
     ``negative`` is the index, of a planar rod in its plane, ``in_space`` that among all perturbations (None where it is
-    not known), ``undecided`` the number of eigenvalues that may be negative besides; ``kink`` names functions on a kink
+    not known), ``undecided`` the number of eigenvalues that may be negative as well; ``kink`` names functions on a kink
     of which the states are, where the index is that of one side.
     """
 
@@ -77,7 +77,7 @@ def pieces_of(branch: Branch) -> list[Piece]:
 
 
 def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
-    """Least index between two rows, and how many eigenvalues may be negative besides.
+    """Least index between two rows, and how many eigenvalues may be negative as well.
 
     Of either end it is known or not, then the index of the row, and the number of undecided eigenvalues there.
     """
@@ -90,7 +90,7 @@ def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
 
 
 def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> list[Piece]:
-    """Pieces of steps that are alike: their index, how many may be negative besides, and what is on a kink."""
+    """Pieces of steps that are alike: their index, how many may be negative as well, and what is on a kink."""
     most = [max(space[i], space[i + 1], step[0]) if space else None for i, step in enumerate(steps)]
     each = [(least, inside, more, on) for (least, more, on), inside in zip(steps, most, strict=True)]
     groups = [[step for step, _ in group] for _, group in groupby(enumerate(each), lambda step: step[1])]

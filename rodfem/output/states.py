@@ -60,7 +60,7 @@ def rows_of(folder: Path) -> Iterator[Rows]:
         if isinstance(trouble, InputError):
             raise
         raise InputError(
-            f"{path} does not hold the states of diagram.json beside it: run the scene again."
+            f"{path} does not hold the states of diagram.json next to it: run the scene again."
         ) from trouble
 
 
@@ -142,7 +142,7 @@ def check_run(data: dict[str, Any], states: Path) -> None:
         raise InputError(f"{states} is no {STATES.name} ({trouble}): give {STATES.file}.") from trouble
     if run != data.get("run"):
         raise InputError(
-            f"{states} and the diagram.json beside it are of different runs: keep the files of one run together, or "
+            f"{states} and the diagram.json next to it are of different runs: keep the files of one run together, or "
             "run the scene again."
         )
 

@@ -238,7 +238,7 @@ def _of_frequencies(negative: int, omega2: Sequence[Sequence[float]]) -> Words:
 def _warnings(branch: Data) -> Iterator[tuple[int, str]]:
     for change in branch.get("unexplained") or ():
         for row in (change["row"], change["row"] + 1):
-            yield row, "the index changes beside this row without a special point"
+            yield row, "the index changes next to this row without a special point"
     if branch.get("singular_start"):
         yield 0, "the first state is singular, and not located"
     for special in branch["special"]:

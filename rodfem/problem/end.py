@@ -330,7 +330,7 @@ class SlidingHinge(End):
         return [tuple(map(float, row)) for row in vectors @ np.eye(3)[moving]]
 
     def check(self, side: str, scene: Scene) -> None:
-        """Check the direction, and the point, beside what is checked of every end; raises :class:`SceneError`."""
+        """Check the direction and the point, and what is checked of every end; raises :class:`SceneError`."""
         if scene.normal is not None and self.along[scene.normal]:
             raise SceneError(
                 f"The guide of the {side} end leaves the plane across {scene.planar}: choose a direction in the plane."

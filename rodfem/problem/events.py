@@ -36,8 +36,8 @@ class Event:
         units of the scene; multipliers, the load and further fields have their names in ``states.h5``.
 
     Between two rows of a branch it is a cubic, by its values there and its derivatives along the branch, for which the
-    function receives states beside the rows, too.  Where the cubic vanishes, or turns near zero, equilibria decide.
-    What it does within a step besides is not seen: ``StepControl(largest=...)`` bounds the steps.
+    function receives states between the rows, too.  Where the cubic vanishes, or turns near zero, equilibria decide.
+    What else it does within a step is not seen: ``StepControl(largest=...)`` bounds the steps.
 
     The function receives the nodes, the ends of the rod among them: ``state.r[:, 0].max()`` is that of the highest
     node, and ``numpy.interp`` or a sum is taken over nodes.  The error bar is by nodes that are twice as close: that of

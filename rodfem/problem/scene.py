@@ -35,7 +35,7 @@ from rodfem.problem.validation import LARGEST, TINIEST, check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
 ASIDE = 1e-6
-"""Distance beside an end or a break at which the material is asked, relative to the rod's length."""
+"""Distance from an end or a break at which the material is asked, relative to the rod's length."""
 
 GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
 """Names that branches are given as they are found."""
@@ -207,7 +207,7 @@ class Scene(Contribution):
     ends
         Left and right :class:`~rodfem.problem.ends.End`, or a :class:`~rodfem.problem.ends.Ring`.
     ordinate
-        What to record beside the load.
+        What to record in addition to the load.
     inertia
         Kinetic metric of the spectrum; unit rotary inertia by default, which serves to count.
     distributed
@@ -223,7 +223,7 @@ class Scene(Contribution):
         Arclengths at which the material or the loads jump: element boundaries are put there.
     planar
         ``"e1"`` or ``"e2"``: the rod moves only in the plane across that axis.  Rotations about it, two displacements,
-        two forces and two strains are all that is left; the index in space is recorded besides that in the plane.
+        two forces and two strains are all that is left; the index in space is recorded, too.
     start
         Quaternion(s) of a first guess, ``start(s)`` of shape (m,) -> (m, 4); by default the identity (a straight rod).
     span
@@ -340,7 +340,7 @@ class Scene(Contribution):
 
     @cached_property
     def parts(self) -> list[Part]:
-        """All that contributes to the problem beside the stored energy: loads along the rod, ends, what is attached.
+        """All that contributes to the problem but the stored energy: loads along the rod, ends, what is attached.
 
         Constraints whose multipliers are fields, and those whose multipliers are scalars, are numbered each for itself.
         """
@@ -437,7 +437,7 @@ class Scene(Contribution):
 
     @property
     def has_inertia(self) -> bool:
-        """Whether the scene states masses or inertias of its own, beside the unit rotary inertia that counts by."""
+        """Whether the scene states masses or inertias of its own, apart from the unit rotary inertia that counts by."""
         return self.inertia != Inertia() or any(x.mass or x.rotary_inertia for x in self.attachments)
 
     @cached_property

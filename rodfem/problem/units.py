@@ -1,6 +1,6 @@
 """Natural sizes of a rod's numbers in the units in which its scene is stated.
 
-What is small is small beside them.  A scene whose numbers are of order one has the size one for each, and so has one
+What is small is so relative to them.  A scene whose numbers are of order one has the size one for each, and so has one
 that is not far from it: results do not depend on where a rod's length is between a tenth and ten.  Stated in metres and
 newtons the load of a DNA molecule is 1e-12, the stiffness of a steel bar 1e6: then all sizes are the rod's own, also
 those that happen to be about one, as only together they make its equations those of a rod of order one.

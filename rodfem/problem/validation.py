@@ -196,7 +196,7 @@ def _trouble_with_stiffness(scene: Scene, stiffness: np.ndarray) -> str:
 
 
 def in_lengths(stiffness: np.ndarray, scene: Scene) -> np.ndarray:
-    """Stiffness with the rod's length as unit: that of bending is beside that of strains, which have no unit."""
+    """Stiffness with the rod's length as unit: that of bending stands next to that of strains, which have no unit."""
     units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)
     return np.asarray(units[:, None] * stiffness * units)
 

@@ -228,7 +228,7 @@ def _readings(one: Mapping[str, Any], places: Iterable[tuple[float, float]]) -> 
 def _locus(path: Path, one: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, Any]:
     load, other = one["parameters"]
     if load != data["parameter"] or other not in data["constants"] or one["kind"] not in LINES:
-        raise InputError(f"{path} is no locus of the diagram beside it: keep the files of one run together.")
+        raise InputError(f"{path} is no locus of the diagram next to it: keep the files of one run together.")
     x, y = (one["columns"][name] for name in (other, load))
     return {
         "file": path.name,

@@ -40,7 +40,7 @@ from rodfem.stability.inertia import EPS, NOISE
 from rodfem.stability.nonsymmetric import REAL, STILL, Frequencies, NonsymmetricPencil, squares
 from rodfem.tolerances import TINY
 
-BESIDE = 1e-3
+SHIFT_OFFSET = 1e-3
 """Distance from zero, over their natural size, where those near it are sought: the matrix is singular there."""
 FARTHER = 3.0
 """Times that distance, or that from the mean, eigenvalues are sought that were not found at first."""
@@ -104,15 +104,15 @@ def members(
     orthogonal: rigid motions of a floating rod may have a greater share than its own, and belong to no cluster away
     from zero.  Raises :class:`ConvergenceError`.
     """
-    size, beside = cluster.size, BESIDE * pencil.system.scene.units.omega2
+    size, offset = cluster.size, SHIFT_OFFSET * pencil.system.scene.units.omega2
     least = REAL if left else LEAST
-    shift = 0.97 * cluster.mean if abs(cluster.mean) > beside else -beside
-    for number, times in ((size + 2, 1.0), (3 * size + 10, FARTHER)):  # one beside the shift takes digits from others
+    shift = 0.97 * cluster.mean if abs(cluster.mean) > offset else -offset
+    for number, times in ((size + 2, 1.0), (3 * size + 10, FARTHER)):  # one next to the shift takes digits from others
         found = pencil.near(number, cluster.mean + times * (shift - cluster.mean), left=left)
         inside = pencil.product(basis, found.weighed)
         energy = squares(pencil.system.comm, found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
-        if found.floating and abs(cluster.mean) > beside:
+        if found.floating and abs(cluster.mean) > offset:
             share[abs(found.values) < STILL * found.far] = 0.0
         chosen = closed(found.values, share, size)
         values = found.values[chosen]

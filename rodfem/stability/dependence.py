@@ -16,7 +16,7 @@ across its axis it shortens by ``int theta^2 / 2``, to first order not at all.  
 in the kernel of ``C``, on any mesh: any balances the straight rod.  From each thrust at which it buckles a branch
 begins there, and which of them Newton's method finds round-off decides.
 
-Newton's method converges by halves to such a state and ends some ``1e-8`` beside, where ``sigma`` is as small.  With
+Newton's method converges by halves to such a state and ends some ``1e-8`` away, where ``sigma`` is as small.  With
 the unit vectors ``C w = sigma u`` the derivative of ``sigma`` is ``H u``, where ``H`` is the second derivative of
 ``w . c``, the part of the Lagrangian's that belongs to the multipliers ``w``.  ``sigma / |H u|`` is, to first order,
 the least distance of a state at which constraints depend, whatever their units and the mesh.  Within the accuracy of

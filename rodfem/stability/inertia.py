@@ -216,7 +216,7 @@ class Inertia:
         return out
 
     def across(self, own: np.ndarray, basis: np.ndarray, duals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Basis of what vectors (own rows, k) span besides a ``basis``, and its products with the metric.
+        """Basis of what vectors (own rows, k) span in addition to a ``basis``, and its products with the metric.
 
         Both are orthonormal in the metric, ``duals`` are its products with the ``basis``.
         """

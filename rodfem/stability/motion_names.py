@@ -142,7 +142,7 @@ def turning_shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) 
 
 
 def of_all(squares: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Shares (k, 3) of rotations with these ``squares`` (k, 3), zero where they are none beside displacements (k,)."""
+    """Shares (k, 3) of rotations with these ``squares`` (k, 3), zero if displacements (k,) hide them."""
     every = squares.sum(axis=1)
     return np.asarray(np.where(every > LEAST * moved, 1.0 / np.maximum(every, TINY), 0.0)[:, None] * squares)
 

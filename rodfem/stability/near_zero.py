@@ -172,7 +172,7 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     if members is None:
         return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
     q = quotients(found, members, TOLERANCE * inertia.scale)
-    # the count has the nearest ones as zero: beside its tolerance a quotient and the count need not agree
+    # the count has the nearest ones as zero: next to its tolerance a quotient and the count need not agree
     counted = np.argsort(abs(q.values))[inside:]
     firm = index.negative - int((q.values[counted] < 0).sum())
     order = np.argsort(q.values)

@@ -47,7 +47,7 @@ STILL = 1e-10
 """Share of the farthest eigenvalue below which one is zero."""
 EPS = float(np.finfo(float).eps)
 BEYOND = 6
-"""Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
+"""Eigenvalues next to the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
 SPARE = 2
 """Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
 FREQUENCIES = 6
@@ -82,7 +82,7 @@ class Frequencies:
 
     @property
     def far(self) -> float:
-        """Size of an eigenvalue beside which others are zero: the greatest, but for a light rod with heavy bodies.
+        """Size of an eigenvalue relative to which others are zero: the greatest, but for a light rod with heavy bodies.
 
         That has a few slow motions, and others whose eigenvalues are 1e10 times as great.
         """

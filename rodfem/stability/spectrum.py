@@ -36,7 +36,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.tolerances import TINY
 
 SHIFT = -10.0
-"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
+"""Eigenvalues are sought next to this one, over their natural size: next to zero, where the matrix may be singular.
 
 Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
 its digits from all others.

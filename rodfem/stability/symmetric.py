@@ -59,7 +59,7 @@ NOISE = 1e-6
 class Found(NamedTuple):
     """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
 
-    ``factorisations`` are those besides the workspace's own; a ``note`` goes after the reason for the method.
+    ``factorisations`` are those in addition to the workspace's own; a ``note`` goes after the reason for the method.
     """
 
     values: np.ndarray

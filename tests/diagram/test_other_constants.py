@@ -147,5 +147,5 @@ def test_constants_that_are_none(given: dict[str, Any], words: str) -> None:
 
 
 def test_a_change_that_neither_plan_nor_scene_has() -> None:
-    with pytest.raises(InputError, match="A plan has no 'B4', nor has the scene beside its load"):
+    with pytest.raises(InputError, match="A plan has no 'B4', nor has the scene apart from its load"):
         rodfem.trace(alike(), MESH, Plan((0.0, 2.0), depth=0, error_bars=False)).again(B4=1.0)

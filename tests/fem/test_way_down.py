@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from rodfem import Discretization, Solver
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.first_equilibrium import beside_saddle
+from rodfem.continuation.first_equilibrium import displaced_saddle
 from rodfem.fem.newton import along, linear_step
 from rodfem.stability.pencil import Blocks
 
@@ -20,7 +20,7 @@ def beside_a_saddle() -> tuple[BranchSolver, PETSc.Vec, float]:
     solver = Solver(wider.scene(3, 144)[0], Discretization("pointwise", 5, 6))
     e, load = solver.equilibria, solver.scene.span[0]
     saddle, _ = e.at_load(e.start(load), load)
-    return e, *beside_saddle(e, saddle, e.start(load))
+    return e, *displaced_saddle(e, saddle, e.start(load))
 
 
 @pytest.mark.long
