@@ -29,6 +29,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import SceneError
@@ -70,6 +71,8 @@ ROUND_OFF = 10.0
 """Times the effect of independent relative errors eps of all entries of ``S`` on the quotient: its round-off."""
 DECAY = 0.6
 """Ratio of one Fourier coefficient of a generic state to the next."""
+NEARER = (1.0, 0.1, 0.01, 1e-3)
+"""Sizes of its displacements, in turn, until the equations are numbers: a barrier admits no large ones."""
 
 
 def find_symmetries(equations: Equations) -> list[Symmetry]:
@@ -286,7 +289,13 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, no_m
         named |= {name: 0.0 * named[name] for name in multipliers}
     low, high = sorted(scene.span)
     named[LOAD] = low + (high - low) * part
-    return Evaluation(equations, fields.filled(named), equations.line)
+    r = named.get("r", 0.0)
+    for size in NEARER:
+        state = Evaluation(equations, fields.filled(named | {"r": size * r} if "r" in named else named), equations.line)
+        known = equations.loads is None or np.isfinite(state.integral(equations.loads))
+        if fields.comm.allreduce(bool(known and np.isfinite(state.covector()).all()), op=MPI.LAND):
+            break
+    return state
 
 
 def _generic_values(fields: Fields, seed: int, decay: float) -> tuple[dict[str, Any], float]:

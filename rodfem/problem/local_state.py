@@ -151,8 +151,8 @@ Lengths are relative to the rod's.
 
 
 def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
-    """Functions of a place in the equations, each with a place of the kind that it will be given."""
-    point, rod = some_places(scene)
+    """Functions of a place in the equations, each with a place of the kind that it will be given, without numbers."""
+    point, rod = some_places(scene, wrap=ufl.variable)
     for what, function, role in functions_of(scene):
         if role.call == "f(x, c)":
             yield what, function, rod if role.along else point

@@ -1,0 +1,38 @@
+"""A strut between two smooth walls, as barriers that are large, or not defined, far away from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
+import pytest
+import ufl
+
+from rodfem import Ordinate, Parameter, Plan, Scene, pinned, trace
+from rodfem.forms.energy import bending_and_twist
+
+pytestmark = pytest.mark.alone
+HALF, STEEP, WEAK = 0.05, 0.001, 1e-4
+EXPONENTIAL = pi**2, lambda x, c: STEEP * (ufl.exp((x.r[0] - HALF) / STEEP) + ufl.exp((-x.r[0] - HALF) / STEEP))
+LOGARITHM = pi**2 + 2 * WEAK / (pi * HALF) ** 2, lambda x, c: -WEAK * ufl.ln(1 - (x.r[0] / HALF) ** 2)
+
+
+@pytest.mark.parametrize(("load", "wall"), [EXPONENTIAL, LOGARITHM], ids=["exponential", "logarithm"])
+def test_a_strut_between_walls(load: float, wall: Callable[[Any, Any], Any]) -> None:
+    """``P = pi^2 + w''/pi^2`` for the stiffness ``w''`` of the walls at rest, 1e-18 and ``2 WEAK/HALF^2``."""
+    strut = Scene(
+        "walls",
+        (0.0, 1.0),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
+        {"P": Parameter(0.0)},
+        "P",
+        (pinned(), pinned((0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
+        Ordinate("quarter", s=0.25, of=lambda r, q: r[0]),
+        (0.0, 20.0),
+        planar="e2",
+        potential=wall,
+    )
+    found = trace(strut, plan=Plan(depth=0)).special("branch point")[0]
+    assert abs(found.point.load - load) <= found.error_estimate < 1e-9
