@@ -62,7 +62,7 @@ Solve = Callable[[np.ndarray], np.ndarray]
 Matrix: TypeAlias = np.ndarray | sp.csr_matrix
 
 
-def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
+def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix, sp.csr_matrix]:
     """Rows with mass (h,), and ``L`` and ``R`` in them (h, r): by Cholesky's method with pivots of a unit diagonal."""
     size = np.sqrt(np.maximum(mass.diagonal(), 0.0))
     heavy = np.flatnonzero(size)
@@ -71,11 +71,12 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, Matrix, Matrix]:
     scale = size[heavy]
     block = mass[heavy][:, heavy].toarray() / np.outer(scale, scale)
     if not len(heavy):
-        return heavy, block, block
+        return heavy, sp.csr_matrix(block), sp.csr_matrix(block)
     lower, pivots, rank, _ = dpstrf(block, tol=RANK, lower=1)
     out = np.zeros((len(heavy), rank))
     out[pivots - 1] = np.tril(lower)[:, :rank]
-    return heavy, out * scale[:, None], out * scale[:, None]
+    lower = sp.csr_matrix(out * scale[:, None])
+    return heavy, lower, lower
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ class Condensed:
         """All finite eigenvalues, or some where the mass has a rank above :data:`ALL`."""
         if self.rank > ALL:
             return self._some()
-        matrix, size = self.dual.T @ self.inverse, np.linalg.norm(self.lower)
+        matrix, size = self.dual.T @ self.inverse, np.linalg.norm(self.lower.data)
         nu, right = np.linalg.eig(matrix)
         try:
             left = np.linalg.inv(right)
