@@ -20,7 +20,7 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import USER
 from rodfem.diagram.diagram import Diagram
-from rodfem.diagram.plan import Plan
+from rodfem.diagram.plan import Plan, plan_of
 from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN, traced
 from rodfem.errors import ConvergenceError, InputError
@@ -65,6 +65,7 @@ def run(
     comm: MPI.Comm = MPI.COMM_WORLD,
     quiet: bool = False,
     words: Callable[[str], str] = str,
+    **of_plan: Any,
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
@@ -82,7 +83,7 @@ def run(
     discretization
         By default 8 elements of degree 6, or a few to start with where the plan has an accuracy.
     plan
-        By default the range of the scene.
+        By default the range of the scene; its fields may be given instead, as ``of_plan``.
     output
         Folder, by default ``results/<name>``.
     figures
@@ -95,7 +96,7 @@ def run(
         Rewords each line on the terminal.
     """
     leave_the_run()
-    plan, discretization = plan or Plan(), discretization or Discretization()
+    plan, discretization = plan_of(plan, of_plan), discretization or Discretization()
     output = Path(output or Path("results") / scene.name)
     plan.check(scene, discretization)
     terminal = Terminal(plan, output, comm, quiet, words)

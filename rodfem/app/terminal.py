@@ -19,7 +19,7 @@ from rodfem import code_cache
 from rodfem.continuation.branch import ORDINATE, Branch, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
-from rodfem.errors import Argument
+from rodfem.errors import Argument, many
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
@@ -27,7 +27,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_decimals, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
 from rodfem.output.table import row_data, special_data
-from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, law_in_words, many, table_of
+from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, law_in_words, table_of
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.ranks import RANK

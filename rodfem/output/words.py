@@ -13,6 +13,7 @@ from typing import Any
 
 from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH
 from rodfem.continuation.kinds import FLUTTER, KINDS
+from rodfem.errors import many
 from rodfem.output.digits import NO_ESTIMATE, number
 from rodfem.output.pieces import is_solved
 from rodfem.output.table import soft_modes
@@ -36,11 +37,6 @@ class Words:
     verdict: str
     index: str
     sentence: str
-
-
-def many(count: int, noun: str, plural: str = "") -> str:
-    """A number of things: ``1 point``, ``2 points``."""
-    return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
 def is_sweep(data: Data) -> bool:

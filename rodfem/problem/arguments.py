@@ -24,7 +24,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 import ufl
 
-from rodfem.errors import InputError, SceneError
+from rodfem.errors import InputError, SceneError, many
 from rodfem.expressions import Condition, Expr
 
 P = ParamSpec("P")
@@ -210,7 +210,7 @@ def function(example: str, arguments: int = 1) -> Check:
     def check(name: str, value: Any) -> Any:
         if not takes(value, arguments):
             raise InputError(
-                f"{name} is {value!r}: give a function of {arguments} argument(s), as in {name}={example}."
+                f"{name} is {value!r}: give a function of {many(arguments, 'argument')}, as in {name}={example}."
             )
         return value
 
