@@ -17,13 +17,14 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.search import Coexisting, equilibria_at, with_copies
-from rodfem.diagram import tables
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
+from rodfem.libraries import optional
 from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
+from rodfem.output import tables
 from rodfem.output.files import as_data, origin, save_run
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.roles import derived
@@ -302,14 +303,17 @@ class Diagram:
 
     def to_dataframe(self) -> Any:
         """All rows as a ``pandas.DataFrame``; raises :class:`~rodfem.errors.SetupError` without pandas."""
-        return tables.dataframe(self)
+        frames = [branch.to_dataframe() for branch in self]
+        for frame, branch in zip(frames, self, strict=True):
+            frame.insert(0, "branch", branch.name)
+        return optional("pandas", "tables").concat(frames, ignore_index=True)
 
     def to_xarray(self) -> Any:
         """All rows as an ``xarray.Dataset``: their numbers, shape, strains, forces and moments, with coordinates.
 
         Raises :class:`~rodfem.errors.SetupError` without xarray.  Collective.
         """
-        return tables.dataset(self)
+        return tables.of_branches(self.branches, self.data)
 
     def view(self) -> Page:
         """Make the page that ``rodfem view`` opens: a notebook shows it, ``.open()`` a browser; collective."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pydoc
+
 import matplotlib.pyplot as plt
 import pytest
 from hemitropic_cases import scene
 
 import rodfem
-from rodfem import Diagram, InputError
+from rodfem import Diagram, InputError, Scene
 
 pytestmark = pytest.mark.alone
 
@@ -64,3 +66,11 @@ def test_what_a_cell_prints_is_short(diagram: Diagram) -> None:
     each.append(diagram.locus(pitchfork, "A", (-3.1, -2.9)))
     assert all(len(repr(thing)) < 160 and "array" not in repr(thing) for thing in each)
     assert "supercritical pitchfork, coefficient 0.0832134" in repr(pitchfork.law)
+
+
+def test_help_has_what_a_person_calls() -> None:
+    """A scene has its fields and a few methods, in help and in completion; all else serves the modules that compute."""
+    page = pydoc.plain(pydoc.render_doc(Scene))
+    assert "varying(self" in page and "ends" in page
+    assert not any(f" |  {name}" in page for name in ("parts", "lagrangian", "known_force", "samples", "__eq__"))
+    assert "varying" in dir(scene()) and "known_force" not in dir(scene())
