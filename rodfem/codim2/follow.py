@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -177,7 +178,8 @@ def locus(
         if doubtful or special.resolved is False:
             errors = errors._replace(unresolved=list(range(len(curve.nodes))))
         found = of.locus(curve, errors)
-        found.crossings = [(float(n.p[0]), n.ordinate) for n in _crossings(tracer, curve, 1, float(of.first.p[1]))]
+        start = of.rows(tracer, curve, 1, float(of.first.p[1]))
+        found.crossings = list(map(attrgetter("load", "ordinate"), start))
         notes = not_integrated(solver, plane, curve.nodes, errors.error), of.nearest()
     found.solve = partial(of.rows, tracer, curve)
     found.note = " ".join(f"Locus of the {special.kind}: {words}" for words in notes if words)

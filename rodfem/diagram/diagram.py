@@ -124,11 +124,11 @@ class Diagram:
         every = list(chain.from_iterable(b.special for b in (self if branch is None else [self[branch]])))
         if kind is None:
             return [s for s in every if not s.kind.given]
-        events = {*(event.name for event in self.plan.events), *chain.from_iterable(s.names for s in every)}
-        known = dict.fromkeys([*KINDS, *LAWS, *sorted(events)])
-        if kind not in known:
+        found = [s for s in every if kind in s.names]
+        known = [*KINDS, *LAWS, *sorted({event.name for event in self.plan.events})]
+        if not found and kind not in known:
             raise InputError(f"There is no kind {kind!r}: choose one of {', '.join(known)}.")
-        return [s for s in every if kind in s.names]
+        return found
 
     @checked(load=number(1.0))
     def at(self, load: float) -> list[Point]:

@@ -194,10 +194,8 @@ def plan_of(plan: Plan | None, asked: dict[str, Any]) -> Plan:
     """The ``plan`` given, or that of the fields ``asked`` for; raises :class:`InputError` for both, or another name."""
     names = [f.name for f in fields(Plan)]
     for name in asked:
-        if name in {f.name for f in fields(Discretization)}:
-            raise InputError(f"A plan has no {name!r}, but a mesh has: give discretization=Discretization({name}=...).")
         if name not in names:
-            raise InputError(f"A plan has no {name!r}: choose one of {', '.join(names)}.")
+            raise InputError(f"A plan has no {name!r}: choose one of {', '.join(names)}, or give a Discretization.")
         if plan is not None:
             raise InputError(f"{name} and plan are both given: give plan=Plan({name}=...), or {name} without a plan.")
     return Plan(**asked) if plan is None else plan

@@ -121,15 +121,9 @@ def _is_flat(branches: Branches) -> bool:
 
 
 def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Line]]:
-    """Draw all curves and special points; return the legend's handles and the lines.
-
-    Branches of a second diagram in the same axes have other hues, and a number behind their names.
-    """
+    """Draw all curves and special points; return the legend's handles and the lines."""
     handles, lines = list[Line2D](), list[Line]()
-    used = {line.get_color() for line in axes.get_lines()}
-    hues = [colour for colour in PALETTE if colour not in used] or PALETTE
-    times = sum(entry.partition(" (")[0] == branches[0]["name"] for entry in entries_of(axes))
-    behind = f" ({times + 1})" if times else ""
+    hues, behind = _free(axes, branches[0]["name"])
     for number, (branch, colour) in enumerate(zip(branches, cycle(hues), strict=False)):
         new = [Line(piece, colour, curve) for piece, curve in drawn(branch)]
         lines += new
@@ -141,6 +135,14 @@ def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Li
         upper = {} if line.piece.kind == STABLE else {"path_effects": RIM, "zorder": 2.5}  # seen where two lines lie
         axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind] | upper)
     return handles + _kinds(lines) + _draw_images(axes, branches, hues) + _draw_marks(axes, branches), lines
+
+
+def _free(axes: Axes, name: str) -> tuple[Sequence[str], str]:
+    """Hues that no other diagram in the axes has, and a number for the names of branches, the first of a ``name``."""
+    used, times = {line.get_color() for line in axes.get_lines()}, 1
+    while name + f" ({times})" * (times > 1) in entries_of(axes):
+        times += 1
+    return [colour for colour in PALETTE if colour not in used] or PALETTE, f" ({times})" * (times > 1)
 
 
 def _kinds(lines: Sequence[Line]) -> list[Line2D]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import pydoc
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
 from hemitropic_cases import scene
 
 import rodfem
-from rodfem import Diagram, InputError, Scene
+from rodfem import Diagram, InputError, Plan, Scene
 
 pytestmark = pytest.mark.alone
 
@@ -74,3 +75,22 @@ def test_help_has_what_a_person_calls() -> None:
     assert "varying(self" in page and "ends" in page
     assert not any(f" |  {name}" in page for name in ("parts", "lagrangian", "known_force", "samples", "__eq__"))
     assert "varying" in dir(scene()) and "known_force" not in dir(scene())
+
+
+def test_a_branch_of_too_many_points_names_the_remedy() -> None:
+    steps = rodfem.StepControl(most=5)
+    found = rodfem.trace(scene(), depth=0, steps=steps, error_bars=False)
+    words = "straight ends: 5 points reached; use longer steps (StepControl(largest=...)) or more points (StepControl("
+    assert any(sentence.startswith(words) for sentence in found.warnings)
+
+
+def test_a_run_says_the_answer_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The words, one table in which each special point stands once, time and files; all else only if it is verbose."""
+    technical = ("unknowns: ", "located to", "ended: end of range", "Time: setup", "factorisation", "inertia decides")
+    plan = Plan(at=(0.5,), method="count")
+    for verbose in (False, True):
+        rodfem.run(scene(), plan=plan, output=tmp_path, figures=False, verbose=verbose)
+        out = capsys.readouterr().out
+        places = [out.index(words) for words in ("In words", "Special points", "points with their index", "Results in")]
+        assert places == sorted(places) and [words in out for words in technical] == [verbose] * len(technical)
+        assert verbose or out.count("0.11430421") == 3  # in the sentences on both branches, and in the table
