@@ -12,6 +12,11 @@ INTERRUPTED = 130
 """Status of a program that is interrupted."""
 
 
+def many(count: int, noun: str, plural: str = "") -> str:
+    """A number of things: ``1 point``, ``2 points``."""
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
 @dataclass(frozen=True)
 class Argument:
     """An argument of a public class or function, with the ``value`` to give where there is one to recommend."""

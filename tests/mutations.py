@@ -782,7 +782,7 @@ FAULTS = {
     ),
     "pitchfork-opens-the-other-way": Fault(
         f"{CONTINUATION}normal_form.py",
-        'return NormalForm("pitchfork", best /',
+        "return NormalForm(PITCHFORK, best /",
         'return NormalForm("pitchfork", -best /',
         f"{ERRORS}",
     ),

@@ -12,6 +12,7 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -48,6 +49,10 @@ NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$|-(inf|nan)$")
 """A negative number, which is the value of an option and none itself; argparse knows those without exponent."""
 
 
+UNKNOWN = re.compile(r"(?<!\S)--[\w-]+")
+"""An option in a complaint of argparse."""
+
+
 class Parser(argparse.ArgumentParser):
     """Argument parser whose complaints are one sentence; the destination of an option is the argument that it sets."""
 
@@ -72,7 +77,10 @@ class Parser(argparse.ArgumentParser):
         return ARGUMENT.sub(option, text)
 
     def error(self, message: str) -> NoReturn:
-        """Print ``message`` and leave with status 2."""
+        """Print ``message``, of an unknown option with the nearest one there is, and leave with status 2."""
+        unknown = UNKNOWN.findall(message.partition("unrecognized")[2])
+        if near := [x for word in unknown for x in get_close_matches(word, self._option_string_actions, 1, 0.7)]:
+            message += f" (did you mean {', '.join(near)}?)"
         complain(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
 
 

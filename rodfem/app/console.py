@@ -21,7 +21,7 @@ from typing import Any
 
 import rodfem
 from rodfem.app.cli import Parser, complain, folder, run_folder
-from rodfem.errors import InputError
+from rodfem.errors import InputError, SetupError
 
 HELP = """usage: rodfem COMMAND [ARGUMENTS]
 
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         try:
             COMMANDS[name](words)
-        except InputError as trouble:
+        except (InputError, SetupError) as trouble:
             complain(str(trouble))
 
 
@@ -72,7 +72,7 @@ def _summary(command: Callable[..., None]) -> str:
 
 
 def convert(words: Sequence[str]) -> None:
-    """Write a saved diagram for other programs: VTKHDF (ParaView), CSV."""
+    """Write a saved diagram for other programs: VTKHDF (ParaView), CSV, netCDF."""
     from rodfem.output.convert import FORMATS
     from rodfem.output.files import load_json
     from rodfem.whole_files import writing

@@ -126,7 +126,7 @@ def _run(
     scene, discretization, plan = statement.scene(**constants), discretization_of(options, own), plan_of(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
-    run(scene, discretization, plan, options.output, figures=options.figures, words=words)
+    run(scene, discretization, plan, options.output, figures=options.figures, verbose=options.verbose, words=words)
     if ignored := unread(petsc):
         Report().warn(f"PETSc did not read the option {', '.join(ignored)}: see whether it is spelled right.")
 
@@ -192,6 +192,7 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
         "--output": f"folder for files and pictures (default {output})",
         "--no-figures": "draw nothing",
+        "--verbose": "print what is technical, too: meshes, special points as they are found, times, methods",
     }
     groups: dict[str, dict[str, dict[str, Any]]] = {
         "discretisation": {
@@ -215,6 +216,7 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
         "output": {
             "--output": {"type": folder, "default": output, "metavar": "DIR"},
             "--no-figures": {"dest": "figures", "action": "store_false"},
+            "--verbose": {"action": "store_true"},
         },
     }
     for title, options in groups.items():

@@ -20,7 +20,7 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import USER
 from rodfem.diagram.diagram import Diagram
-from rodfem.diagram.plan import Plan
+from rodfem.diagram.plan import Plan, plan_of
 from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN, traced
 from rodfem.errors import ConvergenceError, InputError
@@ -53,6 +53,7 @@ GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
     figures=yes_or_no,
     comm=RANKS,
     quiet=yes_or_no,
+    verbose=yes_or_no,
     words=function("str"),
 )
 def run(
@@ -64,7 +65,9 @@ def run(
     figures: bool = True,
     comm: MPI.Comm = MPI.COMM_WORLD,
     quiet: bool = False,
+    verbose: bool = False,
     words: Callable[[str], str] = str,
+    **of_plan: Any,
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
@@ -82,7 +85,7 @@ def run(
     discretization
         By default 8 elements of degree 6, or a few to start with where the plan has an accuracy.
     plan
-        By default the range of the scene.
+        By default the range of the scene; its fields may be given instead, as ``of_plan``.
     output
         Folder, by default ``results/<name>``.
     figures
@@ -91,14 +94,16 @@ def run(
         The ranks that share the rod.
     quiet
         Whether nothing is printed.
+    verbose
+        Whether what is technical is printed, too: unknowns, meshes, points as they are found, times, and methods.
     words
         Rewords each line on the terminal.
     """
     leave_the_run()
-    plan, discretization = plan or Plan(), discretization or Discretization()
+    plan, discretization = plan_of(plan, of_plan), discretization or Discretization()
     output = Path(output or Path("results") / scene.name)
     plan.check(scene, discretization)
-    terminal = Terminal(plan, output, comm, quiet, words)
+    terminal = Terminal(plan, output, comm, words, quiet=quiet, verbose=verbose)
     with locked(output, comm), terminal:
         diagram = traced(scene, discretization, plan, terminal, comm)
         _report(diagram, terminal, figures)
@@ -109,13 +114,13 @@ class Terminal(Report):
     """Shows a run on the terminal, and keeps its files up to date."""
 
     def __init__(
-        self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool, words: Callable[[str], str] = str
+        self, plan: Plan, output: Path, comm: MPI.Comm, words: Callable[[str], str], *, quiet: bool, verbose: bool
     ) -> None:
         """Write what the ``plan`` asks for into the folder ``output``, which there is, on the first rank of ``comm``.
 
-        With ``quiet`` nothing is printed, else what ``words`` makes of each line.
+        With ``quiet`` nothing is printed, else what ``words`` makes of each line, if ``verbose`` of technical ones too.
         """
-        super().__init__(comm, words=words)
+        super().__init__(comm, words=words, verbose=verbose)
         if quiet:
             self.on = self.live = False
         self.plan, self.output, self.comm, self._saved = plan, output, comm, 0
@@ -145,8 +150,8 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     terminal.complete(diagram)
     data = diagram.data
     on_first(terminal.comm, lambda: save_json(data, output / "diagram.json"))
-    terminal.table(data, branches, plan.most_branches)
     terminal.summary(data)
+    terminal.table(data, branches, plan.most_branches)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
     terminal.timing(diagram.clock, sum(len(b.points) for b in branches))
@@ -231,7 +236,6 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
                 terminal.say(
                     "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
                 )
-            terminal.say(f"\nLocus of the {which}")
             terminal.working(f"locus {len(saved) + 1}, of the {which}")
             try:
                 near.append(diagram.locus(special, asked[0], asked[1:]))

@@ -1,4 +1,7 @@
-"""Terminal output, on rank 0 only: the problem, special points as they are found, a final table."""
+"""Terminal output, on rank 0 only: the rod, what its diagram says in words, and a table of its special points.
+
+A verbose one has what is technical, too: unknowns, meshes, special points as they are found, and times.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +19,10 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem import code_cache
-from rodfem.continuation.branch import ORDINATE, Branch, Point, SpecialPoint, not_followed
+from rodfem.continuation.branch import Branch, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
-from rodfem.errors import Argument
+from rodfem.errors import Argument, many
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
@@ -27,7 +30,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_decimals, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
 from rodfem.output.table import row_data, special_data
-from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, law_in_words, many, table_of
+from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, table_of
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.ranks import RANK
@@ -102,9 +105,18 @@ class Report(Observer):
     """Prints on rank 0: on a terminal in colours, with a line that says what is done now, until it is closed."""
 
     def __init__(
-        self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str
+        self,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        stream: TextIO | None = None,
+        words: Callable[[str], str] = str,
+        *,
+        verbose: bool = True,
     ) -> None:
-        """Print what ``words`` makes of each line to ``stream``, by default the terminal."""
+        """Print what ``words`` makes of each line to ``stream``, by default the terminal, on rank 0 of ``comm``.
+
+        Technical lines are printed if ``verbose``.
+        """
+        self.verbose = verbose
         self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
@@ -145,6 +157,11 @@ class Report(Observer):
             self.stream.write("\n".join(lines) + "\n")
             self.stream.flush()
 
+    def detail(self, line: str) -> None:
+        """Print a technical line, if all are wanted."""
+        if self.verbose:
+            self.say(line)
+
     def working(self, words: str) -> None:
         """Say on a terminal what is done now, and takes long."""
         if self.live:
@@ -168,8 +185,8 @@ class Report(Observer):
             f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
         )
         if accuracy is not None and scene.conservative:
-            self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
-        self.say(f"  unknowns: {f.describe()}, load {scene.load}")
+            self.detail(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
+        self.detail(f"  unknowns: {f.describe()}, load {scene.load}")
         self.units, self.load = scene.units, scene.load
         self.count = INDEX if scene.conservative else COUNT
         self.wide = len("0->1 (in space 2)") if scene.planar and scene.conservative else max(6, len(self.count))
@@ -177,7 +194,7 @@ class Report(Observer):
             loads = ", ".join(scene.without_potential())
             self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
         for line in f.left_out():
-            self.say(f"  left out: {line}")
+            self.detail(f"  left out: {line}")
         self._ignored(scene)
 
     def _ignored(self, scene: Scene) -> None:
@@ -202,27 +219,27 @@ class Report(Observer):
 
     def mesh(self, system: System, load: float, why: str) -> None:
         """Say that a branch goes on with another mesh, and why."""
-        self.say(f"  from {system.scene.load} = {load:.6g} on {_mesh(system)} ({why})")
+        self.detail(f"  from {system.scene.load} = {load:.6g} on {_mesh(system)} ({why})")
 
     def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
         """Say with which meshes a branch was traced, and the error of the worst of its points."""
         word = "" if worst <= asked else f", above the {asked:g} asked for"
-        self.say(f"  largest error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
+        self.detail(f"  largest error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
         self.known.append(branch)
         origin = f" from {called(branch.parent[0])}, special point {branch.parent[1] + 1}" if branch.parent else ""
-        self.say(f"\n{branch.name}{origin}")
-        self.say(f"       load           ordinate       int W ds  {self.count:>{self.wide}}  zero  located to")
+        self.detail(f"\n{branch.name}{origin}")
+        self.detail(f"       load           ordinate       int W ds  {self.count:>{self.wide}}  zero  located to")
 
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced; elsewhere than on a terminal print it now and then."""
         if not self.live and monotonic() - self.told < PAUSE:
             return
-        self.told = monotonic()
+        self.told, waiting = monotonic(), not_followed(self.known)
         words = (
-            f"{branch.name}, {len(self.known)} known, {not_followed(self.known)} waiting, "
+            f"{branch.name}, {len(self.known)} known, {many(waiting, 'branch point')} left to follow, "
             f"{self.load} = {in_decimals(point.load, 5, self.units.load)}, {self.count} {point.negative}, "
             f"{len(branch.points)} points"
         )
@@ -233,7 +250,7 @@ class Report(Observer):
 
     def special(self, branch: Branch, special: SpecialPoint) -> None:
         """Print a special point as it is found, as AUTO does."""
-        self.say("  " + self._line(special))
+        self.detail("  " + self._line(special))
 
     def _line(self, special: SpecialPoint) -> str:
         p, units = special.point, self.units
@@ -245,21 +262,11 @@ class Report(Observer):
             f"{index:>{self.wide}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
         )
 
-    def law(self, special: SpecialPoint) -> None:
-        """Print the local law of a branch point, if it has one."""
-        if special.law is not None:
-            law = law_in_words(special_data(special))
-            even = special.law.power == 1 and "pitchfork" in special.law.kind
-            what = "x is the change of the ordinate" + ", of second order in the amplitude" * even
-            if special.law.of != ORDINATE:
-                what = "a is the distance from there in the metric, as the ordinate does not change to leading order"
-            self.say(f"\nAt load {special.point.load:.8g}: {law}; {what}")
-
     def finished(self, branch: Branch) -> None:
         """Close a branch: its last point and why it ended."""
         if branch.special and branch.special[-1].kind == END:
-            self.say("  " + self._line(branch.special[-1]))
-        self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
+            self.detail("  " + self._line(branch.special[-1]))
+        self.detail(f"  {len(branch.points)} points; ended: {branch.ended}")
 
     def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
         """Print every special point of a diagram, with its error bar, and what is left open.
@@ -349,12 +356,12 @@ class Report(Observer):
         self._indented(map(str, found.soft))
         self._indented(_eigenvalues(found, modes))
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
-        took = f"{many(found.factorisations, 'factorisation')}, {1e3 * found.seconds:.1f} ms"
-        self.say(f"    {found.method} ({found.reason}){proof}; {took}")
+        self.say(f"    {found.method} ({found.reason}){proof}")
+        self.detail(f"    {many(found.factorisations, 'factorisation')}, {1e3 * found.seconds:.1f} ms")
         if found.band:
             inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
             inside = f"; inside: {inside}" if inside else ""
-            self.say(f"    inertia decides beyond {found.band:.1e} (in the metric of rotations){inside}")
+            self.detail(f"    inertia decides beyond {found.band:.1e} (in the metric of rotations){inside}")
 
     def _stability(self, found: Verdict) -> str:
         if found.stable:
@@ -372,10 +379,10 @@ class Report(Observer):
         self.say(f"  ! {sentence}")
 
     def timing(self, clock: Clock, points: int) -> None:
-        """Print where the time went."""
+        """Print how long it took, and where the time went."""
+        known = "index" if self.count == INDEX else "frequencies"
+        self.say(f"\n{many(points, 'point')} with {'its' if points == 1 else 'their'} {known} in {clock.total():.1f} s")
         names = ("setup", *WORK, "location", "error bars", "modes", "files")
         took = {name: f"{clock.seconds.get(name, 0.0):.2f} s" for name in names}
-        parts = [f"{name} {seconds}" for name, seconds in took.items() if seconds != "0.00 s"]
-        self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
-        known = "index" if self.count == INDEX else "frequencies"
-        self.say(f"{points} points with their {known}, {clock.each(points):.2f} ms each ({', '.join(WORK)})")
+        parts = ", ".join(f"{name} {seconds}" for name, seconds in took.items() if seconds != "0.00 s")
+        self.detail(f"Time: {parts}; {clock.each(points):.2f} ms a point ({', '.join(WORK)})")

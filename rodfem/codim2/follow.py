@@ -14,7 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +25,7 @@ from petsc4py import PETSc
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Enriched, bound
 from rodfem.codim2.criteria import NEAREST, UNSTABLE, Collision, Singular, null_vectors, unstable
 from rodfem.codim2.curve import Half, Tracer
-from rodfem.codim2.locus import Locus, Mark
+from rodfem.codim2.locus import Locus, Mark, Row
 from rodfem.codim2.plane import Criterion, Interval, LocusPoint, Plane
 from rodfem.codim2.points import place
 from rodfem.continuation.branch import SpecialPoint
@@ -36,6 +38,7 @@ from rodfem.fem.transfer import halved
 from rodfem.output.files import mesh_of
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.tolerances import same_special
 
 
 class Errors(NamedTuple):
@@ -175,8 +178,10 @@ def locus(
         if doubtful or special.resolved is False:
             errors = errors._replace(unresolved=list(range(len(curve.nodes))))
         found = of.locus(curve, errors)
-        found.crossings = _crossings(tracer, curve)
+        start = of.rows(tracer, curve, 1, float(of.first.p[1]))
+        found.crossings = list(map(attrgetter("load", "ordinate"), start))
         notes = not_integrated(solver, plane, curve.nodes, errors.error), of.nearest()
+    found.solve = partial(of.rows, tracer, curve)
     found.note = " ".join(f"Locus of the {special.kind}: {words}" for words in notes if words)
     return found
 
@@ -203,15 +208,25 @@ def _both_sides(tracer: Tracer, first: LocusPoint) -> _Curve:
     return _Curve(backwards.nodes[:0:-1] + onwards.nodes, marks, start, (backwards.ended, onwards.ended))
 
 
-def _crossings(tracer: Tracer, curve: _Curve) -> list[tuple[float, float]]:
-    """Load and ordinate at the start, and wherever else the curve passes the second parameter's value there."""
-    first, nodes = curve.nodes[curve.start], curve.nodes
-    level, found = float(first.p[1]), [first]
-    for side in (nodes[: curve.start][::-1], nodes[curve.start + 1 :]):
-        for a, b in pairwise(side):
-            if (a.p[1] - level) * (b.p[1] - level) < 0:
-                found += tracer.points.crossed(a, b, 1, level)
-    return [(float(n.p[0]), n.ordinate) for n in found]
+def _crossings(tracer: Tracer, curve: _Curve, which: int, value: float) -> list[LocusPoint]:
+    """Points at which parameter ``which`` has a ``value``, each once, the start before others."""
+    first, found = curve.nodes[curve.start], list[LocusPoint]()
+    onwards = curve.nodes[curve.start :]
+    backwards = [first.reversed(), *curve.nodes[: curve.start][::-1]]
+    for side in (onwards, backwards):
+        for a, b in pairwise([side[0], *side]):
+            if b.p[which] == value:
+                found.append(b)
+            elif (a.p[which] - value) * (b.p[which] - value) < 0 and a.s < b.s:
+                found += tracer.points.crossed(a, b, which, value)
+    other, units, plane = 1 - which, tracer.criterion.solver.units, tracer.points.plane
+    places = [(float(n.p[other]), n.ordinate) for n in found]
+
+    def known(i: int) -> bool:
+        left, sizes = float(found[i].located_to[other]), (float(plane.sizes[other]), units.ordinate)
+        return any(same_special(places[i], left, place, sizes) for place in places[:i])
+
+    return [node for i, node in enumerate(found) if not known(i)]
 
 
 def _check(solver: BranchSolver, special: SpecialPoint) -> None:
@@ -289,6 +304,15 @@ class _Followed:
             words=(load.words, other.words),
             units=(load.unit, other.unit),
         )
+
+    def rows(self, tracer: Tracer, curve: _Curve, which: int, value: float) -> list[Row]:
+        """Rows of a curve at which parameter ``which`` has a ``value``, solved for on the mesh of the locus."""
+        with self.plane.kept():
+            found = _crossings(tracer, curve, which, value)
+        change = self._changing()
+        sides = [(n.rest, n.rest + change if n.rest >= 0 else -1) for n in found]
+        rest = [(n.ordinate, n.omega2, i, tuple(n.located_to.tolist())) for n, i in zip(found, sides, strict=True)]
+        return [Row(float(n.p[0]), float(n.p[1]), *others) for n, others in zip(found, rest, strict=True)]
 
     def _changing(self) -> int:
         """By how much the index changes across the locus at the first point."""

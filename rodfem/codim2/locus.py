@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,11 @@ from petsc4py import PETSc
 
 from rodfem.codim2.plane import Interval
 from rodfem.continuation.branch import SpecialPoint
+from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number
 from rodfem.output.files import save_json
+from rodfem.problem.arguments import finite
 from rodfem.problem.units import Units
 from rodfem.tolerances import NEGLIGIBLE, same_special
 
@@ -36,7 +39,23 @@ class Mark:
     row: int
 
 
-@dataclass
+@dataclass(frozen=True)
+class Row:
+    """A point of a locus: its ``load``, second ``parameter`` and ``ordinate``.
+
+    ``omega2`` is the double eigenvalue of flutter, nan for others, and ``index`` that on the two sides of the curve;
+    both parameters are uncertain by ``located_to`` on its mesh.
+    """
+
+    load: float
+    parameter: float
+    ordinate: float
+    omega2: float
+    index: tuple[int, int]
+    located_to: tuple[float, float]
+
+
+@dataclass(repr=False)
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
@@ -79,6 +98,8 @@ class Locus:
         Load and ordinate at the start, and wherever else the curve passes the second parameter's value there.
     note
         Why errors that were asked for are not estimated; empty where they are.
+    solve
+        Rows at which a parameter, 0 or 1, has a value; None in a locus that was read from a file.
     """
 
     scene: str
@@ -108,6 +129,27 @@ class Locus:
     natural: float = 1.0
     planar: bool = False
     unresolved: list[int] = field(default_factory=list)
+    solve: Callable[[int, float], list[Row]] | None = None
+
+    def __repr__(self) -> str:
+        """Kind, names, size and ranges."""
+        each = zip(self.names, self.values.min(axis=0), self.values.max(axis=0), strict=True)
+        ranges = ", ".join(f"{name} from {low:.6g} to {high:.6g}" for name, low, high in each)
+        return f"<Locus of the {self.kind}: {len(self.values)} points, {ranges}>"
+
+    def at(self, **value: float) -> list[Row]:
+        """Rows at which one of its two parameters has a value, as ``locus.at(A=-2.0)``, each solved for; collective.
+
+        Raises :class:`InputError` for anything but one of :attr:`names`, and for a locus that a file holds: it has no
+        states.
+        """
+        names = [name for name in self.names if name in value]
+        if len(names) != 1 or len(value) != 1:
+            one = f"give {' or '.join(self.names)}, as in at({self.names[1]}=1.0)"
+            raise InputError(f"{value} is not one parameter of the locus: {one}.")
+        if self.solve is None:
+            raise InputError("This locus is from a file, which has no states: follow it again, by diagram.locus(...).")
+        return self.solve(self.names.index(names[0]), finite(names[0], value[names[0]], 1.0))
 
     def passes(self, special: SpecialPoint, units: Units) -> bool:
         """Whether the curve passes the line of its start again at another special point.

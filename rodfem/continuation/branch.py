@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.kinds import Kind
-from rodfem.errors import SMALLER_STEPS, InputError
+from rodfem.continuation.kinds import EVENT, Kind
+from rodfem.errors import SMALLER_STEPS, InputError, many
 from rodfem.libraries import optional
 from rodfem.problem.arguments import SHORT
-from rodfem.stability.soft_mode import SoftMode, index_range, is_stable
+from rodfem.stability.soft_mode import STABILITY, SoftMode, index_range, is_stable
 from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ class Point:
 
     def __repr__(self) -> str:
         """Load, ordinate and stability."""
-        words = {True: "stable", None: "undecided", False: "unstable"}[self.stable]
+        words = STABILITY[self.stable]
         word = words if self.stable else f"{words}, index {index_range(self.negative, self.undecided, self.kink)}"
         word += f" of the {self.kink}" if self.kink else ""
         return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
@@ -210,11 +210,13 @@ class Point:
 
 ORDINATE, DISTANCE = "ordinate", "distance"
 """What a normal form is a function of."""
-VERTICAL_BRANCH = "vertical branch"
-"""Kind of a normal form: all states of the branch are at one load."""
+VERTICAL_BRANCH, PITCHFORK, TRANSCRITICAL = "vertical branch", "pitchfork", "transcritical"
+"""Kinds of a normal form; at the first one all states of the branch are at one load."""
+LAWS = (PITCHFORK, f"supercritical {PITCHFORK}", f"subcritical {PITCHFORK}", TRANSCRITICAL, VERTICAL_BRANCH)
+"""All kinds of a normal form: of a pitchfork whose side is known the second or the third."""
 
 
-@dataclass
+@dataclass(repr=False)
 class NormalForm:
     """``load = load_b + coefficient x^power + ...`` at a bifurcation of a ``kind``; the coefficient's ``uncertainty``.
 
@@ -241,9 +243,14 @@ class NormalForm:
 
         One whose side is not determined keeps its name.
         """
-        if self.kind == "pitchfork" and self.side:
+        if self.kind == PITCHFORK and self.side:
             there, here = (index_above, index_below) if self.side > 0 else (index_below, index_above)
-            self.kind = "supercritical pitchfork" if there > here else "subcritical pitchfork"
+            self.kind = LAWS[1] if there > here else LAWS[2]
+
+    def __repr__(self) -> str:
+        """Kind, power, and coefficient with its uncertainty."""
+        law = f"coefficient {self.coefficient:.10g} +- {self.uncertainty:.0e} of x^{self.power}"
+        return f"<Normal form: {self.kind}, {law}, x the {self.of}>"
 
 
 @dataclass(repr=False)
@@ -322,6 +329,13 @@ class SpecialPoint:
         """Kind, load and change of the index."""
         change = f"{self.negative_before}->{self.negative_after}"
         return f"<Special point: {self.kind.words} at load {self.point.load:.10g}, index {change}>"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names by which it is found: its kind, that of its normal form, and that of its event."""
+        law = "" if self.law is None else self.law.kind
+        event = "" if self.kind != EVENT else self.note if self.event is None else self.event.name
+        return tuple(filter(None, (self.kind, law, PITCHFORK * (PITCHFORK in law), event)))
 
     @property
     def multiplicity(self) -> int:
@@ -419,9 +433,10 @@ class Branch:
         """Sentence on a first state that is singular, for a load of that name; empty where it is not."""
         if not self.singular_start:
             return ""
+        vanish = many(self.singular_start, "eigenvalue vanishes", "eigenvalues vanish")
         return (
-            f"The first state, at {load} = {self.points[0].load:.8g}, is singular: {self.singular_start} eigenvalue(s) "
-            "vanish there that do not all along the branch. What else leaves it is not followed: begin before it."
+            f"The first state, at {load} = {self.points[0].load:.8g}, is singular: {vanish} there, not all along "
+            "the branch. What else leaves it is not followed: begin before it."
         )
 
     def backwards(self) -> Branch:

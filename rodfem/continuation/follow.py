@@ -30,8 +30,8 @@ ON_BOUND = 1e-8
 """Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
 UNEXPLAINED = 0.25
 """Defect of a step, relative to the correction that is aimed at, from which on it has ended on another branch."""
-END_OF_RANGE = "end of range"
-"""Why a branch ends at a bound of the range."""
+END_OF_RANGE, MOST_REACHED = "end of range", "points reached"
+"""Why a branch ends at a bound of the range, and with as many points as its steps may have."""
 
 
 def follow(
@@ -57,7 +57,7 @@ def follow(
         if point is not None:
             yield point
             walk.go_on(point)
-    yield walk.ended or f"{steps.most} points reached"
+    yield walk.ended or f"{steps.most} {MOST_REACHED}"
 
 
 class _Walk:

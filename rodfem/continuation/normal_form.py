@@ -25,7 +25,15 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import DISTANCE, ORDINATE, VERTICAL_BRANCH, NormalForm, SpecialPoint
+from rodfem.continuation.branch import (
+    DISTANCE,
+    ORDINATE,
+    PITCHFORK,
+    TRANSCRITICAL,
+    VERTICAL_BRANCH,
+    NormalForm,
+    SpecialPoint,
+)
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.fem.newton import correct
 from rodfem.tolerances import NEGLIGIBLE, round_off
@@ -239,9 +247,9 @@ def _transcritical(load: Leading, x: Term, one: float) -> NormalForm:
     side = int(np.sign(load.best))
     if x is None or x[0] != LINEAR:
         best, left = load.over(ONE, 1)
-        return NormalForm("transcritical", abs(best), 1, left, side, DISTANCE)
+        return NormalForm(TRANSCRITICAL, abs(best), 1, left, side, DISTANCE)
     best, left = load.over(x[1], 1)
-    return NormalForm("transcritical", best / one, 1, left / one, side)
+    return NormalForm(TRANSCRITICAL, best / one, 1, left / one, side)
 
 
 def _pitchfork(load: Leading, hidden: float, x: Term, one: float) -> NormalForm:
@@ -257,7 +265,7 @@ def _pitchfork(load: Leading, hidden: float, x: Term, one: float) -> NormalForm:
     best, left = load.over(term, power)
     left += part * abs(best) + hidden / abs(term.best) ** power
     side = int(np.sign(load.best)) if load.told() else 0
-    return NormalForm("pitchfork", best / size, power, left / size, side, of)
+    return NormalForm(PITCHFORK, best / size, power, left / size, side, of)
 
 
 def _near(

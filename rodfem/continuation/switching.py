@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import VERTICAL_BRANCH, Point, SpecialPoint
+from rodfem.continuation.branch import PITCHFORK, TRANSCRITICAL, VERTICAL_BRANCH, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.first_equilibrium import STILL
 from rodfem.continuation.singular_points import LEVEL
@@ -152,8 +152,8 @@ def _side(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec) -> 
     """Sign of the load's change along a branch right after it leaves; zero where that is not asked for."""
     if special.test_function != "mu":
         return 0.0
-    if special.law is not None and special.law.kind != "transcritical":
-        return special.law.side if "pitchfork" in special.law.kind else 0.0
+    if special.law is not None and special.law.kind != TRANSCRITICAL:
+        return special.law.side if PITCHFORK in special.law.kind else 0.0
     # of a transcritical branch one side may turn back at once, in a fold: the slope is that right at the point
     near = leave(solver, special, direction, FIRST / 4 if special.law is None else NEAREST)
     return 0.0 if near is None else float(np.sign(near.load - special.point.load))

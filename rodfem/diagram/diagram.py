@@ -12,18 +12,19 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch import LAWS, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.kinds import EVENT, KINDS
+from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.search import Coexisting, equilibria_at, with_copies
-from rodfem.diagram import tables
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
+from rodfem.libraries import optional
 from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
+from rodfem.output import tables
 from rodfem.output.files import as_data, origin, save_run
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.roles import derived
@@ -34,6 +35,7 @@ from rodfem.timing import Clock
 from rodfem.whole_files import PICTURES, draft_of, locked, picture_at
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rodfem.codim2.locus import Locus
@@ -115,16 +117,18 @@ class Diagram:
     def special(self, kind: str | None = None, branch: str | None = None) -> list[SpecialPoint]:
         """Special points, of one kind ("fold", "branch point", "flutter", "divergence", ...) or one branch if named.
 
-        Without a kind those at which something happens: loads asked for and ends are left out.  Events are found by
-        their names, too.  Raises :class:`~rodfem.errors.InputError` for a kind that does not exist.
+        Without a kind those at which something happens: loads asked for and ends are left out.  Branch points are found
+        by the kinds of their normal forms, too ("pitchfork", "subcritical pitchfork", "transcritical", ...), and events
+        by their names.  Raises :class:`~rodfem.errors.InputError` for a kind that does not exist.
         """
         every = list(chain.from_iterable(b.special for b in (self if branch is None else [self[branch]])))
         if kind is None:
             return [s for s in every if not s.kind.given]
-        events = {*(event.name for event in self.plan.events), *map(_name_of_event, every)} - {""}
-        if kind not in KINDS and kind not in events:
-            raise InputError(f"There is no kind {kind!r}: choose one of {', '.join([*KINDS, *sorted(events)])}.")
-        return [s for s in every if kind in (s.kind, _name_of_event(s))]
+        found = [s for s in every if kind in s.names]
+        known = [*KINDS, *LAWS, *sorted({event.name for event in self.plan.events})]
+        if not found and kind not in known:
+            raise InputError(f"There is no kind {kind!r}: choose one of {', '.join(known)}.")
+        return found
 
     @checked(load=number(1.0))
     def at(self, load: float) -> list[Point]:
@@ -299,14 +303,17 @@ class Diagram:
 
     def to_dataframe(self) -> Any:
         """All rows as a ``pandas.DataFrame``; raises :class:`~rodfem.errors.SetupError` without pandas."""
-        return tables.dataframe(self)
+        frames = [branch.to_dataframe() for branch in self]
+        for frame, branch in zip(frames, self, strict=True):
+            frame.insert(0, "branch", branch.name)
+        return optional("pandas", "tables").concat(frames, ignore_index=True)
 
     def to_xarray(self) -> Any:
         """All rows as an ``xarray.Dataset``: their numbers, shape, strains, forces and moments, with coordinates.
 
         Raises :class:`~rodfem.errors.SetupError` without xarray.  Collective.
         """
-        return tables.dataset(self)
+        return tables.of_branches(self.branches, self.data)
 
     def view(self) -> Page:
         """Make the page that ``rodfem view`` opens: a notebook shows it, ``.open()`` a browser; collective."""
@@ -333,18 +340,19 @@ class Diagram:
         return folder
 
     @checked(path=path("diagram.png"))
-    def plot(self, path: Path | str | None = None) -> Figure:
+    def plot(self, path: Path | str | None = None, ax: Axes | None = None) -> Figure:
         """Draw the diagram with stability and special points; also into a file, if a ``path`` is given.
 
-        As all that is written it may be in a new folder.  Raises :class:`~rodfem.errors.InputError` where that cannot
-        be written, or has a suffix of no picture.
+        A notebook shows what is returned.  In axes of matplotlib, ``ax``, several diagrams are one picture: each has
+        colours that the others do not have.  As all that is written it may be in a new folder.  Raises
+        :class:`~rodfem.errors.InputError` where that cannot be written, or has a suffix of no picture.
         """
         self._can_write(path, PICTURES)
         if self.scene.conservative:
             from rodfem.output.plot_diagram import figure_of
         else:
             from rodfem.output.plot_frequencies import figure_of
-        figure = figure_of(self.data)
+        figure = figure_of(self.data, ax)
         if path is not None and self.solvers[0].system.comm.rank == 0:
             with draft_of(Path(path)) as draft:
                 figure.savefig(draft)
@@ -385,10 +393,3 @@ class Diagram:
         title = "".join(f"<th>{escape(name)}</th>" for name in head)
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         return f"<p>{escape(repr(self)[1:-1])}</p><table><thead><tr>{title}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def _name_of_event(special: SpecialPoint) -> str:
-    """Name of the event at a special point, which a file has in its note; empty at other points."""
-    if special.kind != EVENT:
-        return ""
-    return special.note if special.event is None else special.event.name

@@ -12,6 +12,7 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
+from rodfem.errors import many
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.stability.near_zero import resolve
@@ -59,14 +60,15 @@ class PersistentZeros:
     def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
         """Report eigenvalues that are zero at two rows: to round-off, or to what Newton's method leaves of a state."""
         load, exact = solver.system.scene.load, _exact(solver, (before, point), extra)
+        stays = "eigenvalue stays", "eigenvalues stay"
         if exact:
             self.observer.note(
-                f"  {exact} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
+                f"  {many(exact, *stays)} zero that no symmetry of the scene explains: these states may turn or "
                 "move freely at one and the same load"
             )
         if extra > exact:
             self.observer.note(
-                f"  {extra - exact} eigenvalue(s) stay within {TOLERANCE:.0e} of zero, relative to the lowest bending "
+                f"  {many(extra - exact, *stays)} within {TOLERANCE:.0e} of zero, relative to the lowest bending "
                 f"eigenvalue, from {load} = {before.load:.8g} to {point.load:.8g} at least, without being zero to "
                 "round-off: Newton's method leaves that open of a state, their sign is undecided"
             )

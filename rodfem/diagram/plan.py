@@ -190,6 +190,17 @@ class Plan:
                 raise InputError(f"The mesh has no more than {most} eigenvalues, not {asked}", Remedy(FEWER, argument))
 
 
+def plan_of(plan: Plan | None, asked: dict[str, Any]) -> Plan:
+    """The ``plan`` given, or that of the fields ``asked`` for; raises :class:`InputError` for both, or another name."""
+    names = [f.name for f in fields(Plan)]
+    for name in asked:
+        if name not in names:
+            raise InputError(f"A plan has no {name!r}: choose one of {', '.join(names)}, or give a Discretization.")
+        if plan is not None:
+            raise InputError(f"{name} and plan are both given: give plan=Plan({name}=...), or {name} without a plan.")
+    return Plan(**asked) if plan is None else plan
+
+
 EQUATIONS = "equations"
 """Entry of what a run was asked for that has the fingerprint of the equations (:mod:`rodfem.fem.fingerprint`)."""
 

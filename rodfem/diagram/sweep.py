@@ -28,7 +28,7 @@ from rodfem.diagram.doubts import Quadrature
 from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_first
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, SceneError, many
 from rodfem.ranks import as_failure, without
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
@@ -223,7 +223,7 @@ class Sweep:
                 moving.append(pencil.motion(found.vectors[:, [i]].real))
         if number := min(len(moving), self._still):
             self.observer.warn(
-                f"{number} frequency(ies) stay zero that no symmetry of the scene explains "
+                f"{many(number, 'frequency stays', 'frequencies stay')} zero that no symmetry of the scene explains "
                 f"({', '.join(dict.fromkeys(moving))}): the rod may turn or move freely, and frequencies and critical "
                 "loads are those of the state that its start leads to; others differ."
             )

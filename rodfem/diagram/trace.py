@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import ceil
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -20,7 +21,7 @@ from rodfem.continuation.observer import Observer, Recorder
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.equilibria import at_load, check_start, first_state
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.plan import EQUATIONS, Plan, entries
+from rodfem.diagram.plan import EQUATIONS, Plan, entries, plan_of
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, Remedy
@@ -57,6 +58,7 @@ def trace(
     observer: Observer | None = None,
     *,
     comm: MPI.Comm = MPI.COMM_WORLD,
+    **of_plan: Any,
 ) -> Diagram:
     """Trace the equilibria of a scene and decide the stability of each; collective over the ranks of ``comm``.
 
@@ -71,7 +73,8 @@ def trace(
         Elements and degree, by default 8 elements of degree 6; where the plan has an accuracy few elements to start
         with.
     plan
-        What is explored, by default the scene's range to a depth of 2.
+        What is explored, by default the scene's range to a depth of 2; its fields may be given instead, as
+        ``of_plan``: ``trace(scene, depth=1, at=(0.5,))``.
     observer
         What hears of the progress; by default nothing does.
     comm
@@ -93,7 +96,8 @@ def trace(
     ``diagram``.  On several ranks one that nobody catches ends all ranks, which would wait for the one that fails; so
     does the end of what started them (:func:`rodfem.ranks.end_together`).
     """
-    diagram = traced(scene, discretization or Discretization(), plan or Plan(), observer or Observer(), comm)
+    plan = plan_of(plan, of_plan)
+    diagram = traced(scene, discretization or Discretization(), plan, observer or Observer(), comm)
     diagram.complete = True
     return diagram
 

@@ -13,7 +13,7 @@ from rodfem.adaptivity.zero_stretch import before_the_end, end_at_zero_stretch, 
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
+from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer
@@ -27,11 +27,18 @@ from rodfem.diagram.finders import Finder, RequestedLoads, Step
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.shorter_steps import Unresolved
 from rodfem.diagram.special_search import SpecialSearch
-from rodfem.errors import ConvergenceError
+from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.ranks import as_failure, without
 from rodfem.tolerances import DRIFT, ROUND_OFF
 
 NO_CONVERGENCE = "no convergence"
+REMEDIES = {
+    NO_CONVERGENCE: "use more elements or smaller steps",
+    MOST_REACHED: Remedy(
+        "use longer steps ({}) or more points ({})", Argument("StepControl", "largest"), Argument("StepControl", "most")
+    ),
+}
+"""What to try where a branch ends for a reason, by its words."""
 """How the reason begins for which a branch ends that no step leads on from."""
 SAME_END = 1e-6
 """A special point nearer to the end of the range than this, in spans, is the last state."""
@@ -168,8 +175,7 @@ class Tracer:
         for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
                 branch.ended = self._rest(branch) or item
-                if branch.ended.startswith(NO_CONVERGENCE):
-                    self.observer.warn(f"{branch.name} ends: {branch.ended}; use more elements or smaller steps.")
+                self._say_early(branch)
                 return True
             try:
                 reason = self._take(branch, history, item)
@@ -181,6 +187,12 @@ class Tracer:
                 branch.ended = reason
                 return True
         return True
+
+    def _say_early(self, branch: Branch) -> None:
+        """Warn of a branch that ends for a reason that has a remedy."""
+        for reason, remedy in REMEDIES.items():
+            if reason in branch.ended:
+                self.observer.warn(f"{branch.name} ends: {branch.ended}; {remedy}.")
 
     def _take(self, branch: Branch, history: list[Point], row: Point) -> str:
         """Append a row to a branch, with the special points before it; why the branch ends there, or before."""

@@ -1,4 +1,4 @@
-"""Saved diagrams in the formats of other programs: VTKHDF for ParaView, CSV tables."""
+"""Saved diagrams in the formats of other programs: VTKHDF for ParaView, CSV tables, netCDF for xarray."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rodfem.file_format import DIAGRAM, read_json
 from rodfem.modes.modes import load_modes, rows_with_modes
 from rodfem.output.states import rows_of
+from rodfem.output.tables import of_files
 from rodfem.output.words import row_of
 from rodfem.whole_files import with_added, write_whole
 
@@ -122,5 +123,15 @@ def _table(rows: list[dict[str, Any]]) -> bytes:
     return text.getvalue().encode()
 
 
-FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv}
+def to_netcdf(folder: Path, target: Path) -> list[Path]:
+    """Write ``diagram.nc``, the content of :meth:`rodfem.Diagram.to_xarray`; returns the file.
+
+    Raises :class:`InputError` for a folder without a run, and :class:`SetupError` without xarray.
+    """
+    path = target / "diagram.nc"
+    write_whole({path: bytes(of_files(folder).to_netcdf())})
+    return [path]
+
+
+FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv, "netcdf": to_netcdf}
 """Formats by name, and what writes them."""

@@ -34,6 +34,7 @@ from rodfem.output.style import (
     WARNING,
     at_most,
     axis_label,
+    entries_of,
     explain,
     mesh_in_words,
     ordinate_in_words,
@@ -92,15 +93,15 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     return save(figure_of(diagram), path)
 
 
-def figure_of(diagram: Mapping[str, Any]) -> Figure:
-    """Figure of a diagram, as :func:`draw_diagram` writes it."""
+def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
+    """Figure of a diagram, as :func:`draw_diagram` writes it, or that of axes that are ``given``: it is drawn there."""
     DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = diagram["branches"]
     with matplotlib.rc_context(STYLE):
-        figure, axes = sheet(diagram["title"], _about(diagram))
+        figure, axes = sheet(diagram["title"], _about(diagram), given)
         handles, lines = draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
-        if _is_flat(branches):
+        if given is None and _is_flat(branches):
             axes.set_ylim(-1.0, 1.0)
             if len(branches) > 1:
                 words = "the ordinate is zero all over: another one tells branches apart"
@@ -122,17 +123,26 @@ def _is_flat(branches: Branches) -> bool:
 def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Line]]:
     """Draw all curves and special points; return the legend's handles and the lines."""
     handles, lines = list[Line2D](), list[Line]()
-    for number, (branch, colour) in enumerate(zip(branches, cycle(PALETTE), strict=False)):
+    hues, behind = _free(axes, branches[0]["name"])
+    for number, (branch, colour) in enumerate(zip(branches, cycle(hues), strict=False)):
         new = [Line(piece, colour, curve) for piece, curve in drawn(branch)]
         lines += new
         shape, places = SHAPES[number // HUES % len(SHAPES)], _places(branch)
-        handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"]))
+        handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"] + behind))
         if shape or not new:
             axes.plot(*places.T, ls="", marker=shape or "o", ms=5.0, color=colour, markevery=0.08, zorder=3)
     for line in sorted(lines, key=lambda line: line.piece.kind != STABLE):
         upper = {} if line.piece.kind == STABLE else {"path_effects": RIM, "zorder": 2.5}  # seen where two lines lie
         axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind] | upper)
-    return handles + _kinds(lines) + _draw_images(axes, branches) + _draw_marks(axes, branches), lines
+    return handles + _kinds(lines) + _draw_images(axes, branches, hues) + _draw_marks(axes, branches), lines
+
+
+def _free(axes: Axes, name: str) -> tuple[Sequence[str], str]:
+    """Hues that no other diagram in the axes has, and a number for the names of branches, the first of a ``name``."""
+    used, times = {line.get_color() for line in axes.get_lines()}, 1
+    while name + f" ({times})" * (times > 1) in entries_of(axes):
+        times += 1
+    return [colour for colour in PALETTE if colour not in used] or PALETTE, f" ({times})" * (times > 1)
 
 
 def _kinds(lines: Sequence[Line]) -> list[Line2D]:
@@ -144,10 +154,10 @@ def _kinds(lines: Sequence[Line]) -> list[Line2D]:
     return out + [Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words)] * bool(lines)
 
 
-def _draw_images(axes: Axes, branches: Branches) -> list[Line2D]:
+def _draw_images(axes: Axes, branches: Branches, hues: Sequence[str]) -> list[Line2D]:
     """Draw the images of branches by a symmetry, of the opposite ordinate, that are no branches themselves."""
     out = []
-    for branch, colour in zip(branches, cycle(PALETTE), strict=False):
+    for branch, colour in zip(branches, cycle(hues), strict=False):
         if branch.get("image") and not is_traced(branch, branches):
             for piece, curve in drawn(branch):
                 axes.plot(*(curve * [1.0, -1.0]).T, color=colour, **LINES[piece.kind] | THIN)

@@ -60,17 +60,20 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
     unstable ranges are shaded.  The axis shows the ``most`` left-most eigenvalues.  Returns ``path``; raises
     :class:`ValueError` without any ``omega2``, and :class:`InputError` for another format of file.
     """
-    return save(figure_of(diagram, most), path)
+    return save(figure_of(diagram, most=most), path)
 
 
-def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
-    """Figure of the frequencies, as :func:`draw_frequencies` writes it; raises :class:`ValueError` as that does."""
+def figure_of(diagram: Mapping[str, Any], given: Axes | None = None, most: int = 3) -> Figure:
+    """Figure of the frequencies, as :func:`draw_frequencies` writes it; raises :class:`ValueError` as that does.
+
+    It is drawn into axes that are ``given``.
+    """
     DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
     if not branches:
         raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")
     with matplotlib.rc_context(STYLE):
-        figure, axes = sheet(str(diagram["title"]), _about(diagram, branches))
+        figure, axes = sheet(str(diagram["title"]), _about(diagram, branches), given)
         handles = draw_into(axes, branches, most)
         axes.set_xlabel(axis_label(diagram))
         explain(axes, handles)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from io import BytesIO
 from math import ceil, floor, log10
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import offset_copy
 
+from rodfem.errors import InputError
 from rodfem.file_format import UNREADABLE
 from rodfem.output.digits import with_unit
 from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE
@@ -57,21 +59,48 @@ HALO, RIM = ([withStroke(linewidth=width, foreground="white")] for width in (3.2
 """White around words and marks, and around lines that lie on wider ones."""
 
 
-def sheet(title: str, about: str) -> tuple[Figure, Axes]:
-    """A figure of one picture with its title, and in small letters what it is computed with."""
-    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+class Sheet(Figure):
+    """A figure that a notebook shows, although pyplot has not made it."""
+
+    def _repr_png_(self) -> bytes:
+        stream = BytesIO()
+        self.savefig(stream, format="png", dpi=DPI / 2)
+        return stream.getvalue()
+
+
+def sheet(title: str, about: str, given: Axes | None = None) -> tuple[Figure, Axes]:
+    """A figure of one picture with its title, and in small letters what it is computed with.
+
+    If axes are ``given``, they and their figure as they are; raises :class:`InputError` for anything else.
+    """
+    if given is not None:
+        if not isinstance(given, Axes):
+            raise InputError(f"ax is {given!r}: give axes of matplotlib, as in ax=pyplot.gca().")
+        return given.get_figure(), given  # type: ignore[return-value]
+    figure = Sheet(figsize=SIZE, dpi=DPI, layout="constrained")
     axes = figure.add_subplot(axisbelow=True)
     figure.suptitle(tex(title), fontsize=FONT + 2, wrap=True)
     axes.set_title(about, color="0.4", fontsize=FONT - 3, wrap=True)
     return figure, axes
 
 
+def entries_of(axes: Axes) -> dict[str, Artist]:
+    """Entries of the legend that :func:`explain` has written; none before that."""
+    return getattr(axes.get_legend(), "entries", {})
+
+
 def explain(axes: Axes, handles: Sequence[Artist]) -> None:
-    """Write the legend below the axes, each entry once: inside there may be no room."""
-    entries = {str(handle.get_label()): handle for handle in handles}
+    """Write the legend below the axes, each entry once: inside there may be no room.
+
+    Entries that it had are kept, those of another diagram in the same axes.
+    """
+    entries = entries_of(axes) | {str(handle.get_label()): handle for handle in handles}
     columns = max(1, min(4, 150 // (12 + max(map(len, entries), default=0))))
     place = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": offset_copy(axes.transAxes, axes.figure, 0, -36, "points")}
-    axes.legend(handles=list(entries.values()), loc="upper center", ncols=columns, fontsize=FONT - 2.5, **place)
+    legend = axes.legend(
+        list(entries.values()), list(entries), loc="upper center", ncols=columns, fontsize=FONT - 2.5, **place
+    )
+    legend.entries = entries  # type: ignore[attr-defined]
     axes.figure.draw_without_rendering()  # pixels are final
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
+from rodfem.errors import many
 from rodfem.output.pieces import (
     MEETS,
     PLANAR,
@@ -24,7 +25,7 @@ from rodfem.output.pieces import (
     intervals_of,
     without_stable,
 )
-from rodfem.output.words import is_sweep, many
+from rodfem.output.words import is_sweep
 
 MOST_INTERVALS, MOST_NAMES = 6, 6
 """Intervals of a branch that have a clause each, and branches that are named in one sentence."""

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 from typing import Any
 
-from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH
+from rodfem.continuation.branch import ORDINATE, PITCHFORK, VERTICAL_BRANCH
 from rodfem.continuation.kinds import FLUTTER, KINDS
+from rodfem.errors import many
 from rodfem.output.digits import NO_ESTIMATE, number
 from rodfem.output.pieces import is_solved
 from rodfem.output.table import soft_modes
@@ -36,11 +37,6 @@ class Words:
     verdict: str
     index: str
     sentence: str
-
-
-def many(count: int, noun: str, plural: str = "") -> str:
-    """A number of things: ``1 point``, ``2 points``."""
-    return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
 def is_sweep(data: Data) -> bool:
@@ -107,6 +103,7 @@ def _remarks(special: Data, row: Data) -> list[str]:
         remarks.append(
             f"double eigenvalue omega^2 = {number(special['omega2'], _bar(special, 'omega2_error_estimate'))}"
         )
+    remarks += [law_in_words(special)] if special.get("law") else []
     return remarks + ([special["note"]] if special.get("note") else [])
 
 
@@ -122,10 +119,15 @@ def law_in_words(special: Data) -> str:
     kind, c, bar = law["kind"], law["coefficient"], nan if law["uncertainty"] is None else law["uncertainty"]
     if kind == VERTICAL_BRANCH:
         return f"{kind}: a family of equilibria at one and the same load"
-    x = ("x" if law["of"] == ORDINATE else "a") + (f"^{law['power']}" if law["power"] > 1 else "")
+    even = law["power"] == 1 and PITCHFORK in kind
+    x, what = "x", "x the change of the ordinate" + ", of second order in the amplitude" * even
+    if law["of"] != ORDINATE:
+        x, what = "a", "a the distance from there in the metric, as the ordinate does not change to leading order"
+    x += f"^{law['power']}" if law["power"] > 1 else ""
     if isfinite(bar) and bar >= abs(c):
-        return f"{kind}, load = load_b + c {x} + ..., where c is not told from zero"
-    return f"{kind}, load = load_b {'-' if c < 0 else '+'} {number(abs(c), bar, special.get('resolved'))} {x} + ..."
+        return f"{kind}, load = load_b + c {x} + ..., where c is not distinguished from zero; {what}"
+    size = number(abs(c), bar, special.get("resolved"))
+    return f"{kind}, load = load_b {'-' if c < 0 else '+'} {size} {x} + ..., {what}"
 
 
 def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, str]]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Iterable, Mapping, Set
-from dataclasses import fields, is_dataclass
 from functools import wraps
 from math import isfinite, nan
 from numbers import Integral, Real
@@ -24,7 +23,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 import ufl
 
-from rodfem.errors import InputError, SceneError
+from rodfem.errors import InputError, SceneError, many
 from rodfem.expressions import Condition, Expr
 
 P = ParamSpec("P")
@@ -114,7 +113,7 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
             except TypeError as trouble:  # Python's own words lack the function and what it takes
                 names = [name for name in signature.parameters if name != "self"]
                 words = f"{function.__name__}() {trouble}: its arguments are {', '.join(names)}"
-                raise TypeError(f"{words}{_belongs(named, checks)}") from None
+                raise TypeError(words) from None
             for name, check in checks.items():
                 if name in given.arguments and given.arguments[name] is not defaults[name]:
                     given.arguments[name] = check(name, given.arguments[name])
@@ -126,16 +125,6 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
     return decorate
 
 
-def _belongs(named: Iterable[str], checks: dict[str, Check]) -> str:
-    """Say which of the last arguments is of a dataclass that has one of some names as a field; empty if none is."""
-    kinds = {argument: getattr(check, "kind", None) for argument, check in reversed(checks.items())}
-    for name in named:
-        for argument, kind in kinds.items():
-            if isinstance(kind, type) and is_dataclass(kind) and name in {f.name for f in fields(kind)} - checks.keys():
-                return f"; give {argument}={kind.__name__}({name}=...)"
-    return ""
-
-
 def a(kind: type | tuple[type, ...], example: str) -> Check:
     """Check for an object of a class, or of one of some; raises :class:`InputError` for anything else."""
 
@@ -144,7 +133,6 @@ def a(kind: type | tuple[type, ...], example: str) -> Check:
             raise InputError(f"{name} is {SHORT.repr(value)}: give {example}.")
         return value
 
-    check.kind = kind  # type: ignore[attr-defined]
     return check
 
 
@@ -210,7 +198,7 @@ def function(example: str, arguments: int = 1) -> Check:
     def check(name: str, value: Any) -> Any:
         if not takes(value, arguments):
             raise InputError(
-                f"{name} is {value!r}: give a function of {arguments} argument(s), as in {name}={example}."
+                f"{name} is {value!r}: give a function of {many(arguments, 'argument')}, as in {name}={example}."
             )
         return value
 

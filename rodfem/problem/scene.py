@@ -187,8 +187,18 @@ class Part(NamedTuple):
     s: float | None
 
 
+class Stated(type):
+    """Class whose ``dir``, and so ``help`` and completion, has its fields and what its ``PUBLIC`` names.
+
+    What else it has is for the modules that compute.
+    """
+
+    def __dir__(cls) -> list[str]:
+        return sorted([*getattr(cls, "__dataclass_fields__", ()), *getattr(cls, "PUBLIC", ()), "__init__"])
+
+
 @dataclass(frozen=True)
-class Scene(Contribution):
+class Scene(Contribution, metaclass=Stated):
     """A boundary value problem for one rod, as a person states it.
 
     Parameters
@@ -232,6 +242,8 @@ class Scene(Contribution):
         Name of the first branch; by default ``straight`` if its states are, ``ring`` for a closed rod, and
         ``first branch`` for any other.
     """
+
+    PUBLIC = ("varying", "in_space", "constants", "stiffness", "length", "conservative", "without_potential")
 
     name: str
     interval: tuple[float, float]
@@ -321,6 +333,10 @@ class Scene(Contribution):
         for name, parameter in self.parameters.items():
             parameter.check(name, parameter.value)
         self.check_span(self.span)
+
+    def __dir__(self) -> list[str]:
+        """Names for completion."""
+        return dir(type(self))
 
     @cached_property
     def tables(self) -> list[tuple[Table, str]]:

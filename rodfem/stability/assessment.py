@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import ConvergenceError, InputError, many
 from rodfem.fem.shape import Shape
 from rodfem.ranks import as_failure
 from rodfem.stability.dependence import require_independent_constraints
 from rodfem.stability.methods import Found, Method, Workspace
 from rodfem.stability.near_zero import Decision, decide
 from rodfem.stability.registry import AUTO, METHODS, find
-from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
+from rodfem.stability.soft_mode import ONE_SIDE, STABILITY, SoftMode, is_stable
 
 COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
@@ -28,7 +28,7 @@ SMALL = 12
 """A system with fewer unknowns than this for each eigenvalue is solved by dense matrices."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Verdict:
     """Stability of one state.
 
@@ -84,6 +84,12 @@ class Verdict:
         counts = replace(here, negative=point.negative, zero=point.zero, undecided=point.undecided)
         return replace(counts, soft=tuple(point.soft))
 
+    def __repr__(self) -> str:
+        """Stability, counts and the left-most eigenvalue."""
+        first = f", left-most mu = {self.values[0]:.10g}" if len(self.values) else ""
+        words = f"{STABILITY[self.stable]}, {self.negative} negative, {self.zero} zero"
+        return f"<Verdict by {self.method}: {words}{first}>"
+
     def __str__(self) -> str:
         values = ", ".join(f"{v:.10g}" for v in self.values) or "none computed"
         proof = ", none missing" if self.certified and len(self.values) else ""
@@ -93,7 +99,7 @@ class Verdict:
         undecided += f", {ONE_SIDE} of the {self.kink}" if self.kink else ""
         return (
             f"{self.negative} negative, {self.zero} zero{undecided}{inside}; left-most: {values}{proof} "
-            f"({self.method}: {self.reason}; {self.factorisations} factorisations, {1e3 * self.seconds:.1f} ms)"
+            f"({self.method}: {self.reason}; {many(self.factorisations, 'factorisation')}, {1e3 * self.seconds:.1f} ms)"
             f"{alone}"
         )
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 ONE_SIDE = "on one side of a kink"
+STABILITY = {True: "stable", None: "undecided", False: "unstable"}
+"""Words for what :func:`is_stable` says."""
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,8 @@ LINES = {
     # words
     "--output ''": "name of the folder is empty",
     "--output /etc/passwd/x": "cannot be written",
-    "--foo": "Unrecognized",
+    "--foo": "Unrecognized arguments: --foo; see",
+    "--cuopling -2 --elemnts 4": "--elemnts 4 .did you mean --coupling, --elements[?]",
 }
 AFTER_SET_UP = ("--half-length 1e3", "--bending 1e-5")
 """What is found with the discrete rod, in a folder that has been made."""

@@ -128,21 +128,20 @@ def test_colours(line: str, seen: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_line_that_changes_says_what_is_known_and_what_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in 'branch 2.1, 7 known, 3 waiting, lam = 12.3, index 2'; lines that stay are those of a pipe."""
+    """As in 'branch 2.1, 7 known, 3 branch points left to follow, lam = 12.3'; lines that stay are those of a pipe."""
     scene, plan = hemitropic_cases.scene(span=(0.0, 0.2)), Plan(depth=1, error_bars=False)
     plain = io.StringIO()
     trace(scene, MESH, plan, Report(stream=plain))
-    assert " waiting, " not in plain.getvalue() and "\033" not in plain.getvalue()
+    assert " left to follow, " not in plain.getvalue() and "\033" not in plain.getvalue()
     with terminal() as (seen, stream), Report(stream=stream) as report:
         trace(scene, MESH, plan, report)
         report.screen._progress.refresh()  # type: ignore[union-attr]
         report.say("the end")
     changing = [SPINNING.search(CONTROL.sub("", part)) for part in re.split(r"\r\x1b\[2K|\n", seen.text)]
     found = [one[1] for one in changing if one]
-    assert found and all(
-        re.fullmatch(r"[\w ]+, \d known, \d waiting, lam = 0\.\d+, index \d, \d+ points", x) for x in found
-    )
-    assert re.match(r"(straight, 1 known, 1|branch 1, 2 known, 0) waiting", found[-1])
+    line = r"[\w ]+, \d known, \d branch points? left to follow, lam = 0\.\d+, index \d, \d+ points"
+    assert found and all(re.fullmatch(line, x) for x in found)
+    assert re.match(r"(straight, 1 known, 1|branch 1, 2 known, 0) branch points? left to follow", found[-1])
     assert lines_that_stay(seen.text) == [*plain.getvalue().splitlines(), "the end", ""]
     assert seen.text.count("\x1b[?25l") == seen.text.count("\x1b[?25h") == 1  # the cursor is back
 
@@ -154,7 +153,7 @@ def test_a_log_of_a_long_run_has_lines_of_progress(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("rodfem.app.terminal.PAUSE", -1.0)
     trace(scene, MESH, plan, Report(stream=log))
     assert [x for x in log.getvalue().splitlines() if not x.startswith("  ... ")] == plain.getvalue().splitlines()
-    assert log.getvalue().count("\n  ... straight, 1 known, 0 waiting, lam = ") > 2
+    assert log.getvalue().count("\n  ... straight, 1 known, 0 branch points left to follow, lam = ") > 2
 
 
 def test_a_narrow_window_breaks_lines_between_words(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,7 @@ def printed(capfd: pytest.CaptureFixture[str]) -> Iterator[Any]:
     """Returns what a run prints on the first rank, and its diagram.json."""
 
     def terminal(scene: Scene, plan: Plan, folder: Path, mesh: Discretization = MESH) -> tuple[str, dict[str, Any]]:
-        run(scene, mesh, plan, folder, figures=False)
+        run(scene, mesh, plan, folder, figures=False, verbose=True)
         return capfd.readouterr().out, json.loads((folder / "diagram.json").read_text())
 
     yield terminal

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from demo_cases import scene
 
 import rodfem
 from rodfem import Diagram, Plan
+from rodfem.app import console
 
 pytestmark = pytest.mark.alone
 
@@ -50,3 +53,16 @@ def test_the_page_from_python(ruler: Diagram, tmp_path: object) -> None:
     page = ruler.view()
     assert "ruler" in page.html and page._repr_html_().startswith("<iframe srcdoc=")
     assert len(repr(page)) < 100
+
+
+def test_netcdf_of_files_is_the_table_of_the_diagram(ruler: Diagram, tmp_path: Path) -> None:
+    """Coordinates, units and all; profiles in files are at other points, from which nodes are interpolated."""
+    xarray = pytest.importorskip("xarray")
+    console.main(["convert", str(ruler.save(tmp_path)), "--to", "netcdf"])
+    read, own = xarray.open_dataset(tmp_path / "netcdf" / "diagram.nc"), ruler.to_xarray()
+    assert {*read.coords} == {*own.coords} and {*read.data_vars} == {*own.data_vars} and read.sizes == own.sizes
+    assert read.attrs == own.attrs and read.branch.values.tolist() == own.branch.values.tolist()
+    for name in own.variables.keys() - {"branch"}:
+        assert read[name].attrs == own[name].attrs and read[name].dims == own[name].dims
+        bound = 2e-4 if name in ("strain", "curvature", "force", "moment") else 1e-14
+        np.testing.assert_allclose(read[name].astype(float), own[name].astype(float), rtol=bound, atol=bound)

@@ -16,7 +16,7 @@ from hard.folders import HOME, MPIRUN, alive, branches_in, children_of, surround
 
 from rodfem.app.interrupts import KEPT, held
 
-HEMITROPIC = ("demos/hemitropic.py", "--no-figures", "--output")
+HEMITROPIC = ("demos/hemitropic.py", "--no-figures", "--verbose", "--output")
 MAP = ("demos/map.py", "--couplings", "200", "--output")
 LIMIT = 30
 SECOND_BRANCH, ROD = "branch 1 from", "rods"

@@ -329,10 +329,10 @@ def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
                 ("left end", "right end"), "clamp"
             )
             assert group["displacement"].shape == group["weight_rotation"].shape == (3, len(group["s"]), 3)
-    run_demo(*common, "--method", "count")
+    run_demo(*common, "--method", "count", "--verbose")
     out = capfd.readouterr().out
     if MPI.COMM_WORLD.rank == 0:
-        assert "count (as asked); 2 factorisations" in out
+        assert "count (as asked)" in out and "2 factorisations, " in out
     for words, sentence in (
         (("--at", "0.2", "--method", "magic"), "Unknown method 'magic'"),
         (("--modes", "2"), "needs loads to judge at"),

@@ -242,16 +242,15 @@ def test_arguments_of_functions(tmp_path: Path) -> None:
 
 
 def test_what_belongs_to_a_plan_or_a_mesh_is_named() -> None:
-    for name, words in (
-        ("at", r"give plan=Plan\(at=...\)"),
-        ("degree", r"give discretization=Discretization\(degree="),
+    for asked, words in (
+        ({"degree": 1}, "A plan has no 'degree': choose one of .*, or give a Discretization"),
+        ({"nonsense": 1}, "A plan has no 'nonsense': choose one of span, at, depth, "),
+        ({"depth": 1, "plan": Plan()}, r"depth and plan are both given: give plan=Plan\(depth="),
     ):
-        with pytest.raises(TypeError, match=f"unexpected keyword argument '{name}': its arguments are .*; {words}"):
-            rodfem.trace(scene(), **{name: 1})
+        with pytest.raises(InputError, match=words):
+            rodfem.trace(scene(), **asked)
     with pytest.raises(TypeError, match="its arguments are scene, discretization, comm"):
         rodfem.Solver()  # type: ignore[call-arg]
-    with pytest.raises(TypeError, match=r"its arguments are .* comm$"):
-        rodfem.trace(scene(), nonsense=1)  # type: ignore[call-arg]
 
 
 def test_ufl_prints_nothing_besides(capfd: pytest.CaptureFixture[str]) -> None:
