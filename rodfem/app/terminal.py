@@ -359,6 +359,8 @@ class Report(Observer):
     def _stability(self, found: Verdict) -> str:
         if found.stable:
             return "stable"
+        if found.negative_in_space and not found.negative and found.stable is False:
+            return f"stable in its plane, unstable in space (index {found.negative_in_space})"
         index, one = index_range(found.negative, found.undecided), found.negative + found.undecided == 1
         if found.stable is None:
             of = f" of the {found.kink}" if found.kink else ""

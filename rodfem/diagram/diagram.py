@@ -145,7 +145,8 @@ class Diagram:
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
         found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, solver.mesh))
-        return [self.solver(point).examined(point, special=self._special_at(point)) for point in found]
+        compare = self.plan.error_bars or self.plan.accuracy is not None
+        return [self.solver(p).examined(p, compare=compare, special=self._special_at(p)) for p in found]
 
     @checked(load=number(1.0))
     def states(self, load: float) -> list[Coexisting]:
