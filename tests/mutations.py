@@ -1058,7 +1058,7 @@ FAULTS = {
     ),
     "another-state-confirms-an-index": Fault(
         "rodfem/adaptivity/soft_states.py",
-        'self.uncompared = "" if again.resolved else _other_state(point.load, again)',
+        'self.uncompared = "" if again.resolved else again.unlike(point.load)',
         'self.uncompared = ""',
         "tests/stability/test_soft_modes.py",
     ),

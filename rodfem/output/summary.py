@@ -58,13 +58,24 @@ def in_sentences(data: Mapping[str, Any]) -> list[str]:
     first, *others = data["branches"]
     shown = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
     quiet = [branch for branch in others if branch not in shown and _kinds(branch)]
-    out = [_of_branch(branch, data) for branch in (first, *shown[:MOST_NAMES])]
+    out = [_of_branch(branch, data) + _remarks(data, branch) for branch in (first, *shown[:MOST_NAMES])]
     if more := shown[MOST_NAMES:]:
-        out.append(f"{_names(more)} have stable states, too.")
+        out.append(f"{_names(more)} have stable states, too." + _remarks(data, *more))
     if quiet:
         verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
-        out.append(f"{_names(quiet)} {verb} whole range.")
-    return [*out, *_ranges(data), *_coexistence(data), *_open(data)]
+        out.append(f"{_names(quiet)} {verb} whole range." + _remarks(data, *quiet))
+    return [*out, *_ranges(data), *_coexistence(data), *_open(data), *filter(None, [_remarks(data).strip()])]
+
+
+def _remarks(data: Mapping[str, Any], *branches: Mapping[str, Any]) -> str:
+    """What the run says of some ``branches``; without any, what it says of no branch of the diagram."""
+    names, out = {branch["name"] for branch in branches}, ""
+    every = {branch["name"] for branch in data["branches"]}
+    for word, entry in (("Warning", "warnings"), ("Note", "notes")):
+        for remark in data.get(entry) or ():
+            if remark["branch"] in names or not (names or remark["branch"] in every):
+                out += f" {word}: {' '.join(remark['sentence'].split())}"
+    return out
 
 
 def _kinds(branch: Mapping[str, Any]) -> set[str]:
@@ -193,7 +204,8 @@ def _open(data: Mapping[str, Any]) -> Iterator[str]:
     if changes := sum(len(branch.get("unexplained") or ()) for branch in branches):
         yield f"{many(changes, 'change')} of the index without a special point: see the warnings."
     if coarse := sum(special.get("resolved") is False for branch in branches for special in branch["special"]):
-        yield f"The mesh does not resolve {many(coarse, 'special point')}: use more elements."
+        what = f"{many(coarse, 'special point')}, whose error bars are no bounds"
+        yield f"The mesh does not resolve {what}: use more elements or a higher degree."
 
 
 def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple[str, str]:

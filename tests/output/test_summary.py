@@ -233,7 +233,7 @@ def test_what_is_open_is_said() -> None:
         assert sentence in words
     coarse = special("fold", 1, 1.0, 0, 1, resolved=False)
     rod = branch("straight", [0.0, 1.0, 4.0], [0, 0, 1], special=[coarse])
-    assert "The mesh does not resolve 1 special point: use more elements." in said(rod)
+    assert "does not resolve 1 special point, whose error bars are no bounds: use more elements" in said(rod)
 
 
 def test_mirror_images_are_no_hysteresis() -> None:
