@@ -219,6 +219,19 @@ def test_an_index_that_no_richer_mesh_confirms() -> None:
         assert ("not compared with a richer mesh" in str(verdict)) == bool(why)
 
 
+@pytest.mark.alone
+def test_a_bent_cantilever_that_is_nearly_round_has_one_name_for_its_rotation() -> None:
+    """It turns about its axis as its sections turn back; it slides nowhere, and its mode is that soft mode."""
+    round_but = lambda v, k, c: bending_and_twist(k, (1.0, 1.0 + 1e-6, 1.0))  # noqa: E731
+    rod = replace(column("bent", SUPPORTS["clamped-free"], (0.0, 10.0)), energy=round_but)
+    diagram = trace(rod, Discretization("reduced", 6, 6), Plan(at=(4.0,), depth=1, most_branches=3, error_bars=False))
+    for branch in diagram.branches[1:]:
+        (point,) = [s.point for s in branch.special if s.kind == "user"]
+        (mode,) = diagram.assess(point).soft
+        assert mode.name == "rotation about e3 with turning of the cross-sections about d3"
+        assert mode.name in diagram.modes(point, 2).motion and "mixed" not in diagram.modes(point, 2).motion
+
+
 def test_words() -> None:
     assert [index_range(*x) for x in ((2, 0), (0, 1), (0, 2), (1, 1))] == ["2", "0 or 1", "0 to 2", "1 or 2"]
     assert [is_stable(stability(*x)) for x in ((0, 0), (0, 1), (1, 1))] == [True, None, False]
