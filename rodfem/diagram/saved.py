@@ -129,9 +129,13 @@ def _branch(entry: dict[str, Any], solvers: Sequence[BranchSolver], states: Path
     branch.special = [_special(s, points, solvers) for s in entry["special"]]
     branch.singular_start = entry.get("singular_start", 0)
     branch.image = entry.get("image", "")
-    for x in entry.get("unexplained") or ():
-        branch.unexplained.append(Unexplained(points[x["row"]], points[x["row"] + 1], x["before"], x["after"]))
+    branch.unexplained = [_unexplained(change, points) for change in entry.get("unexplained", ())]
     return branch
+
+
+def _unexplained(change: dict[str, Any], points: Sequence[Point]) -> Unexplained:
+    row = change["row"]
+    return Unexplained(points[row], points[row + 1], change["before"], change["after"])
 
 
 def _remark(entry: dict[str, Any], folder: Path) -> Remark:
