@@ -16,7 +16,7 @@ from rodfem.adaptivity.error_estimate import Again, Enriched
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.observer import Observer
+from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.stability.inertia import ROUGH
@@ -138,7 +138,8 @@ class AccuracyControl:
             why = "finer meshes do not lower the error" if not helps else f"{self.tries + 1} finer meshes did not do"
             if len(self.meshes.solvers) >= MOST:
                 why = f"{MOST} meshes are the most"
-            observer.warn(f"The accuracy is not reached near load {trouble.point.load:.6g} ({trouble}): {why}.")
+            load = trouble.point.load
+            observer.warn(Remark(f"The accuracy is not reached near load {load:.6g} ({trouble}): {why}.", load))
             return None
         return self.meshes.raised(trouble, self.tries)
 

@@ -121,6 +121,13 @@ class Again:
         """Whether the first discretisation resolves the state: otherwise the errors may exceed their bounds."""
         return self.changed <= RESOLVED_TO
 
+    def unlike(self, load: float) -> str:
+        """Sentence on a state at a ``load`` that is not resolved."""
+        return (
+            f"The richer mesh has another state at load {load:.8g}: its strains differ by {self.changed:.2g} of "
+            f"themselves, more than {RESOLVED_TO:g}; use more elements."
+        )
+
     def errors(self, point: Point) -> tuple[float, float]:
         """Bounds of the errors in load and ordinate of the point as first computed."""
         return bound(point.load, self.load, self.load_left, self.rho), self.ordinate_error

@@ -26,12 +26,13 @@ from math import inf, isfinite
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
+from rodfem.adaptivity.error_estimate import Again, Enriched
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import EVENT, FOLD
+from rodfem.continuation.observer import Remark
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
@@ -147,7 +148,7 @@ class SoftStates:
                 found, inertia = richer.solver.inertia.at(there.x), richer.solver.inertia
                 below = found.below(-inertia.tolerance)
                 if below == point.negative:
-                    self.uncompared = "" if again.resolved else _other_state(point.load, again)
+                    self.uncompared = "" if again.resolved else again.unlike(point.load)
                     return int(self._moved(point, found) if again.resolved else not fixed_load)
                 index = decide(found).index
             except ConvergenceError as trouble:  # no such state, or arithmetic leaves too many signs open there
@@ -231,16 +232,9 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
     finally:
         system.damping = given
     if soft and not again.resolved:
-        raise ConvergenceError(_other_state(point.load, again))
+        raise ConvergenceError(again.unlike(point.load))
     tangent = None if point.tangent is None else richer.transfer(point.tangent, state=False)
     return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again
-
-
-def _other_state(load: float, again: Again) -> str:
-    return (
-        f"The richer mesh has another state at load {load:.8g}: its strains differ by {again.changed:.2g} of "
-        f"themselves, more than {RESOLVED_TO:g}; use more elements."
-    )
 
 
 def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
@@ -324,15 +318,17 @@ class SoftRows:
         rows = [p for p in branch.points[begin:] if id(p) not in singular]
         return bool(rows) and all(abs(p.slope) < VERTICAL * abs(span[1] - span[0]) for p in rows)
 
-    def undecided(self, branch: Branch) -> Iterator[str]:
+    def undecided(self, branch: Branch) -> Iterator[Remark]:
         """Yield a sentence on each piece of a branch whose index is not decided, or not compared with a richer mesh."""
         if branch.name in self._uncompared:
             at, why = self._uncompared.pop(branch.name)
-            name = self.meshes.solvers[0].system.scene.load
-            yield f"{branch.name}: At {name} = {at:.8g} the index is not compared with that of a richer mesh. {why}"
+            where = f"{self.meshes.solvers[0].system.scene.load} = {at:.8g}"
+            words = f"{branch.name}: At {where} the index is not compared with that of a richer mesh. {why}"
+            yield Remark(words, at)
         for words, group in groupby(branch.points, lambda p: p.undecided and index_range(p.negative, p.undecided)):
             if words:
-                yield f"{branch.name}: {self._piece(list(group), str(words))}"
+                points = list(group)
+                yield Remark(f"{branch.name}: {self._piece(points, str(words))}", points[0].load, points[-1].load)
 
     def _piece(self, points: list[Point], words: str) -> str:
         """Sentence on neighbouring points whose index is undecided, in ``words``."""

@@ -19,6 +19,7 @@ from rodfem.app.persons_file import leave_the_run
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import USER
+from rodfem.continuation.observer import Remark
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan, plan_of
 from rodfem.diagram.solver import MESH, RANKS, SCENE
@@ -166,7 +167,13 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
         on_first(terminal.comm, lambda: draw(output, terminal))
     diagram.complete = True
     with held():
-        on_first(terminal.comm, lambda: save_json(data | {"complete": True}, output / "diagram.json"))
+        on_first(terminal.comm, lambda: save_json(data | diagram.remarks | {"complete": True}, output / "diagram.json"))
+
+
+def _warn(diagram: Diagram, terminal: Terminal, remark: Remark) -> None:
+    """Print a warning, and keep it with the diagram."""
+    diagram.warnings.append(remark)
+    terminal.warn(remark)
 
 
 def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
@@ -184,7 +191,7 @@ def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
         try:
             verdict, modes = _verdict(finder_on(special.point.mesh), special, plan)
         except (InputError, ConvergenceError) as trouble:
-            terminal.warn(str(trouble))
+            _warn(diagram, terminal, Remark(str(trouble), special.point.load, branch=branch.name))
             continue
         terminal.verdict(branch.name, where, verdict.at(special.point), modes)
         if modes is not None:
@@ -240,7 +247,7 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
             try:
                 near.append(diagram.locus(special, asked[0], asked[1:]))
             except (InputError, ConvergenceError) as trouble:
-                terminal.warn(str(trouble))
+                _warn(diagram, terminal, Remark(str(trouble), special.point.load, branch=branch.name))
                 continue
             terminal.say(near[-1].text())
             saved.append(near[-1].data())

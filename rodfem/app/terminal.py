@@ -269,7 +269,7 @@ class Report(Observer):
         self.detail(f"  {len(branch.points)} points; ended: {branch.ended}")
 
     def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
-        """Print every special point of a diagram, with its error bar, and what is left open.
+        """Print every special point of a diagram, with its error bar, and what was not followed.
 
         ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
         """
@@ -282,19 +282,7 @@ class Report(Observer):
         for name, kind, *numbers, index, remarks in rows:
             self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
             self._indented(remarks)
-        self._doubts(branches)
         self._not_followed(branches, most)
-
-    def _doubts(self, branches: Sequence[Branch]) -> None:
-        """Say where indices are not explained, first states are singular, and special points are not resolved."""
-        for branch in branches:
-            for sentence in filter(None, (branch.start_in_words(self.load), *map(str, branch.unexplained))):
-                self.warn(f"{branch.name}: {sentence}")
-        if coarse := sum(s.resolved is False for branch in branches for s in branch.special):
-            self.warn(
-                f"The mesh does not resolve {many(coarse, 'special point')}: the value in parentheses is no bound "
-                "there, and whether the rod has such a point is open; use more elements or a higher degree."
-            )
 
     def _not_followed(self, branches: Sequence[Branch], most: int) -> None:
         """Say how many branch points were not followed, why, and what would follow them."""
@@ -366,6 +354,8 @@ class Report(Observer):
     def _stability(self, found: Verdict) -> str:
         if found.stable:
             return "stable"
+        if found.negative_in_space and not found.negative and found.stable is False:
+            return f"stable in its plane, unstable in space (index {found.negative_in_space})"
         index, one = index_range(found.negative, found.undecided), found.negative + found.undecided == 1
         if found.stable is None:
             of = f" of the {found.kink}" if found.kink else ""

@@ -14,7 +14,7 @@ from rodfem.continuation.kinds import EVENT, Kind
 from rodfem.errors import SMALLER_STEPS, InputError, many
 from rodfem.libraries import optional
 from rodfem.problem.arguments import SHORT
-from rodfem.stability.soft_mode import STABILITY, SoftMode, index_range, is_stable
+from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, SoftMode, index_range, is_stable, stability
 from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
@@ -57,6 +57,9 @@ class Point:
     kink
         What has a kink at the very state, the equations: there ``negative`` is the index on one side only, and
         stability is undecided.  Empty where nothing has.
+    uncompared
+        Why the index was not compared with that of a richer mesh, if it was to be: that has no such state.  Stability
+        is undecided there.
     slope
         The load's component of the tangent.
     drift, error
@@ -104,6 +107,7 @@ class Point:
     potential: float = float("nan")
     conjugate: float = float("nan")
     kink: str = ""
+    uncompared: str = ""
     solver: BranchSolver | None = field(default=None, compare=False)
     branch: str = field(default="", compare=False)
 
@@ -114,11 +118,16 @@ class Point:
 
     @property
     def stable(self) -> bool | None:
-        """Whether no eigenvalue is negative; None where :attr:`undecided` ones may be, and no other is, or on a kink.
+        """Whether no eigenvalue is negative, of a planar rod in space, too, where :attr:`negative_in_space` is known.
 
+        None where :attr:`undecided` ones may be, and no other is, on a kink, and if a richer mesh has no such state.
         Zero ones, which :attr:`zero` counts, are those of symmetries, or leave it undecided beyond that.
         """
-        return is_stable(self.negative, self.undecided, self.kink)
+        return is_stable(self._stability)
+
+    @property
+    def _stability(self) -> str:
+        return stability(self.negative, self.undecided, self.kink or self.uncompared, self.negative_in_space)
 
     # --- along the rod ---------------------------------------------------------------------------------------------
 
@@ -202,9 +211,15 @@ class Point:
 
     def __repr__(self) -> str:
         """Load, ordinate and stability."""
-        words = STABILITY[self.stable]
-        word = words if self.stable else f"{words}, index {index_range(self.negative, self.undecided, self.kink)}"
-        word += f" of the {self.kink}" if self.kink else ""
+        kind, index = self._stability, index_range(self.negative, self.undecided, self.kink)
+        plane = self.negative_in_space is None and self.solver is not None and self.solver.system.scene.planar
+        words = {
+            STABLE: "stable in its plane (not examined in space)" if plane else "stable",
+            PLANAR: f"stable in its plane, unstable in space, index {self.negative_in_space}",
+            UNDECIDED: f"undecided, index {index}",
+        }
+        word = words.get(kind, f"unstable, index {index}") + (f" of the {self.kink}" if self.kink else "")
+        word += ", not resolved by this mesh" if self.uncompared else ""
         return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
 
 

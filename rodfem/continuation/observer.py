@@ -63,23 +63,61 @@ class Observer:
         """Something went wrong, without stopping the computation."""
 
 
+class Remark(str):
+    """A sentence with the ``branch`` that it is about, by name, and the least and the greatest of the ``loads`` there.
+
+    Either is None if it is about all.
+    """
+
+    branch: str | None
+    loads: list[float] | None
+
+    def __new__(cls, sentence: str, *loads: float, branch: str | None = None) -> Remark:
+        """Keep what a ``sentence`` is about: the ``loads`` of a range, of one state, or none."""
+        made = super().__new__(cls, sentence)
+        made.branch, made.loads = branch, [min(loads), max(loads)] if loads else None
+        return made
+
+
 class Recorder(Observer):
-    """Keeps warnings and notes, and hands every event on to a listener."""
+    """Keeps warnings and notes, and hands every event on to a listener.
+
+    A remark between the first and the last event of a branch is about that branch; so is one about loads that comes
+    before the first branch.
+    """
 
     def __init__(self, listener: Observer) -> None:
         """Nothing is recorded yet."""
         self.listener = listener
-        self.warnings: list[str] = []
-        self.notes: list[str] = []
+        self.warnings: list[Remark] = []
+        self.notes: list[Remark] = []
+        self._branch: str | None = None
+
+    def _kept(self, sentence: str) -> Remark:
+        loads, name = getattr(sentence, "loads", None) or (), getattr(sentence, "branch", None)
+        return Remark(sentence.strip(), *loads, branch=name or self._branch or None)
+
+    def branch(self, branch: Branch) -> None:
+        """Hand it on; what follows is about that branch."""
+        if self._branch is None:
+            for remark in (*self.warnings, *self.notes):
+                remark.branch = branch.name if remark.loads else None
+        self._branch = branch.name
+        self.listener.branch(branch)
+
+    def finished(self, branch: Branch) -> None:
+        """Hand it on; what follows is about no branch."""
+        self._branch = ""
+        self.listener.finished(branch)
 
     def note(self, sentence: str) -> None:
         """Keep it and hand it on."""
-        self.notes.append(sentence.strip())
+        self.notes.append(self._kept(sentence))
         self.listener.note(sentence)
 
     def warn(self, sentence: str) -> None:
         """Keep it and hand it on."""
-        self.warnings.append(sentence)
+        self.warnings.append(self._kept(sentence))
         self.listener.warn(sentence)
 
 

@@ -15,6 +15,7 @@ from uuid import uuid4
 from rodfem.continuation.branch import LAWS, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
+from rodfem.continuation.observer import Remark
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.search import Coexisting, equilibria_at, with_copies
 from rodfem.diagram.plan import Plan
@@ -26,6 +27,7 @@ from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
 from rodfem.output import tables
 from rodfem.output.files import as_data, origin, save_run
+from rodfem.output.table import REMARK
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.roles import derived
 from rodfem.problem.scene import Scene
@@ -58,7 +60,8 @@ class Diagram:
     solvers
         Solver of each mesh, by the number that a point has in ``mesh``.
     warnings, notes
-        Sentences on what went wrong without stopping the computation, and on what is worth knowing.
+        Sentences on what went wrong without stopping the computation, and on what is worth knowing; each has the
+        ``branch`` and the ``loads`` that it is about, or None.
     clock
         Seconds by scope.
     run
@@ -76,8 +79,8 @@ class Diagram:
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[BranchSolver]) -> None:
         """Keep what was traced; ``solvers`` may grow."""
         self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
-        self.warnings: list[str] = []
-        self.notes: list[str] = []
+        self.warnings: list[Remark] = []
+        self.notes: list[Remark] = []
         self.run = uuid4().hex
         self.origin = origin()
         self.asked: dict[str, Any] | None = None
@@ -149,7 +152,8 @@ class Diagram:
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
         found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, solver.mesh))
-        return [self.solver(point).examined(point, special=self._special_at(point)) for point in found]
+        compare = self.plan.error_bars or self.plan.accuracy is not None
+        return [self.solver(p).examined(p, compare=compare, special=self._special_at(p)) for p in found]
 
     @checked(load=number(1.0))
     def states(self, load: float) -> list[Coexisting]:
@@ -293,10 +297,19 @@ class Diagram:
         systems = [solver.system for solver in self.solvers]
         data = as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
         asked = {} if self.asked is None else {"asked": self.asked}
-        return data | asked | {"complete": self.complete, "run": self.run, "origin": self.origin}
+        return data | asked | self.remarks | {"complete": self.complete, "run": self.run, "origin": self.origin}
+
+    @property
+    def remarks(self) -> dict[str, Any]:
+        """Entries ``warnings`` and ``notes`` of ``diagram.json``."""
+        said = {"warnings": self.warnings, "notes": self.notes}
+        return {name: [{e.name: e.value(x) for e in REMARK} for x in remarks] for name, remarks in said.items()}
 
     def in_words(self) -> str:
-        """What the diagram says, a sentence a line: ranges of stability, how stability is lost, what is left open."""
+        """What the diagram says, a sentence a line: ranges of stability, how stability is lost, what is left open.
+
+        What the run warned of, and its notes, stand with the sentence of the branch that they are about.
+        """
         from rodfem.output.summary import in_sentences
 
         return "\n".join(in_sentences(self.data))

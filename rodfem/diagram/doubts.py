@@ -11,7 +11,7 @@ from math import isfinite, nan
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import END
-from rodfem.continuation.observer import Observer
+from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import many
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.quadrature_check import QuadratureCheck
@@ -103,7 +103,7 @@ class Quadrature:
         found += [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
         self._kinks(branch, [*first, *(special.point for special in asked)])
         for point, words in [each for each in found if each[1] and not each[0].kink][:1]:
-            self.observer.warn(f"{branch.name}: at {self.load} = {point.load:.6g} {words}")
+            self.observer.warn(Remark(f"{branch.name}: at {self.load} = {point.load:.6g} {words}", point.load))
 
     def _without_bars(self, special: SpecialPoint) -> str:
         """Take the bars of a special point away where the equations are not integrated, and say why."""
@@ -120,12 +120,13 @@ class Quadrature:
             return
         for point in branch.points:
             point.kink = self._check(point).kink(point.x)
-        loads = [f"{point.load:.6g}" for point in branch.points if point.kink]
-        where = " to ".join(dict.fromkeys((loads[0], loads[-1])))
-        self.observer.warn(
+        loads = [point.load for point in branch.points if point.kink]
+        where = " to ".join(dict.fromkeys((f"{loads[0]:.6g}", f"{loads[-1]:.6g}")))
+        words = (
             f"{branch.name}: the equations have a kink at the very state at {self.load} = {where}: the second "
             "derivative depends on the side, the index holds for one side only, and stability is undecided there."
         )
+        self.observer.warn(Remark(words, *loads))
 
     def _check(self, point: Point) -> QuadratureCheck:
         if point.mesh not in self._by_mesh:

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import FIRST_BRANCH, Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
+from rodfem.continuation.observer import Remark
 from rodfem.continuation.prediction import ROWS, across_orbit, predict_at_load
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy, SceneError
 from rodfem.fem.newton import NewtonResult
@@ -122,11 +123,12 @@ def check_start(solver: BranchSolver, span: tuple[float, float], warn: Callable[
         if NODES * index > mesh.elements * mesh.degree:
             there = _index(BranchSolver(System(scene, mesh.finer(2), solver.system.comm)), load)
             if there not in (None, index):
-                warn(
+                words = (
                     f"At {scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} elements "
                     f"and {there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a higher "
                     "degree."
                 )
+                warn(Remark(words, load))
 
 
 def _index(solver: BranchSolver, load: float) -> int | None:

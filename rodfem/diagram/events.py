@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.event_piece import End, EventPiece, end
 from rodfem.continuation.kinds import EVENT
+from rodfem.continuation.observer import Remark
 from rodfem.continuation.prediction import between
 from rodfem.diagram.finders import Step
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
@@ -49,10 +50,10 @@ class Events:
         """Say where an event was not located, and where it is zero all along."""
         for name, loads in self._open.items():
             where = f"between loads {min(loads):.8g} and {max(loads):.8g}"
-            observer.warn(f"The event {name!r} was not located {where}: {SMALLER_STEPS}.")
+            observer.warn(Remark(f"The event {name!r} was not located {where}: {SMALLER_STEPS}.", *loads))
         for name, loads in self._still.items():
             where = f"between loads {min(loads):.8g} and {max(loads):.8g}"
-            observer.note(f"  the event {name!r} is zero all along {where}: no special points")
+            observer.note(Remark(f"  the event {name!r} is zero all along {where}: no special points", *loads))
         self._open, self._still, self._last = {}, {}, None
 
     def _end(self, step: Step, row: Point) -> End:

@@ -14,6 +14,7 @@ from rodfem.adaptivity.mesh_sequence import Gap, arms
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
+from rodfem.continuation.observer import Remark
 from rodfem.continuation.reduced import lines
 from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, start_branch
@@ -54,20 +55,19 @@ class Explorer(Tracer):
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         found, before = self._found(load), len(self.branches)
-        for i, point in enumerate(self._convex(found)):
+        for i, point in enumerate(self._resolved(self._convex(found))):
             if not self._on_branch(point, before):
                 self.trace_whole(point, self._unused("found ", f" at {load:g}", i + 1), 0)
         self._branch_off(before)
 
     def _found(self, load: float) -> list[Point]:
         """Equilibria at ``load`` that a search finds on no branch."""
-        self.observer.note("")
         self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
         with self.solver.system.clock.scope("search"):
             known = equilibria_at(self.solver, self.branches, load, self.here)
             search = Deflation(self.solver, load, known)
             found = search.run(self.plan.tries)
-            self.observer.note(str(search.tally))
+            self.observer.note(Remark(f"\n{search.tally}", load))
             return found
 
     def _on_branch(self, point: Point, first: int = 0) -> bool:
@@ -90,6 +90,20 @@ class Explorer(Tracer):
                 f"  {many} near {self.scene.load} = {near}: not followed, the stored energy is not convex there"
             )
         return convex
+
+    def _resolved(self, points: list[Point]) -> list[Point]:
+        """Those ``points`` that the richer mesh has, too, where errors are estimated; a warning names the others."""
+        if not self.soft.error_bars:
+            return points
+        kept = list[Point]()
+        for point in points:
+            with self.without(f"A state found at {self.scene.load} = {point.load:.8g} was not followed"):
+                with self.solver.system.clock.scope("error bars"):
+                    again = self.meshes.richer(point.mesh).again(point, fixed_load=True)
+                if not again.resolved:
+                    raise ConvergenceError(again.unlike(point.load))
+                kept.append(point)
+        return kept
 
     def _detached(self, gap: Gap, depth: int) -> None:
         """Trace the branch on the other side of a gap, unless it is squeezed to nothing, or through it."""
@@ -132,9 +146,8 @@ class Explorer(Tracer):
             self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
         if point.negative:
             index = index_range(point.negative, point.zero - self.solver.system.active_drifts(point.x))
-            self.observer.note(
-                f"  the first state is unstable already (index {index}): stability was lost outside the range"
-            )
+            words = f"  the first state is unstable already (index {index}): stability was lost outside the range"
+            self.observer.note(Remark(words, start))
         name = name_of_first(self.solver.shape, [point.x, ahead(point.x, point.tangent)])
         return Branch(name, None, 0, [point])
 
@@ -202,11 +215,13 @@ class Explorer(Tracer):
         bounds = self.low - margin, self.high + margin  # room for round-off
         made = start_branch(self.solver, special, direction, ways, bounds, depth)
         if made is None:
-            self.observer.warn(f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}.")
+            words = f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
+            self.observer.warn(Remark(words, special.point.load, branch=parent.name))
             return None
         points, begins = made
         if not bounds[0] <= points[1].load <= bounds[1]:
-            self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
+            words = f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range"
+            self.observer.note(Remark(words, special.point.load, branch=parent.name))
             return None
         name = self._unused(f"{parent.name}." if parent.depth else "branch ")
         return Branch(name, (parent.name, i), depth, points, begins=begins)
@@ -231,10 +246,11 @@ class Explorer(Tracer):
         """Say that the mirror ``image`` of a branch, which is not traced, has other ordinates, if it does."""
         for branch in [branch for branch in traced if branch.points[1].x is first.x]:
             if words := other_ordinates(branch, first, image, self.solver):
-                self.observer.warn(
-                    f"{branch.name}: What leaves {special.point.load:.8g} on the other side is its mirror image "
+                said = (
+                    f"  {branch.name}: What leaves {special.point.load:.8g} on the other side is its mirror image "
                     f"({words}), at the same loads and as stable, but has other ordinates, and is not traced."
                 )
+                self.observer.note(Remark(said, special.point.load, branch=branch.name))
 
     def _lines(self, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
         """Directions of the branches that leave, given those of the null vectors; what leaves subcritically is first.
@@ -246,10 +262,11 @@ class Explorer(Tracer):
         with self.solver.system.clock.scope("location"):
             found = lines(self.solver, special, ways)
             if len(ways) > 2:
-                self.observer.note(
+                words = (
                     f"  {len(ways)} null vectors at {self.scene.load} = {special.point.load:.8g}: directions in which "
                     "branches leave are sought at random there, and some may be missing."
                 )
+                self.observer.note(Remark(words, special.point.load))
             forms = [normal_form_of(self.solver, origin_of(self.solver, special), way) for way in found]
         kinds = [self._kind(form, special) for form in forms]
         order = sorted(range(len(found)), key=lambda i: not kinds[i].startswith("subcritical"))

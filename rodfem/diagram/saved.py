@@ -9,9 +9,10 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch import Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
+from rodfem.continuation.observer import Remark
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import EQUATIONS, Plan, not_held, plan_without
 from rodfem.diagram.solver import RANKS, SCENE, Solver
@@ -22,7 +23,7 @@ from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM
 from rodfem.output.files import load_json, load_state
 from rodfem.output.states import check_run
-from rodfem.output.table import COLUMNS, SPECIAL, point_values, special_values
+from rodfem.output.table import COLUMNS, REMARK, SPECIAL, point_values, special_values
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
@@ -63,7 +64,7 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     asked, span = data.get("asked"), tuple(data["range"])
     plan = replace(Plan() if asked is None else plan_without(asked), span=span, accuracy=data["accuracy"])
     diagram = Diagram(scene, plan, branches, solvers)
-    diagram.notes.append(f"read from {folder}")
+    diagram.warnings, diagram.notes = ([_remark(e, folder) for e in data.get(x) or ()] for x in ("warnings", "notes"))
     diagram.lacks = "" if asked is None else not_held(asked)
     diagram.asked, diagram.complete = asked, data.get("complete", True)
     return diagram
@@ -128,7 +129,18 @@ def _branch(entry: dict[str, Any], solvers: Sequence[BranchSolver], states: Path
     branch.special = [_special(s, points, solvers) for s in entry["special"]]
     branch.singular_start = entry.get("singular_start", 0)
     branch.image = entry.get("image", "")
+    branch.unexplained = [_unexplained(change, points) for change in entry.get("unexplained", ())]
     return branch
+
+
+def _unexplained(change: dict[str, Any], points: Sequence[Point]) -> Unexplained:
+    row = change["row"]
+    return Unexplained(points[row], points[row + 1], change["before"], change["after"])
+
+
+def _remark(entry: dict[str, Any], folder: Path) -> Remark:
+    DIAGRAM.check(entry, folder / "diagram.json", [each.name for each in REMARK])
+    return Remark(entry["sentence"], *entry["loads"] or (), branch=entry["branch"])
 
 
 def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[BranchSolver], states: Path) -> Point:

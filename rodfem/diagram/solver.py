@@ -170,6 +170,7 @@ class Solver:
             tangent, point.tangent = point.tangent, None if special is None else special.point.tangent
             vanishing = () if special is None else special.null_vectors
             self._soft.examine(point, fixed_load=special is None, compare=compare, vanishing=vanishing)
+            point.uncompared = self._soft.uncompared
             point.tangent = tangent
         return point
 
@@ -234,7 +235,7 @@ class Solver:
             return replace(verdict, kink=self._quadrature.kink(x))
         special = point if isinstance(point, SpecialPoint) and point.kind.singular else None
         found = self.examined(self.equilibria.point(x, 0.0, None), compare=True, special=special)
-        return replace(verdict.at(found), uncompared=self._soft.uncompared)
+        return verdict.at(found)
 
     @checked(point=STATE, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
@@ -261,15 +262,16 @@ class Solver:
     def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` other than the ``known`` ones, by ``tries`` deflated Newton iterations.
 
-        Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known equilibria at another
-        one, and where a load has no potential.  ``seed`` is that of the random guesses.
+        Each is compared with a richer mesh: one that this mesh does not resolve says so in ``uncompared``, and is not
+        called stable.  Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known
+        equilibria at another one, and where a load has no potential.  ``seed`` is that of the random guesses.
         """
         if not self.equilibria.conservative:
             raise InputError(
                 "A search by deflation needs a scene whose loads all have a potential: "
                 f"{', '.join(self.scene.without_potential())} has none."
             )
-        return [self.examined(p) for p in Deflation(self.equilibria, load, known, seed).run(tries)]
+        return [self.examined(p, compare=True) for p in Deflation(self.equilibria, load, known, seed).run(tries)]
 
 
 def state_of(point: Point | SpecialPoint | PETSc.Vec) -> PETSc.Vec:

@@ -12,7 +12,7 @@ from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.crossings import Node, Zeros, fourth
 from rodfem.continuation.kinds import IMPERFECT
-from rodfem.continuation.observer import Observer
+from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.piece import Piece
 from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.continuation.singular_points import (
@@ -211,7 +211,7 @@ class SpecialSearch:
                 continue
             if not ended:
                 self._steps.ask(a, b)
-            self.observer.warn(missing(a.load, b.load))
+            self.observer.warn(Remark(missing(a.load, b.load), a.load, b.load))
         for node in zeros.misses:
             self._missed(piece, node, resolved=ended)
         nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
@@ -249,7 +249,7 @@ class SpecialSearch:
             return None
         at = of_turn(piece, left, right, turn)
         if why := taut_where_it_turns(solver, at.x):
-            self.observer.warn(why)
+            self.observer.warn(Remark(why, solver.system.scalar(at.x)))
             return None
         if left.index != right.index and is_fold(solver, at.x, at.null):
             return None

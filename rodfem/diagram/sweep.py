@@ -20,7 +20,7 @@ from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
-from rodfem.continuation.observer import Observer
+from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.row_checks import RowCheck
 from rodfem.diagram.collisions import Critical, Side
 from rodfem.diagram.critical_loads import CriticalLoads
@@ -302,13 +302,14 @@ class Sweep:
         if not explained:
             change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
             branch.unexplained.append(change)
-            self.observer.warn(str(change))
+            self.observer.warn(Remark(str(change), a.load, b.load))
         elif findings.entered > 0:  # of unstable rows only the number is in doubt
             report = self.observer.note if a.negative else self.observer.warn
-            report(
+            words = (
                 f"{findings.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at "
                 f"{a.load:.6g} by no more than round-off: the rows before, which count {a.negative}, may count too few."
             )
+            report(Remark(words, a.load, b.load))
 
     def _critical(self, branch: Branch, event: Critical, ends: tuple[Point, Point], negative: tuple[int, int]) -> None:
         """Take a critical load between two rows into a branch, at which the number of unstable eigenvalues changes."""
@@ -337,10 +338,11 @@ class Sweep:
             apart = abs(s.point.load - t.point.load)
             if s.kind == t.kind == FLUTTER and sum(changes) == 0 and 0 < apart <= sum(bars):
                 what, loads = "meet" if changes[0] > 0 else "part", f"{s.point.load:.8g} and {t.point.load:.8g}"
-                self.observer.warn(
+                words = (
                     f"Whether frequencies {what} between {self._load} = {loads} is not known: these loads differ by "
                     "less than their bars. Use another mesh, without very short elements."
                 )
+                self.observer.warn(Remark(words, s.point.load, t.point.load))
 
     def _name(self, point: Point, cluster: Cluster, number: int) -> None:
         """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one."""

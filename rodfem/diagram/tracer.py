@@ -16,7 +16,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.kinds import END, USER
-from rodfem.continuation.observer import Observer
+from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.switching import FIRST
 from rodfem.diagram.branch_ends import connection, loop_end, point_past_end
@@ -103,7 +103,7 @@ class Tracer:
                 self._follow(branch)
         except ConvergenceError as trouble:
             branch.ended = f"{NO_CONVERGENCE}: {trouble}"
-            self.observer.warn(str(trouble))
+            self.observer.warn(Remark(str(trouble), branch.points[-1].load))
 
     def without(self, what: str) -> AbstractContextManager[None]:
         """Go on where the block fails, and warn of ``what`` did not happen and why."""
@@ -192,7 +192,8 @@ class Tracer:
         """Warn of a branch that ends for a reason that has a remedy."""
         for reason, remedy in REMEDIES.items():
             if reason in branch.ended:
-                self.observer.warn(f"{branch.name} ends: {branch.ended}; {remedy}.")
+                words = f"{branch.name} ends: {branch.ended}; {remedy}."
+                self.observer.warn(Remark(words, branch.points[-1].load))
 
     def _take(self, branch: Branch, history: list[Point], row: Point) -> str:
         """Append a row to a branch, with the special points before it; why the branch ends there, or before."""
@@ -317,7 +318,7 @@ class Tracer:
         located = any(s.point is first and s.kind.branches for s in branch.special)
         if branch.parent is None and extra > 0 and not located:
             branch.singular_start = extra
-            self.observer.warn(branch.start_in_words(self.scene.load))
+            self.observer.warn(Remark(branch.start_in_words(self.scene.load), first.load))
 
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Insert a branch point on the very end of the range, located on a piece of the branch that goes past it."""
@@ -328,7 +329,8 @@ class Tracer:
                 found = [] if further is None else self.specials.beyond(previous, further)
         except ConvergenceError as trouble:
             where = f"{self.scene.load} = {last.load:g}"
-            self.observer.warn(f"The last state, at {where}, is singular, and was not resolved: {trouble}")
+            words = f"The last state, at {where}, is singular, and was not resolved: {trouble}"
+            self.observer.warn(Remark(words, last.load))
             return
         width = SAME_END * (self.high - self.low)
         for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
@@ -377,8 +379,8 @@ class Tracer:
         self._soft_modes(branch)
         self.quadrature.examine(branch)
         branch.image = image_of(branch, self.solver)
-        for unexplained in branch.unexplained:
-            self.observer.warn(str(unexplained))
+        for change in branch.unexplained:
+            self.observer.warn(Remark(str(change), change.a.load, change.b.load))
         self.observer.finished(branch)
         self.control.summary(branch, self.observer)
         self.finished()

@@ -7,6 +7,7 @@ modes at typical states of each branch: its ends, evenly between, special points
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ from rodfem.stability import motion_names
 from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.cluster import DRAWN, as_vectors
 from rodfem.stability.inertia import NOISE
+from rodfem.stability.motion_names import MotionNames
+from rodfem.stability.near_zero import soft_limit
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
 from rodfem.stability.symmetric import CONVERGED, SymmetricPencil
@@ -185,7 +188,7 @@ class ModeFinder:
         vectors = [combine([vectors[i] for i in group], b) for group, b in weights]
         motions = [_sum([motions[i] for i in group], b) for group, b in weights]
         duals = [mass * v for v in vectors]
-        names = [self._name(x, v) for v in vectors]
+        names = [self._name(x, v, value) for v, value in zip(vectors, values, strict=True)]
         symmetries = symmetry_modes(self.system, x)
         for vector, dual in weighed_modes(self.system, symmetries, mass).values():
             vectors.append(vector)
@@ -193,8 +196,17 @@ class ModeFinder:
             motions.append(self.motions.at(x, vector))
         return Turned(vectors, duals, motions, (*names, *[SYMMETRY] * len(symmetries)))
 
-    def _name(self, x: PETSc.Vec, v: PETSc.Vec) -> str:
+    def _name(self, x: PETSc.Vec, v: PETSc.Vec, value: float) -> str:
+        """Name of a mode of mass 1; that of a soft one is the name of its soft mode."""
+        inertia = self.solver.inertia
+        square = v.dot(inertia.metric * v).real
+        if abs(value) < soft_limit(inertia) * square:
+            return self._soft(x, [v / square**0.5])[0]
         return motion_names.name_of(motion_names.turning_shares(self.system, self.system.at(x).turned, [v.array_r]))
+
+    @cached_property
+    def _soft(self) -> MotionNames:
+        return MotionNames(self.system, self.solver.inertia.metric)
 
     def _weights(self, values: np.ndarray, responses: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
         """Each new mode as a combination: places of those combined, and weights; ``responses`` are (K, 36)."""

@@ -16,11 +16,9 @@ import numpy as np
 
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.errors import InputError
-from rodfem.stability.soft_mode import index_range, on_kink
+from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE, index_range, on_kink, stability
 from rodfem.tolerances import SAME_SPECIAL
 
-STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
-UNDECIDED = "stability undecided"
 COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
 """Kinds whose index before and after is that of the steps next to them."""
 COMPLETE = ("", "end of range", "closed loop", "not traced")
@@ -49,10 +47,8 @@ class Piece(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`."""
-        if self.kink or (self.undecided and not self.negative):
-            return UNDECIDED
-        return UNSTABLE if self.negative else PLANAR if self.in_space else STABLE
+        """Stability, of :func:`~rodfem.stability.soft_mode.stability`."""
+        return stability(self.negative, self.undecided, self.kink, self.in_space)
 
     @property
     def label(self) -> str:
@@ -82,9 +78,9 @@ def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
     Of either end it is known or not, then the index of the row, and the number of undecided eigenvalues there.
     """
     sure, own, undecided = zip(*ends, strict=True)
-    if not any(undecided):
-        return next((known for known in sure if known is not None), max(own)), 0
     least = [b if a is None else a for a, b in zip(sure, own, strict=True)]
+    if not any(undecided):
+        return max(least), 0
     more = [0 if known is not None else count for known, count in zip(sure, undecided, strict=True)]
     return min(least), max(a + b for a, b in zip(least, more, strict=True)) - min(least)
 
@@ -100,14 +96,14 @@ def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> lis
 def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
     """Rows at which the index is known before and after, with both.
 
-    They are singular points, and rows next to them at the same load to its error bar: a load asked for may be that of a
-    special point, where the index of the row itself is not decided.  At the branch point that a branch leaves they are
-    undecided rows, too, whose index is that of the next row.
+    They are singular points, and rows next to them at the same load: a load asked for may be that of a special point,
+    where the index of the row itself is not decided.  At the branch point that a branch leaves they are undecided rows,
+    too, whose index is that of the next row.
     """
     columns = branch["columns"]
     for point in (point for point in branch.get("special", []) if point["kind"] in COUNTED):
         yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
-        yield from _neighbours(columns["load"], point) if point.get("negative_after") is not None else ()
+        yield from _neighbours(columns, point) if point.get("negative_after") is not None else ()
     if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
         near = _at_the_origin(columns["arclength"], columns["undecided"])
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
@@ -117,12 +113,20 @@ def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
     return [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
 
 
-def _neighbours(loads: Sequence[float], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
-    """Rows on either side of a special point at its load, to its error bar, with the index there."""
-    row, bar = int(point["row"]), max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0)
+def _neighbours(columns: Mapping[str, Any], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
+    """Rows on either side of a special point at its load, with the index there.
+
+    Decided rows are those of this mesh, on which the load is known to ``located_to``; the error bar, which has the
+    error of the mesh in it, covers undecided ones.
+    """
+    loads, undecided, row = columns["load"], columns.get("undecided"), int(point["row"])
+    located = point.get("located_to") or 0.0
+    bar = max(point.get("error_estimate") or 0.0, located)
     for step, side in ((-1, "before"), (1, "after")):
         other = row + step
-        while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= bar:
+        while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= (
+            bar if undecided and undecided[other] else located
+        ):
             yield other, point[f"negative_{side}"], point[f"negative_{side}"]
             other += step
 
@@ -183,6 +187,12 @@ class Interval:
         return 4 if self.kind == UNDECIDED and self.soft else (STABLE, PLANAR, UNDECIDED, UNSTABLE).index(self.kind)
 
     @property
+    def resolved(self) -> bool:
+        """Whether the mesh resolves one of its states that were examined, if any was."""
+        found = [s.get("resolved") for s in self.branch["special"] if self.first <= s["row"] <= self.last]
+        return True in found or False not in found
+
+    @property
     def loads(self) -> tuple[float, float]:
         """Load at its first and at its last row."""
         column = self.branch["columns"]["load"]
@@ -221,10 +231,24 @@ def changes_at(branch: Mapping[str, Any], row: int) -> list[Mapping[str, Any]]:
     return [s for s in branch["special"] if s["row"] == row and s["negative_before"] != s["negative_after"]]
 
 
-def without_stable(stable: Sequence[Interval], low: float, high: float) -> Iterator[tuple[float, float]]:
-    """Parts of a range of loads that no stable interval covers, from below."""
+def step_between(one: Interval, after: Interval) -> int:
+    """First row of the step in which two intervals of a branch meet, if no special point is there."""
+    return one.last if after.rank > one.rank else one.last - 1
+
+
+def unlocated(branches: Sequence[Mapping[str, Any]]) -> Iterator[tuple[float, float]]:
+    """Loads of the steps in which stability is lost or won without a special point."""
+    for one, after in (pair for branch in branches for pair in pairwise(intervals_of(branch))):
+        kinds = one.kind, after.kind
+        if STABLE in kinds and UNDECIDED not in kinds and not changes_at(one.branch, one.last):
+            step = one.branch["columns"]["load"][step_between(one, after) :][:2]
+            yield min(step), max(step)
+
+
+def without_stable(stable: Sequence[tuple[float, float]], low: float, high: float) -> Iterator[tuple[float, float]]:
+    """Parts of a range of loads that no ``stable`` range covers, from below."""
     reached = low
-    for a, b in sorted(interval.covers for interval in stable):
+    for a, b in sorted((a, b) for a, b in stable if b > low and a < high):
         if a - reached > SAME_SPECIAL * (high - low):
             yield reached, min(a, high)
         reached = max(reached, b)

@@ -23,6 +23,8 @@ from rodfem.output.pieces import (
     coexisting,
     intervals_in,
     intervals_of,
+    step_between,
+    unlocated,
     without_stable,
 )
 from rodfem.output.words import is_sweep
@@ -37,6 +39,11 @@ EVENTS = {
     FLUTTER: "flutters: two frequencies coincide and become complex",
     DIVERGENCE: "diverges: a frequency passes through zero",
 }
+RECOVERY = {
+    FLUTTER: "ceases to flutter: two complex frequencies coincide and become real",
+    DIVERGENCE: "ceases to diverge: a frequency passes through zero",
+}
+"""The same where the index does not rise."""
 FORMS = {
     "supercritical pitchfork": "buckles supercritically",
     "subcritical pitchfork": "buckles subcritically",
@@ -52,13 +59,24 @@ def in_sentences(data: Mapping[str, Any]) -> list[str]:
     first, *others = data["branches"]
     shown = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
     quiet = [branch for branch in others if branch not in shown and _kinds(branch)]
-    out = [_of_branch(branch, data) for branch in (first, *shown[:MOST_NAMES])]
+    out = [_of_branch(branch, data) + _remarks(data, branch) for branch in (first, *shown[:MOST_NAMES])]
     if more := shown[MOST_NAMES:]:
-        out.append(f"{_names(more)} have stable states, too.")
+        out.append(f"{_names(more)} have stable states, too." + _remarks(data, *more))
     if quiet:
         verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
-        out.append(f"{_names(quiet)} {verb} whole range.")
-    return [*out, *_ranges(data), *_open(data)]
+        out.append(f"{_names(quiet)} {verb} whole range." + _remarks(data, *quiet))
+    return [*out, *_ranges(data), *_coexistence(data), *_open(data), *filter(None, [_remarks(data).strip()])]
+
+
+def _remarks(data: Mapping[str, Any], *branches: Mapping[str, Any]) -> str:
+    """What the run says of some ``branches``; without any, what it says of no branch of the diagram."""
+    names, out = {branch["name"] for branch in branches}, ""
+    every = {branch["name"] for branch in data["branches"]}
+    for word, entry in (("Warning", "warnings"), ("Note", "notes")):
+        for remark in data.get(entry) or ():
+            if remark["branch"] in names or not (names or remark["branch"] in every):
+                out += f" {word}: {' '.join(remark['sentence'].split())}"
+    return out
 
 
 def _kinds(branch: Mapping[str, Any]) -> set[str]:
@@ -137,23 +155,38 @@ def _state(interval: Interval, data: Mapping[str, Any]) -> str:
 
 
 def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
-    """Ranges of the load without a stable state, and with several."""
+    """Ranges of the load without a stable state, and those that are not examined."""
     if is_sweep(data):
         return
-    load, stable = data["parameter"], intervals_in(data["branches"], STABLE)
-    undecided = [x.covers for x in intervals_in(data["branches"], UNDECIDED)]
-    for a, b in without_stable(stable, *sorted(data["range"])):
-        first, last = distinct_digits(a, b, width=_width(data))
+    stable, undecided = ([x.covers for x in intervals_in(data["branches"], kind)] for kind in (STABLE, UNDECIDED))
+    lost = list(unlocated(data["branches"]))
+    for a, b in without_stable(stable + lost, *sorted(data["range"])):
         doubt = any(low < b and high > a for low, high in undecided)
         but = ", but there are states of undecided stability" if doubt else ""
-        yield f"From {load} = {first} to {last} no stable state was found{but}."
-    pairs = list(coexisting(stable))
+        yield f"From {_between(data, a, b, 'to')} no stable state was found{but}."
+    for step in lost:
+        for a, b in without_stable(stable, *step):
+            yield f"Stability is not examined between {_between(data, a, b, 'and')}, where it changes."
+
+
+def _coexistence(data: Mapping[str, Any]) -> Iterator[str]:
+    """Ranges of the load with several stable states."""
+    pairs = [] if is_sweep(data) else list(coexisting(intervals_in(data["branches"], STABLE)))
     for one, other, a, b in pairs[:MOST_NAMES]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
-        first, last = distinct_digits(a, b, width=_width(data))
-        yield f"From {load} = {first} to {last} two stable states coexist, of {names}: hysteresis is possible."
+        states, verb = f"From {_between(data, a, b, 'to')} two stable states", f"coexist, of {names}"
+        if one.resolved and other.resolved:
+            yield f"{states} {verb}: hysteresis is possible."
+        else:
+            yield f"{states} may {verb}: the mesh does not resolve them, use more elements."
     if more := pairs[MOST_NAMES:]:
         yield f"So do {many(len(more), 'further pair')} of stable states at other loads."
+
+
+def _between(data: Mapping[str, Any], a: float, b: float, word: str) -> str:
+    """Two loads with a word between them."""
+    first, last = distinct_digits(a, b, width=_width(data))
+    return f"{data['parameter']} = {first} {word} {last}"
 
 
 def _width(data: Mapping[str, Any]) -> float:
@@ -172,7 +205,8 @@ def _open(data: Mapping[str, Any]) -> Iterator[str]:
     if changes := sum(len(branch.get("unexplained") or ()) for branch in branches):
         yield f"{many(changes, 'change')} of the index without a special point: see the warnings."
     if coarse := sum(special.get("resolved") is False for branch in branches for special in branch["special"]):
-        yield f"The mesh does not resolve {many(coarse, 'special point')}: use more elements."
+        what = f"{many(coarse, 'special point')}, whose error bars are no bounds"
+        yield f"The mesh does not resolve {what}: use more elements or a higher degree."
 
 
 def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple[str, str]:
@@ -180,7 +214,7 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
     branch, row = one.branch, one.last
     if found := changes_at(branch, row):
         return known_digits(found[0]), " and ".join(_event(special, branch, branches) for special in found)
-    column, segment = branch["columns"]["load"], row if after.rank > one.rank else row - 1
+    column, segment = branch["columns"]["load"], step_between(one, after)
     a, b = distinct_digits(column[segment], column[segment + 1])
     unexplained = any(change["row"] == segment for change in branch.get("unexplained") or ())
     what = "changes its index without a special point that says why" if unexplained else _change(one, after)
@@ -201,7 +235,8 @@ def _change(one: Interval, after: Interval) -> str:
 
 def _event(special: Mapping[str, Any], branch: Mapping[str, Any], branches: Branches) -> str:
     """What happens at a special point, as a verb with all that is known of it."""
-    kind, words = special["kind"], EVENTS.get(special["kind"], f"passes a special point, {special['kind']}")
+    kind, verbs = special["kind"], EVENTS if _rises(special) else EVENTS | RECOVERY
+    words = verbs.get(kind, f"passes a special point, {kind}")
     if kind == IMPERFECT:
         size = special.get("unfolding")
         known = "" if size is None else f" of the relative size {abs(size):.0e}"
@@ -217,8 +252,15 @@ def _form(special: Mapping[str, Any]) -> str:
     if law is None or law["kind"] not in FORMS:
         return "passes a branch point" + (" of undetermined form" if special["followed"] else " that was not followed")
     words = FORMS[law["kind"]]
+    if words.startswith("buckles") and not _rises(special):
+        words = f"passes a {law['kind']}"
     uncertain = law["uncertainty"] is None or abs(law["coefficient"]) <= law["uncertainty"]
     return words + (" (or nearly so)" if uncertain and law["side"] else "")
+
+
+def _rises(special: Mapping[str, Any]) -> bool:
+    """Whether the index rises at a special point, along the branch."""
+    return bool(special["negative_after"] > special["negative_before"])
 
 
 def _directions(special: Mapping[str, Any], branch: Mapping[str, Any], branches: Branches) -> str:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
+from rodfem.continuation.observer import Remark
 from rodfem.stability.soft_mode import SoftMode
 
 Data = Mapping[str, Any]
@@ -46,6 +47,7 @@ OF_SPECIAL: dict[str, Source] = {
     "meets": lambda special: list(special.connects_to) if special.connects_to else None,
     "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
 }
+OF_REMARK: dict[str, Source] = {"sentence": str}
 """Where values come from that are no attributes of their name."""
 
 
@@ -68,7 +70,7 @@ class Entry:
         """Whether each branch has it."""
         return not self.where
 
-    def value(self, point: Point | SpecialPoint) -> Any:
+    def value(self, point: Point | SpecialPoint | Remark) -> Any:
         """What a file has of a point; numbers that are not finite become null."""
         return plain(getattr(point, ATTRIBUTES.get(self.name, self.name)) if self.of is None else self.of(point))
 
@@ -84,8 +86,12 @@ def _entries(section: str, sources: Mapping[str, Source]) -> tuple[Entry, ...]:
     return tuple(Entry(a, b, c, d, e, sources.get(a)) for a, b, c, d, e in ROW.findall(text))
 
 
-COLUMNS, SPECIAL = _entries("columns", OF_POINT), _entries("special", OF_SPECIAL)
-"""Columns of a branch, one entry a row; entries of a special point."""
+COLUMNS, SPECIAL, REMARK = (
+    _entries("columns", OF_POINT),
+    _entries("special", OF_SPECIAL),
+    _entries("remarks", {"sentence": str}),
+)
+"""Columns of a branch, one entry a row; entries of a special point, and of a warning or a note."""
 
 
 def plain(value: Any) -> Any:

@@ -17,11 +17,13 @@ from rodfem.errors import many
 from rodfem.output.digits import NO_ESTIMATE, number
 from rodfem.output.pieces import is_solved
 from rodfem.output.table import soft_modes
-from rodfem.stability.soft_mode import ONE_SIDE, index_range, on_kink
+from rodfem.stability import soft_mode
+from rodfem.stability.soft_mode import ONE_SIDE, index_range, on_kink, stability
 from rodfem.tolerances import unit
 
 Data = Mapping[str, Any]
 STABLE, PLANAR, UNSTABLE, CRITICAL, UNDECIDED = "stable", "planar", "unstable", "critical", "undecided"
+VERDICTS = {soft_mode.STABLE: STABLE, soft_mode.PLANAR: PLANAR, soft_mode.UNDECIDED: UNDECIDED}
 INDEX, COUNT = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
 READ = ("load", "ordinate")
@@ -200,7 +202,7 @@ def _stability(row: Data) -> Words:
         return Words(UNDECIDED, index_range(negative, undecided, row["kink"]), sentence)
     if "omega2" in row:
         return _of_frequencies(negative, row["omega2"])
-    verdict = UNSTABLE if negative else UNDECIDED if undecided else PLANAR if space else STABLE
+    verdict = VERDICTS.get(stability(negative, undecided, in_space=space), UNSTABLE)
     index = index_range(negative, undecided) + ("" if space is None or undecided else f" ({space})")
     return Words(verdict, index, f"{_verdict(negative, undecided, space)}.{_neutral(row['zero'])}")
 

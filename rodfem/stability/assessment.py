@@ -20,7 +20,7 @@ from rodfem.stability.dependence import require_independent_constraints
 from rodfem.stability.methods import Found, Method, Workspace
 from rodfem.stability.near_zero import Decision, decide
 from rodfem.stability.registry import AUTO, METHODS, find
-from rodfem.stability.soft_mode import ONE_SIDE, STABILITY, SoftMode, is_stable
+from rodfem.stability.soft_mode import ONE_SIDE, WORDS, SoftMode, is_stable, stability
 
 COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
@@ -48,9 +48,10 @@ class Verdict:
         Whether counts prove that none is missing among the values.
     seconds, factorisations, method, reason
         Cost of the verdict, how it was done, and why so.
-    soft, kink, uncompared
+    soft, kink, uncompared, negative_in_space
         Of :meth:`rodfem.Solver.assess`: eigenvalues near zero in the metric, by name; what has a kink at the very
-        state, where the numbers are those of one side; why the index was not compared with that of a richer mesh.
+        state, where the numbers are those of one side; why the index was not compared with that of a richer mesh; of a
+        planar rod the index in space, if it is known.
     """
 
     negative: int
@@ -70,15 +71,17 @@ class Verdict:
     soft: tuple[SoftMode, ...] = ()
     kink: str = ""
     uncompared: str = ""
+    negative_in_space: int | None = None
 
     @property
     def stable(self) -> bool | None:
         """Whether no direction is unstable; None where that is not decided."""
-        return is_stable(self.negative, self.undecided, self.kink)
+        doubt = self.kink or self.uncompared
+        return is_stable(stability(self.negative, self.undecided, doubt, self.negative_in_space))
 
     def at(self, point: Any) -> Verdict:
         """The same with kink and soft modes of a ``point`` of a branch, and the index as far as they are decided."""
-        here = replace(self, kink=point.kink)
+        here = replace(self, kink=point.kink, uncompared=point.uncompared, negative_in_space=point.negative_in_space)
         if not point.soft:
             return here
         counts = replace(here, negative=point.negative, zero=point.zero, undecided=point.undecided)
@@ -87,7 +90,7 @@ class Verdict:
     def __repr__(self) -> str:
         """Stability, counts and the left-most eigenvalue."""
         first = f", left-most mu = {self.values[0]:.10g}" if len(self.values) else ""
-        words = f"{STABILITY[self.stable]}, {self.negative} negative, {self.zero} zero"
+        words = f"{WORDS[self.stable]}, {self.negative} negative, {self.zero} zero"
         return f"<Verdict by {self.method}: {words}{first}>"
 
     def __str__(self) -> str:
@@ -97,6 +100,7 @@ class Verdict:
         inside = f"; {len(self.inside)} inside the band {self.band:.1e} of the count" if len(self.inside) else ""
         undecided = f", {self.undecided} undecided" if self.undecided else ""
         undecided += f", {ONE_SIDE} of the {self.kink}" if self.kink else ""
+        undecided += f", {self.negative_in_space} negative in space" if self.negative_in_space is not None else ""
         return (
             f"{self.negative} negative, {self.zero} zero{undecided}{inside}; left-most: {values}{proof} "
             f"({self.method}: {self.reason}; {many(self.factorisations, 'factorisation')}, {1e3 * self.seconds:.1f} ms)"

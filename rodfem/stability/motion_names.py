@@ -5,9 +5,9 @@ mixed, or without rotation.
 
 A soft mode costs the rod little energy.  Its vector ``v`` of metric norm 1 is named after the first group of generators
 ``g_j`` of the state in whose span it lies, nearly: its share there is ``b . G^+ b`` with ``G_ij = g_i . M g_j`` and
-``b_j = g_j . M v``.  Groups are the rigid motions, turning of the cross-sections about one director, and the motion
-along the rod, the derivative of the state in arclength; a twisted rod, or a helix, turns as it slides.  Any other
-vector is named as a mode of vibration.  Symmetries of the state are no part of any generator here.
+``b_j = g_j . M v``.  Groups are the rigid motions, turning of the cross-sections about one director, both at once, and
+the motion along the rod, the derivative of the state in arclength; a twisted rod, or a helix, turns as it slides.  Any
+other vector is named as a mode of vibration.  Symmetries of the state are no part of any generator here.
 """
 
 from __future__ import annotations
@@ -101,13 +101,11 @@ class MotionNames:
 
     def _name(self, state: State, v: PETSc.Vec, groups: tuple[Group, Group, Group]) -> str:
         turning, rigid, along = groups
-        share, weights = self.share(v, rigid)
-        if share > SHARE:
-            named = abs(weights) > abs(weights).max() / 2
-            return " with ".join(name for (name, _), chosen in zip(rigid, named, strict=True) if chosen)
-        for motion in turning:
-            if self.share(v, [motion])[0] > SHARE:
-                return motion[0]
+        for group in (rigid, *([motion] for motion in turning), [*rigid, *turning]):
+            share, weights = self.share(v, group)
+            if share > SHARE:
+                named = abs(weights) > abs(weights).max() / 2
+                return " with ".join(name for (name, _), chosen in zip(group, named, strict=True) if chosen)
         if along and self.share(v, [*along, *turning, *rigid])[0] > SHARE:
             return along[0][0]
         return name_of(turning_shares(self.system, state.turned, [v.array_r.real]))

@@ -9,7 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 ONE_SIDE = "on one side of a kink"
-STABILITY = {True: "stable", None: "undecided", False: "unstable"}
+STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
+UNDECIDED = "stability undecided"
+WORDS = {True: "stable", None: "undecided", False: "unstable"}
 """Words for what :func:`is_stable` says."""
 
 
@@ -44,9 +46,23 @@ class Judgement:
     soft: tuple[SoftMode, ...]
 
 
-def is_stable(negative: int, undecided: int, kink: str = "") -> bool | None:
-    """Whether a state with so many eigenvalues is stable; None where that is not decided, as on a ``kink``."""
-    return None if kink else False if negative else None if undecided else True
+def stability(negative: int, undecided: int, doubt: str = "", in_space: int | None = None) -> str:
+    """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`: the one decision that all words follow.
+
+    ``negative`` is the index, or the number of unstable frequencies, ``undecided`` eigenvalues may be negative besides;
+    ``in_space`` is the index among all perturbations of a planar rod (None: unknown).  In ``doubt``, as on a kink or
+    where a richer mesh has no such state, an index is no decision.
+    """
+    if doubt:
+        return UNDECIDED
+    if negative:
+        return UNSTABLE
+    return UNDECIDED if undecided else PLANAR if in_space else STABLE
+
+
+def is_stable(kind: str) -> bool | None:
+    """Whether a state of a kind of stability is stable; None if that is undecided."""
+    return None if kind == UNDECIDED else kind == STABLE
 
 
 def index_range(negative: int, undecided: int, kink: str = "") -> str:

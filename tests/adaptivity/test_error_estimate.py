@@ -171,7 +171,9 @@ def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
     assert abs(s.point.ordinate - reference_values.FIRST[0.5][0]) > 5 * s.ordinate_error
     assert s.resolved is False
     stream = StringIO()
-    Report(stream=stream).table(diagram.data, diagram.branches)
+    report = Report(stream=stream)
+    report.table(diagram.data, diagram.branches)
+    report.summary(diagram.data)
     if MPI.COMM_WORLD.rank == 0:
         assert "(at least 2e-03)" in stream.getvalue()
         assert "does not resolve" in stream.getvalue()

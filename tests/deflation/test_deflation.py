@@ -285,3 +285,20 @@ def test_quaternions_of_opposite_signs_are_one_rotation(planar: str | None) -> N
     for one, other in combinations(shapes, 2):
         turned = abs((one["q"] * other["q"]).sum(axis=1))  # the cosine of half the angle between them
         assert abs(one["r"] - other["r"]).max() > 1e-6 or turned.min() < 1 - 1e-9
+
+
+@pytest.mark.alone
+def test_states_of_the_mesh_alone_are_not_offered_as_stable() -> None:
+    """An elastica at twenty times its critical load on two linear elements: the richer mesh has other strains."""
+    rod, mesh = (
+        classics.column("elastica", classics.SUPPORTS["clamped-free"], (0.0, 50.0)),
+        Discretization("reduced", 2, 1),
+    )
+    found = [p for p in Solver(rod, mesh).search(50.0, tries=6) if not p.negative]
+    assert found and all(p.stable is None and "not resolved by this mesh" in repr(p) for p in found)
+    plan = Plan((0.0, 50.0), at=(50.0,), tries=6, depth=0)
+    diagram = trace(rod, mesh, plan)
+    said = [w for w in diagram.warnings if "found at P = 50 was not followed: The richer mesh has another state" in w]
+    assert said and [b.name for b in diagram] == ["straight"]
+    assert "coexist" not in diagram.in_words() and said[0] in diagram.in_words()
+    assert [p.stable for p in diagram.again(depth=1, tries=0).at(50.0) if not p.negative] == [None]

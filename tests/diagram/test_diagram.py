@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from mpi4py import MPI
 
 import rodfem
 from rodfem import Diagram, Discretization, InputError, Observer, Parameter, Plan
+from rodfem.app import console
 from rodfem.continuation.branch import Branch
 
 MESH = Discretization("reduced", 8, 6)
@@ -151,6 +153,31 @@ def test_an_observer_hears_of_all(diagram: Diagram) -> None:
     assert heard[-2:] == ["straight", 1]
     assert [h for h in heard if isinstance(h, str) and h != "straight"] == found.warnings
     assert any("is singular" in sentence for sentence in found.warnings)
+
+
+@pytest.mark.alone
+def test_what_a_run_warns_of_is_saved_and_in_its_words(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a first state that is critical, and of an event that is zero all along: live, loaded, and from the shell."""
+    rod, critical = demo_cases.scene("cord"), 49.348022005446796
+    still = rodfem.Event("still", of=lambda state: state.r[0, 0])
+    plan = Plan((critical, 45.0), depth=0, error_bars=False, events=(still,))
+    found = rodfem.trace(rod, MESH, plan)
+    (said,) = [x for x in found.warnings if "is singular" in x]
+    (note,) = [x for x in found.notes if "zero all along" in x]
+    assert (said.branch, said.loads) == (note.branch, [critical, critical]) == ("straight", [critical, critical])
+    assert note.loads == [45.0, critical]
+    again = rodfem.load(found.save(folder / "cord"), rod)
+    for live, loaded in ((found.warnings, again.warnings), (found.notes, again.notes)):
+        assert [(x, x.branch, x.loads) for x in live] == [(x, x.branch, x.loads) for x in loaded] != []
+    assert again.in_words() == found.in_words()
+    (first,) = [x for x in found.in_words().splitlines() if x.startswith("The first branch, straight,")]
+    assert f"Warning: {said}" in first and f"Note: {note}" in first
+    console.main(["info", str(folder / "cord")])
+    assert first in capsys.readouterr().out
+    file = folder / "cord" / "diagram.json"
+    old = {key: value for key, value in rodfem.load_json(file).items() if key not in ("warnings", "notes")}
+    file.write_text(json.dumps(old))
+    assert rodfem.load(folder / "cord", rod).warnings == []
 
 
 @pytest.mark.long

@@ -37,7 +37,7 @@ def test_a_side_with_other_ordinates_is_said() -> None:
     assert a.point.load == pytest.approx(b.point.load, rel=1e-9)
     assert abs(a.point.ordinate - b.point.ordinate) > 1e-4
     for diagram in diagrams:
-        assert any("has other ordinates, and is not traced" in said for said in diagram.warnings)
+        assert any("has other ordinates, and is not traced" in said for said in diagram.notes)
 
 
 @pytest.fixture

@@ -165,6 +165,53 @@ def test_verbs(more: dict[str, Any], verb: str) -> None:
     assert f"to 2, where it {verb}" in words
 
 
+@pytest.mark.parametrize(
+    ("more", "verb"),
+    [
+        ({"law": LAW | {"kind": "subcritical pitchfork"}}, "passes a subcritical pitchfork; then stable"),
+        ({"kind": "flutter"}, "ceases to flutter: two complex frequencies coincide and become real; then stable"),
+        ({"kind": "divergence"}, "ceases to diverge: a frequency passes through zero; then stable"),
+        ({"kind": "fold"}, "turns back in a fold; then stable"),
+    ],
+)
+def test_no_rod_buckles_where_the_index_falls(more: dict[str, Any], verb: str) -> None:
+    point = special("branch point", 2, 2.0, 2, 0, multiplicity=1) | more
+    assert f"to 2, where it {verb}" in said(
+        branch("straight", [0.0, 1.0, 2.0, 3.0, 4.0], [2, 2, 2, 0, 0], special=[point])
+    )
+
+
+def test_a_step_in_which_a_change_is_not_located_is_not_called_unstable() -> None:
+    """Of a planar rod that falls out of its plane, and of one whose index changes without a special point."""
+    loads, planar = [-9.0, -3.0, 2.0, 4.0], {"negative_in_space": [0, 0, 1, 1]}
+    for rod in (branch("straight", loads, [0] * 4, columns=planar), branch("straight", loads, [0, 0, 1, 1])):
+        words = said(rod, span=(-9.0, 4.0))
+        assert "From P = 2 to 4 no stable state was found." in words
+        assert "Stability is not examined between P = -3 and 2, where it changes." in words
+        stable = branch("other", loads, [0] * 4)
+        assert "no stable state" not in said(rod, stable) and "not examined" not in said(rod, stable)
+
+
+def test_states_that_the_mesh_does_not_resolve_may_coexist() -> None:
+    loads = [0.0, 2.0, 4.0]
+    ends = [special("end", 2, 4.0, 0, 0, resolved=resolved) for resolved in (True, False)]
+    rods = [branch("straight", loads, [0] * 3), branch("found 1", loads, [0] * 3, energy=[1.0, 9.0, 20.0])]
+    for end, verb in zip(ends, ("two stable states coexist", "two stable states may coexist"), strict=True):
+        words = said(rods[0], rods[1] | {"special": [end]})
+        assert f"From P = 0 to 4 {verb}, of straight and found 1" in words
+        assert ("hysteresis" in words) == end["resolved"]
+
+
+def test_rows_decide_where_a_bar_is_wide() -> None:
+    """A special point that the mesh does not resolve, with a bar over three rows: their indices are the mesh's."""
+    point = special("fold", 1, 1.0, 1, 0, error_estimate=5.0, located_to=1e-9, resolved=False)
+    loads, index = [0.0, 1.0, 2.0, 3.0, 4.0], [1, 1, 1, 1, 1]
+    words = said(branch("straight", loads, index, special=[point]))
+    assert "is unstable (index 1) on its whole range, from P = 0 to 4" in words
+    columns = {"undecided": [0, 0, 1, 0, 0]}
+    assert "then unstable (index 1) to 4" in said(branch("straight", loads, index, special=[point], columns=columns))
+
+
 def test_digits_are_those_of_the_error_bar() -> None:
     point = special("fold", 2, 2.123456789, 0, 1, error_estimate=1e-4)
     rod = branch("straight", [0.0, 1.0, 2.123456789, 3.0, 4.0], [0, 0, 0, 1, 1], special=[point])
@@ -186,7 +233,7 @@ def test_what_is_open_is_said() -> None:
         assert sentence in words
     coarse = special("fold", 1, 1.0, 0, 1, resolved=False)
     rod = branch("straight", [0.0, 1.0, 4.0], [0, 0, 1], special=[coarse])
-    assert "The mesh does not resolve 1 special point: use more elements." in said(rod)
+    assert "does not resolve 1 special point, whose error bars are no bounds: use more elements" in said(rod)
 
 
 def test_mirror_images_are_no_hysteresis() -> None:
