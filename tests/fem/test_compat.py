@@ -158,6 +158,24 @@ def test_forms_are_compiled_beside_this_process(folder: Path, monkeypatch: pytes
         form_compiler.compile_forms([x**4 * ufl.dx])
 
 
+@pytest.mark.alone
+def test_options_in_the_current_folder_change_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files that FFCx and dolfinx read would change what is compiled, and one that is no JSON would end the run."""
+    monkeypatch.chdir(folder)
+    for module, reader in compat._OPTION_FILES:
+        getattr(module, reader).cache_clear()
+    (folder / "ffcx_parameters.json").write_text('{"epsilon": 0.05, "table_rtol": 0.05}')
+    (folder / "ffcx_options.json").write_text('{"epsilon": 0.05, "table_rtol": 0.05}')
+    for name in ("parameters", "options"):
+        (folder / f"dolfinx_jit_{name}.json").write_text("no JSON")
+    said: list[str] = []
+    with form_compiler.announce_compilation(lambda: said.append("compiling")):
+        System(scene(), Discretization("reduced", 9, 6))
+    for module, reader in compat._OPTION_FILES:
+        getattr(module, reader).cache_clear()
+    assert (said, len(compat._OPTION_FILES)) == ([], 2)
+
+
 @pytest.mark.short
 def test_complex_petsc_gives_one_sentence(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
