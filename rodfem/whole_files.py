@@ -43,6 +43,8 @@ def writing(folder: Path) -> Iterator[None]:
     """Raise :class:`InputError` where the system lets nobody write into a folder."""
     try:
         yield
+    except InputError:
+        raise
     except (OSError, ValueError) as error:  # ValueError for a zero byte in a name
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"The output folder {folder} cannot be written ({reason})", ANOTHER_FOLDER) from error
