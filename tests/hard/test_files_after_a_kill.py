@@ -82,7 +82,11 @@ def test_a_kill_at_any_moment(folder: Path, diagrams: tuple[Diagram, Diagram]) -
     """Files are those of one run, all that was finished is there, and the next run finds no drafts."""
     earlier, later = diagrams
     earlier.save(folder / "earlier")
-    (folder / "earlier" / "diagram.png").write_bytes(b"an earlier picture")
+    named = load_json(folder / "earlier" / "diagram.json") | {"files": ["diagram.png", "notes.txt", "../x.png"]}
+    (folder / "earlier" / "diagram.json").write_text(json.dumps(named))
+    own = ("notes.txt", "modes-mine.png", "locus-1.json", ".mine.part.tex", "report.html")
+    for name in ("diagram.png", *own):
+        (folder / "earlier" / name).write_bytes(b"an earlier picture, or a file of a person")
     status, moment, states, between = KILLED, 0, set(), 0
     while status == KILLED:
         here = folder / "killed"
@@ -99,6 +103,7 @@ def test_a_kill_at_any_moment(folder: Path, diagrams: tuple[Diagram, Diagram]) -
             continue
         assert data["run"] == (later.run if finished else data["run"])
         assert (here / "diagram.png").exists() <= (data["run"] == earlier.run)
+        assert all((here / name).exists() for name in own)
         with h5py.File(here / "states.h5") as file:
             for branch in data["branches"]:
                 assert file[f"branches/{branch['name']}/load"][:].tolist() == branch["columns"]["load"]
