@@ -186,3 +186,12 @@ def test_ranks_with_different_input(name: str) -> None:
     several = MPI.COMM_WORLD.size > 1
     with pytest.raises(InputError, match=rf"different input \({what}\)") if several else nullcontext():
         rodfem.trace(stated, mesh, plan)
+
+
+def test_an_ordinate_that_is_no_number() -> None:
+    """It is one in the trial states, and none in those of the branch."""
+    rod = scene(span=(0.0, 0.1))
+    rod = replace(rod, ordinate=replace(rod.ordinate, of=lambda r, q: 0.0 if abs(q[1]) > 1e-3 else np.nan))
+    diagram = rodfem.trace(rod, MESH, rodfem.Plan(depth=0, error_bars=False))
+    sentence = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
+    assert diagram.warnings == [f"straight: at lam = 0 {sentence}"]

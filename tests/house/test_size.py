@@ -14,11 +14,11 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 34757,
+    "lines of Python": 34808,
     "files of Python": 184,
     "lines of C": 957,
     "module constants with a number": 387,
-    "functions of a complexity above 10": 47,
+    "functions of a complexity above 10": 46,
     "functions of six parameters or more": 21,
     "places that warn": 34,
     "files that import internals of UFL and FFCx": 2,
@@ -92,7 +92,7 @@ def figures() -> dict[str, int]:
     """What :data:`MOST` bounds, as it is."""
     functions = [node for node in nodes() if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
     return {
-        "lines of Python": 34757lines(list(modules())),
+        "lines of Python": lines(list(modules())),
         "files of Python": len(modules()),
         "lines of C": lines(sorted(PACKAGE.rglob("*.c"))),
         "module constants with a number": sum(numeric(line) for tree in modules().values() for line in tree.body),

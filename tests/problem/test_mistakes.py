@@ -33,6 +33,7 @@ from rodfem import (
     free,
     hinged,
     integral,
+    pinned,
     section,
     sliding_hinge,
 )
@@ -96,6 +97,11 @@ def stiff(b: Any, k: Any) -> Any:
 
 
 SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
+    # forces that do no work
+    (
+        {"ends": (pinned(), pinned(lambda c: (0, 0, None), lambda c: (1 + c.P, 0, -c.P)))},
+        "A force acts on the right end in a direction in which its position is held",
+    ),
     # names, numbers, pairs
     ({"title": 3}, "title is 3"),
     *(
