@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 34808,
+    "lines of Python": 34809,
     "files of Python": 184,
     "lines of C": 957,
     "module constants with a number": 387,
