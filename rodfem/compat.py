@@ -54,6 +54,14 @@ C_COMPILER = {
 With the instructions of this processor they take a fifth less time.  FFCx names a compiled module after these options:
 that of another processor, in a cache that both share, is not loaded.
 """
+_FFCX = dolfinx.jit.ffcx
+_OPTION_FILES = [
+    (module, name)
+    for module in (dolfinx.jit, _FFCX.options if hasattr(_FFCX, "options") else _FFCX.parameters)
+    for name in ("_load_options", "_load_parameters")  # dolfinx 0.5 calls them parameters
+    if hasattr(module, name)
+]
+"""Functions that read options from files, each with its module."""
 COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 """Whether this PETSc was built for complex numbers: forms and states are real all the same."""
 KINDS = CELL, BOUNDARY, INTERIOR = 1, 2, 4
@@ -113,7 +121,7 @@ def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
         element = ufl.MixedElement(
             [ufl.VectorElement(e, dim=p[2]) if p[2] > 1 else e for e, p in zip(single, parts, strict=True)]
         )
-    with quiet():  # the element itself is compiled
+    with compilation():  # the element itself is compiled
         return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
 
 
@@ -250,14 +258,22 @@ def pack_constants(form: Any) -> np.ndarray:
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
-    """Keep the compilers' own chatter off the terminal: FFCx's, and that of setuptools, which runs the C compiler."""
-    root = logging.getLogger()
+def compilation() -> Iterator[None]:
+    """Compile with rodfem's options alone, and without the chatter of FFCx and of setuptools, which runs the compiler.
+
+    FFCx and dolfinx also read options from files of the current folder and of the home folder; their tolerances would
+    change the equations.
+    """
+    root, readers = logging.getLogger(), {place: getattr(*place) for place in _OPTION_FILES}
     level, disabled = root.level, root.manager.disable
     logging.disable(max(disabled, logging.INFO))
+    for place in readers:
+        setattr(*place, lambda: ({}, {}))
     try:
         yield
     finally:
+        for place, reader in readers.items():
+            setattr(*place, reader)
         logging.disable(disabled)
         root.setLevel(level)
 

@@ -11,10 +11,16 @@ Each entry, group and column is described in ``docs/files.md``.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from stat import S_ISREG
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from rodfem import __version__
 from rodfem.errors import Argument, InputError
@@ -59,6 +65,23 @@ class Format:
         mark = {key: file.attrs.get(name) for key, name in KEYS.items()}
         self._check(mark if mark["name"] else None, {*file.attrs, *file}, file.filename, needs)
 
+    @contextmanager
+    def opened(self, path: Path | str, needs: Sequence[str] = (), unfit: str = "") -> Iterator[h5py.File]:
+        """Open an HDF5 file that :meth:`check_hdf5` admits, and whose arrays are no larger than what it stores of them.
+
+        Raises :class:`InputError` for what cannot be read inside of the block, too, as :func:`refusal` does; ``unfit``
+        is the sentence.
+        """
+        import h5py
+
+        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."):
+            stat = regular(path)
+            with h5py.File(path, "r") as file:
+                self.check_hdf5(file, needs)
+                if hollow := _hollow(Path(path), stat.st_mtime_ns, stat.st_size):
+                    raise InputError(f"{path} stores a part of the array {hollow} only: run the scene again.")
+                yield file
+
     def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
         if mark is not None and mark["name"] != self.name:
             raise InputError(f"{where} has the format {mark['name']!r}, not {self.name!r}: give {self.file}.")
@@ -82,8 +105,47 @@ LOCUS = Format("rodfem locus", f"a locus-1.json, locus-2.json ... of a run with 
 RESULT = Format("rodfem result", "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
-UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, AttributeError, RuntimeError)
+UNREADABLE = (
+    *(OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, MemoryError, ArithmeticError),
+    np.linalg.LinAlgError,
+)
 """Errors of h5py and numpy for a file that holds something else than was expected."""
+
+
+@contextmanager
+def refusal(unfit: str) -> Iterator[None]:
+    """Raise :class:`InputError` with a sentence, in which ``{}`` stands for the reason, where a file is unreadable."""
+    try:
+        yield
+    except InputError:
+        raise
+    except UNREADABLE as trouble:
+        reason = (str(trouble).splitlines() or [type(trouble).__name__])[0]
+        raise InputError(unfit.replace("{}", reason)) from trouble
+
+
+@lru_cache
+def _hollow(path: Path, changed: int, size: int) -> str:
+    """Name of an array in a file that would be larger in memory than what is stored of it; empty if there is none.
+
+    rodfem stores arrays whole.  The file has its ``size`` since it was ``changed``: it is not searched for each row.
+    """
+    import h5py
+
+    def found(name: str, item: Any) -> str | None:
+        large = isinstance(item, h5py.Dataset) and item.nbytes > item.id.get_storage_size()
+        return name if large else None
+
+    with h5py.File(path, "r") as file:
+        return file.visititems(found) or ""
+
+
+def regular(path: Path | str) -> os.stat_result:
+    """Status of a file; raises :class:`OSError` for a folder, a pipe, and what is larger than this machine's memory."""
+    status = os.stat(path)
+    if not S_ISREG(status.st_mode) or status.st_size > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
+        raise OSError("no regular file, or one larger than the memory")
+    return status
 
 
 def _no_number(name: str) -> float:
@@ -94,12 +156,13 @@ def _no_number(name: str) -> float:
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
     """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        regular(path)
+        text = path.read_text(encoding="utf-8")
         data: dict[str, Any] = json.loads(text, parse_constant=_no_number)
     except FileNotFoundError as trouble:
         also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""
         raise InputError(f"There is no {path}: give {form.file}{also}.") from trouble
-    except (OSError, ValueError, RecursionError) as trouble:
+    except (OSError, ValueError, RecursionError, MemoryError) as trouble:
         raise InputError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
     form.check(data, path, needs)
     return data

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import signal
 import sys
 import time
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 RANK = ("PMIX_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK")
 """Variables of the environment, one of which every rank has."""
+ADDRESS = re.compile(r" at 0x\w+")
+"""Place of an object in the memory of its rank, in its text."""
 PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
 """Seconds after which a rank that others do not join failed alone; between two looks for them at last, and at first."""
 
@@ -47,6 +50,13 @@ def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
     trouble = comm.bcast(trouble)
     if trouble is not None:
         raise trouble
+
+
+def agree(comm: MPI.Comm, **given: object) -> None:
+    """Raise :class:`InputError` on every rank of ``comm`` where their texts of what is ``given`` differ; collective."""
+    every = comm.allgather({name: ADDRESS.sub("", str(value)) for name, value in given.items()})
+    if other := [name for name in given if len({texts[name] for texts in every}) > 1]:
+        raise InputError(f"The ranks of this job have different input ({', '.join(other)}): give all of them the same.")
 
 
 def all_come(comm: MPI.Comm) -> bool:

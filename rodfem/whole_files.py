@@ -13,8 +13,9 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,12 +26,12 @@ if TYPE_CHECKING:
     import h5py
     from mpi4py import MPI
 
-DRAFTS = ".*.part.*"
+DRAFTS = ".*.rodfem-part*"
 """Names of drafts: that of the file, whose suffix says what it is to those who write it."""
 LOCK = ".lock"
 """File whose lock says that the folder is in use; it has the process and the host in words."""
-OF_A_RUN = ("modes.h5", "modes-*.*", "locus*.*", "diagram.png", "shape.png", "report.html")
-"""Files that a run may leave with its diagram and states."""
+OF_A_RUN = ("modes.h5", "modes-*.png", "modes-*.gif", "locus-*.json", "locus.png", "diagram.png", "shape.png")
+"""Names of the files that a run may write next to its diagram and states."""
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
 """Suffixes of pictures of diagrams; without one it is PNG."""
 FOLDERS: set[Path] = set()
@@ -43,6 +44,8 @@ def writing(folder: Path) -> Iterator[None]:
     """Raise :class:`InputError` where the system lets nobody write into a folder."""
     try:
         yield
+    except InputError:
+        raise
     except (OSError, ValueError) as error:  # ValueError for a zero byte in a name
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"The output folder {folder} cannot be written ({reason})", ANOTHER_FOLDER) from error
@@ -54,9 +57,10 @@ def draft_of(path: Path) -> Iterator[Path]:
 
     Folders on the way are made.  Raises :class:`InputError` where it cannot be written.
     """
-    draft = path.with_name(f".{path.stem}.part{path.suffix}")
+    draft = path.with_name(f".{path.stem}.rodfem-part{path.suffix}")
     with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
+        draft.unlink(missing_ok=True)  # it may be a link to another file
         try:
             yield draft
             os.replace(draft, path)
@@ -142,7 +146,7 @@ def _acquired(folder: Path) -> int:
 
 def _lock(folder: Path) -> int | None:
     """Descriptor of the lock; None if another process has just removed it."""
-    file = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+    file = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
     try:
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if os.path.samestat(os.fstat(file), os.stat(folder / LOCK)):
@@ -157,12 +161,12 @@ def _lock(folder: Path) -> int | None:
     return None
 
 
-def remove_earlier(folder: Path) -> None:
-    """Remove what an earlier run left with its diagram and states, which the next save replaces."""
+def remove_earlier(folder: Path, names: Iterable[str]) -> None:
+    """Remove from a folder what its diagram names as the files of a run: the next save replaces diagram and states."""
     with writing(folder):
-        for pattern in OF_A_RUN:
-            for file in folder.glob(pattern):
-                file.unlink()
+        for name in names:
+            if Path(name).name == name and any(fnmatch(name, pattern) for pattern in OF_A_RUN):
+                (folder / name).unlink(missing_ok=True)
 
 
 def picture_at(path: Path, suffixes: Sequence[str]) -> None:
@@ -176,5 +180,5 @@ def picture_at(path: Path, suffixes: Sequence[str]) -> None:
     with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
         probe = path.parent / f".probe-{os.getpid()}"
-        probe.write_text("")
+        probe.touch(exist_ok=False)
         probe.unlink()

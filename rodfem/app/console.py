@@ -21,7 +21,7 @@ from typing import Any
 
 import rodfem
 from rodfem.app.cli import Parser, complain, folder, run_folder
-from rodfem.errors import InputError, SetupError
+from rodfem.errors import InputError, SetupError, printable
 
 HELP = """usage: rodfem COMMAND [ARGUMENTS]
 
@@ -31,7 +31,8 @@ Equilibria of nonlinearly elastic rods: which are stable, and at which load stab
 
 rodfem COMMAND --help lists the arguments of a command.
 """
-OF_INFO = ("parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
+UNFIT = "{} lacks what a diagram has, or has something else there ({{}}): run the scene again."
+OF_INFO = ("scene", "parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
 """Entries of a diagram that ``rodfem info`` prints."""
 HEADS = {"folder": 28, "scene": 16, "date": 10, "branches": 8, "special": 7}
 """Columns of ``rodfem list``, and their widths."""
@@ -72,7 +73,11 @@ def _summary(command: Callable[..., None]) -> str:
 
 
 def convert(words: Sequence[str]) -> None:
-    """Write a saved diagram for other programs: VTKHDF (ParaView), CSV, netCDF."""
+    """Write a saved diagram for other programs: VTKHDF (ParaView), CSV, netCDF.
+
+    Raises :class:`~rodfem.errors.InputError` for files that are unfit.
+    """
+    from rodfem.file_format import refusal
     from rodfem.output.convert import FORMATS
     from rodfem.output.files import load_json
     from rodfem.whole_files import writing
@@ -84,10 +89,13 @@ def convert(words: Sequence[str]) -> None:
     options = parser.parse_args(words)
     target: Path = options.output or options.folder / options.format
     load_json(options.folder / "diagram.json")  # no folder is made for a run that there is not
+    if options.output is None and target.is_symlink():
+        raise InputError(f"{target} is a link to another folder: name that with --output.")
     with writing(target):
         target.mkdir(parents=True, exist_ok=True)
-    for path in FORMATS[options.format](options.folder, target):
-        print(path)
+    with refusal(UNFIT.format(options.folder)):
+        for path in FORMATS[options.format](options.folder, target):
+            print(printable(str(path)))
 
 
 def explain(words: Sequence[str]) -> None:
@@ -109,24 +117,31 @@ def explain(words: Sequence[str]) -> None:
 
 def info(words: Sequence[str]) -> None:
     """Special points, meshes and accuracy of a saved diagram."""
-    from rodfem.file_format import DIAGRAM, read_json
+    from rodfem.file_format import DIAGRAM, read_json, refusal
     from rodfem.output.summary import in_sentences
     from rodfem.output.words import table_of
 
     parser = Parser(prog="rodfem info", description=_summary(info))
     parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
-    data = read_json(parser.parse_args(words).folder / "diagram.json", DIAGRAM, OF_INFO)
+    path = parser.parse_args(words).folder / "diagram.json"
+    data = read_json(path, DIAGRAM, OF_INFO)
+    with refusal(UNFIT.format(path)):
+        sentences = [f"  {sentence}" for sentence in in_sentences(data)]
+        print(printable("\n".join([*_tables(data, [*table_of(data)]), *sentences])))
+
+
+def _tables(data: Mapping[str, Any], rows: Sequence[Sequence[Any]]) -> list[str]:
+    """Lines of a diagram: constants, meshes, and branches with the ``rows`` of their special points."""
     constants = ", ".join(f"{name} = {value:.6g}" for name, value in data["constants"].items())
     lines = [f"{data.get('title', data['scene'])}: {constants or 'no constants'}"]
     for mesh in data["meshes"]:
         lines.append(f"  {mesh['elements']} elements of degree {mesh['degree']}, {mesh['unknowns']} unknowns")
     lines.append(f"  {'branch':<12} {'kind':<13} {data['parameter']:<24} {data['ordinate'][:24]:<24} index")
-    rows = list(table_of(data))
     for branch in data["branches"]:
         for name, kind, load, ordinate, index, _ in (row for row in rows if row[0] == branch["name"]):
             lines.append(f"  {name:<12} {kind:<13} {load:<24} {ordinate:<24} {index}")
         lines.append(f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}")
-    print("\n".join([*lines, *(f"  {sentence}" for sentence in in_sentences(data))]))
+    return lines
 
 
 def list_diagrams(words: Sequence[str]) -> None:
@@ -140,21 +155,22 @@ def list_diagrams(words: Sequence[str]) -> None:
     files = sorted(place.rglob("diagram.json"))
     if not files:
         raise InputError(f"No folder in {place} has a diagram.json: run a scene, or name a folder with results.")
-    print("\n".join([_row(*HEADS, "first loss of stability"), *map(_diagram, files)]))
+    print(printable("\n".join([_row(*HEADS, "first loss of stability"), *map(_diagram, files)])))
 
 
 def _diagram(file: Path) -> str:
     """Line of a diagram; a file that is none has its reason in place of numbers."""
-    from rodfem.file_format import DIAGRAM, read_json
+    from rodfem.file_format import DIAGRAM, read_json, refusal
 
     name = str(file.parent)
     try:
         data = read_json(file, DIAGRAM, ("scene", "parameter", "branches"))
-        written = datetime.fromtimestamp(file.stat().st_mtime, UTC).isoformat()
-        date = str((data.get("origin") or {}).get("date") or written)[: HEADS["date"]]
-        branches = data["branches"]
-        special = sum(len(branch["special"]) for branch in branches)
-        return _row(name, data["scene"], date, str(len(branches)), str(special), first_loss(data))
+        with refusal(UNFIT.format(file)):
+            written = datetime.fromtimestamp(file.stat().st_mtime, UTC).isoformat()
+            date = str((data.get("origin") or {}).get("date") or written)[: HEADS["date"]]
+            branches = data["branches"]
+            special = sum(len(branch["special"]) for branch in branches)
+            return _row(name, data["scene"], date, str(len(branches)), str(special), first_loss(data))
     except InputError as trouble:
         return f"{name:<{HEADS['folder']}} {trouble}"
 

@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rodfem.app.cli import Parser, complain, folder, sentences, start_petsc
-from rodfem.app.persons_file import load
+from rodfem.app.persons_file import as_sentence, load
 from rodfem.errors import InputError
 from rodfem.problem.scene import Scene
 from rodfem.stability.registry import AUTO, METHODS
@@ -162,7 +162,7 @@ def _returning(module: ModuleType, kind: str) -> dict[str, Callable[..., Any]]:
             returned = signature(x).return_annotation
             word = returned if isinstance(returned, str) else getattr(returned, "__name__", "")
             if word.rpartition(".")[2].strip("'\"") == kind:
-                found[name] = x
+                found[name] = as_sentence(Path(str(module.__file__)), f"correct {name}, or choose other constants")(x)
     return found
 
 

@@ -119,7 +119,7 @@ def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
 def _contents(file: Path) -> dict[str, Any]:
     """Entries of a file; none where it is missing or cut off."""
     try:
-        data = json.loads(file.read_text())
+        data = json.loads(file.read_text()) if file.is_file() else {}
     except (OSError, ValueError):
         return {}
     return data if isinstance(data, dict) else {}

@@ -43,6 +43,21 @@ def leave_the_run() -> None:
         raise RunsItselfError
 
 
+@contextmanager
+def as_sentence(file: Path, remedy: str) -> Iterator[None]:
+    """Raise :class:`~rodfem.errors.InputError` with the last line of a ``file`` that ran, and a ``remedy``.
+
+    Its functions are decorated with it, too.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except (Exception, SystemExit) as trouble:  # whatever the file does
+        where = f"{file}{_line(file.resolve(), trouble)}"
+        raise InputError(f"{where}: {type(trouble).__name__}: {trouble}; {remedy}.") from trouble
+
+
 def load(file: Path, name: str | None = None) -> ModuleType:
     """Module of a file, by the name of the file, with a stroke that no other module has, or by another one.
 
@@ -60,13 +75,8 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     sys.modules[spec.name] = module  # where pickling, and dataclasses, look
     sys.path.append(str(path.parent))
     try:
-        with stated:
+        with stated, as_sentence(file, f"run {sys.executable} {file} to see more"):
             spec.loader.exec_module(module)
-    except InputError:
-        raise
-    except (Exception, SystemExit) as trouble:  # whatever the file does
-        words = f"{file}{_line(path, trouble)}: {type(trouble).__name__}: {trouble}"
-        raise InputError(f"{words}; run {sys.executable} {file} to see more.") from trouble
     finally:
         if before is not None:
             sys.modules[spec.name] = before

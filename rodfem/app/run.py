@@ -29,7 +29,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder, typical_modes
 from rodfem.modes.modes import Modes, save_modes
-from rodfem.output.files import save_json, save_run
+from rodfem.output.files import load_json, save_json, save_run
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
@@ -125,6 +125,8 @@ class Terminal(Report):
         if quiet:
             self.on = self.live = False
         self.plan, self.output, self.comm, self._saved = plan, output, comm, 0
+        self.files: list[str] = []
+        self.data: dict[str, Any] = {}
 
     def system(self, system: System, accuracy: float | None = None) -> None:
         """Say what is solved, and refuse a method that does not apply before anything is computed."""
@@ -140,17 +142,33 @@ class Terminal(Report):
         modes = typical_modes(new, diagram.solvers)
         with diagram.clock("files"), held():
             if not self._saved:
-                on_first(self.comm, lambda: remove_earlier(self.output))
-            save_run(diagram.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
+                on_first(self.comm, lambda: remove_earlier(self.output, _files_of_a_run(self.output)))
+            self.data = diagram.data | {"files": self.files}
+            save_run(self.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
             self._saved = len(diagram)
+
+    def name(self, *files: str) -> None:
+        """Name ``files`` in the diagram before they are written: the next run in the folder removes what is named."""
+        self.files += [file for file in files if file not in self.files]
+        on_first(self.comm, lambda: save_json(self.data | {"files": self.files}, self.output / "diagram.json"))
+
+
+def _files_of_a_run(folder: Path) -> list[str]:
+    """Names of the files that a diagram in a folder names; of an older one, which names none, those with numbers."""
+    older = ["modes.h5", *(path.name for path in folder.glob("locus-[0-9]*.json"))]
+    try:
+        named = load_json(folder / "diagram.json").get("files", older)
+    except InputError:
+        return []
+    return [str(name) for name in named] if isinstance(named, list) else []
 
 
 def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     """Print tables, do what the plan asks for beyond branches, and draw the pictures if ``figures``."""
     scene, plan, output, branches = diagram.scene, terminal.plan, terminal.output, diagram.branches
     terminal.complete(diagram)
-    data = diagram.data
-    on_first(terminal.comm, lambda: save_json(data, output / "diagram.json"))
+    data = terminal.data = diagram.data
+    terminal.name()
     terminal.summary(data)
     terminal.table(data, branches, plan.most_branches)
     terminal.spectra(branches, scene)
@@ -164,10 +182,12 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
         _follow(diagram, terminal, figures, plan.locus)
     if figures:
         terminal.working("pictures")
+        terminal.name("diagram.png", "shape.png")
         on_first(terminal.comm, lambda: draw(output, terminal))
     diagram.complete = True
+    terminal.data = data | diagram.remarks | {"complete": True}
     with held():
-        on_first(terminal.comm, lambda: save_json(data | diagram.remarks | {"complete": True}, output / "diagram.json"))
+        terminal.name()
 
 
 def _warn(diagram: Diagram, terminal: Terminal, remark: Remark) -> None:
@@ -195,6 +215,7 @@ def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
             continue
         terminal.verdict(branch.name, where, verdict.at(special.point), modes)
         if modes is not None:
+            terminal.name("modes.h5")
             keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
             on_first(terminal.comm, partial(keep, first=not saved, scene=diagram.scene))
             saved.append((branch.name, special.row))
@@ -222,6 +243,7 @@ def _draw_modes(saved: list[tuple[str, int]], pictures: list[str], terminal: Ter
     """Draw the modes that were saved of rows of branches: a picture and an animation of each row."""
     from rodfem.output.plot_modes import draw_modes
 
+    terminal.name(*(f"{picture}{suffix}" for picture in pictures for suffix in (".png", ".gif")))
     for (name, row), picture in zip(saved, pictures, strict=False):
         terminal.working(f"{name}, row {row}: pictures and animations of its modes")
         for suffix in (".png", ".gif"):
@@ -251,6 +273,7 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
                 continue
             terminal.say(near[-1].text())
             saved.append(near[-1].data())
+            terminal.name(f"locus-{len(saved)}.json", *["locus.png"] * figures)
             on_first(terminal.comm, partial(near[-1].save, terminal.output / f"locus-{len(saved)}.json"))
     if saved and figures:
         from rodfem.output.plot_locus import draw_locus

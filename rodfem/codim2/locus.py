@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from rodfem.codim2.plane import Interval
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.errors import InputError
-from rodfem.file_format import LOCUS, read_json
+from rodfem.file_format import LOCUS, read_json, refusal
 from rodfem.output.digits import number
 from rodfem.output.files import save_json
 from rodfem.problem.arguments import finite
@@ -177,18 +177,19 @@ class Locus:
     def read(cls, path: Path) -> Locus:
         """Read what :meth:`save` has written, but for the states; raises :class:`InputError` where that is missing."""
         data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", "lower"))
-        columns, names = data["columns"], tuple(data["parameters"])
-        tables: dict[str, Any] = {name: np.array(columns[name], dtype=float) for name in COLUMNS}
-        tables["error"][data["without_estimate"]] = np.inf
-        tables |= {name: [*map(tuple, data[name])] for name in PAIRS}
-        tables |= {name: tuple(data.get(name, ("", ""))) for name in WORDS}
-        return cls(
-            **{name: data[name] for name in AS_THEY_ARE if name in data},
-            **(tables | {"bounds": tuple(tables["bounds"]), "index": tables["index"].astype(int)}),
-            names=names,
-            values=np.array([columns[name] for name in names]).T,
-            marks=[Mark(mark["kind"], mark["row"]) for mark in data["marks"]],
-        )
+        with refusal(f"{path} is no {LOCUS.name} ({{}}): give {LOCUS.file}."):
+            columns, names = data["columns"], tuple(data["parameters"])
+            tables: dict[str, Any] = {name: np.array(columns[name], dtype=float) for name in COLUMNS}
+            tables["error"][data["without_estimate"]] = np.inf
+            tables |= {name: [*map(tuple, data[name])] for name in PAIRS}
+            tables |= {name: tuple(data.get(name, ("", ""))) for name in WORDS}
+            return cls(
+                **{name: data[name] for name in AS_THEY_ARE if name in data},
+                **(tables | {"bounds": tuple(tables["bounds"]), "index": tables["index"].astype(int)}),
+                names=names,
+                values=np.array([columns[name] for name in names]).T,
+                marks=[Mark(mark["kind"], mark["row"]) for mark in data["marks"]],
+            )
 
     def save(self, path: Path) -> None:
         """Write :meth:`data` as JSON, whole or not at all; call it on one rank."""

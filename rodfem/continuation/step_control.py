@@ -41,7 +41,7 @@ class StepControl:
     def __post_init__(self) -> None:
         """Check kinds and the largest step; raises :class:`InputError`."""
         for name in ("first", "largest", "smallest", "aim"):
-            real(name, getattr(self, name), getattr(StepControl, name))
+            object.__setattr__(self, name, real(name, getattr(self, name), getattr(StepControl, name)))
         if whole("most", self.most, StepControl.most) < 1:
             raise InputError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
         if not self.smallest < self.largest <= 1:

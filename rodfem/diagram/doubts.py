@@ -21,6 +21,9 @@ ROWS = 4
 """Rows one after the other that have as many zero eigenvalues, before these are said to stay."""
 
 
+NO_NUMBER = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
+
+
 class PersistentZeros:
     """Watches the rows of a run for zero eigenvalues; an ``observer`` hears of the first that stay."""
 
@@ -102,7 +105,8 @@ class Quadrature:
         found = [(point, self._check(point)(point.x)) for point in first]
         found += [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
         self._kinks(branch, [*first, *(special.point for special in asked)])
-        for point, words in [each for each in found if each[1] and not each[0].kink][:1]:
+        undefined = [(point, NO_NUMBER) for point in branch.points if not isfinite(point.ordinate)]
+        for point, words in [each for each in found if each[1] and not each[0].kink][:1] + undefined[:1]:
             self.observer.warn(Remark(f"{branch.name}: at {self.load} = {point.load:.6g} {words}", point.load))
 
     def _without_bars(self, special: SpecialPoint) -> str:

@@ -93,7 +93,7 @@ class Plan:
         if self.method not in ("", registry.AUTO):
             registry.find(self.method)
         if self.accuracy is not None:
-            real("accuracy", self.accuracy, ACCURACY)
+            object.__setattr__(self, "accuracy", real("accuracy", self.accuracy, ACCURACY))
         yes_or_no("error_bars", self.error_bars)
         events = a((tuple, list), "Events, as in events=(Event('ends meet', of=f),)")("events", self.events)
         for i, event in enumerate(events):
@@ -102,7 +102,7 @@ class Plan:
             parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
             if len(parts) != 3 or not isinstance(parts[0], str):
                 raise InputError(f"locus is {self.locus!r}: give a name and an interval, as in locus=('A', -3.0, 0.0).")
-            reals("locus[1:]", parts[1:], (-3.0, 0.0))
+            object.__setattr__(self, "locus", (parts[0], *reals("locus[1:]", parts[1:], (-3.0, 0.0))))
 
     def over(self, scene: Scene) -> tuple[float, float]:
         """Range of the load: that of the plan, or that of the scene."""

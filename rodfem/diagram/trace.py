@@ -32,8 +32,8 @@ from rodfem.fem.system import System
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
-from rodfem.problem.validation import FLEXIBLE, round_off_of_strains
-from rodfem.ranks import end_together
+from rodfem.problem.validation import FLEXIBLE, round_off_of_strains, statement
+from rodfem.ranks import agree, end_together
 from rodfem.stability.nonsymmetric import FREQUENCIES, NonsymmetricSolver
 from rodfem.stability.spectrum import SHIFT
 from rodfem.timing import Clock
@@ -107,8 +107,10 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
 
     ``discretization``, ``plan``, ``observer`` and ``comm`` are those of that function.
     """
-    plan.check(scene, discretization)
     end_together()
+    if comm.size > 1:
+        agree(comm, scene=statement(scene), discretisation=discretization, plan=entries(plan, scene))
+    plan.check(scene, discretization)
     recorder, clock = Recorder(observer), Clock()
     with form_compiler.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):

@@ -126,7 +126,7 @@ def compile_forms(forms: Sequence[Any], comm: MPI.Comm = MPI.COMM_SELF) -> list[
     with _from_cache(comm):
         compiled = compile_ahead(forms)
         _wait()
-        with compat.quiet():
+        with compat.compilation():
             return [f for g in _groups(forms) for f in _compiled(g)] if None in compiled else compiled
 
 
@@ -138,7 +138,7 @@ def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable
     """
     # dolfinx packs the constants of what it is given; FFCx numbers those that differentiation leaves
     derived = differentiated(form)
-    with _from_cache(mesh.comm), compat.quiet():
+    with _from_cache(mesh.comm), compat.compilation():
         compiled = fem.Expression(derived, points, dtype=compat.REAL)
     chosen = np.arange(cells, dtype=np.int32)
     takes_mesh = "mesh" in inspect.signature(compiled.eval).parameters
@@ -159,7 +159,7 @@ def compile_ahead(forms: Sequence[Any]) -> list[Any]:
     if not ALONE:
         return [None] * len(forms)
     _wait()
-    with compat.quiet():
+    with compat.compilation():
         return [form for group in _groups(forms) for form in _compiled_or_begun(group)]
 
 

@@ -108,18 +108,20 @@ class Shape:
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
 
-        The least value at many points picks an element and a place; Newton's method finds the minimum of the polynomial
-        nearby.
+        The least value at many points picks a place in each element that may hold it, on whatever rank: one whose least
+        value is above that of the rod by less than a change between neighbours.  Newton's method finds the minimum of
+        the polynomial nearby.
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
         nodal = self.system.at(x).values("v")[self.cells, :, -1]
         samples = nodal @ self._v_at_samples.T
-        cell, place = divmod(int(samples.argmin()), samples.shape[1])
-        spacing = 2.0 / (samples.shape[1] - 1)
-        turn = minimum((self._v_to_powers @ nodal[cell]).tolist(), -1.0 + spacing * place, spacing)
-        mine, comm = min(float(samples[cell, place]), turn), self.system.comm
-        return mine if comm.size == 1 else float(comm.allreduce(mine, op=MPI.MIN))
+        lowest, comm, spacing = samples.min(axis=1), self.system.comm, 2.0 / (samples.shape[1] - 1)
+        least = comm.allreduce(float(lowest.min()), op=MPI.MIN)
+        near = lowest - least < abs(np.diff(samples)).max(axis=1)
+        powers, begin = nodal[near] @ self._v_to_powers.T, -1.0 + spacing * samples[near].argmin(axis=1)
+        turns = [minimum(p, t, spacing) for p, t in zip(powers.tolist(), begin.tolist(), strict=True)]
+        return float(comm.allreduce(min([least, *turns]), op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
         """All of a state in natural order on every rank, independent of the number of ranks.

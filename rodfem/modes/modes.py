@@ -21,6 +21,7 @@ Symmetry modes, whose eigenvalue is zero for a reason, come after the others.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,7 +30,7 @@ import h5py
 import numpy as np
 
 from rodfem.errors import Argument, InputError
-from rodfem.file_format import MODES, UNREADABLE
+from rodfem.file_format import MODES
 from rodfem.problem.arguments import checked, count, text
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
@@ -147,22 +148,17 @@ def save_modes(
 @checked(path=argument_path("results/column/modes.h5"), branch=text("straight"), row=count(0))
 def load_modes(path: Path | str, branch: str, row: int) -> Modes:
     """Modes of a saved state; raises :class:`InputError` where the file has none, or has another or a newer format."""
-    try:
-        with h5py.File(path, "r") as file:
-            MODES.check_hdf5(file, ("branches",))
-            group = file[f"branches/{branch}/{row}"]
-            names = [name for name in Modes.__dataclass_fields__ if name != "note"]
-            if missing := [name for name in names if name not in group]:
-                raise InputError(
-                    f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another "
-                    "version of rodfem wrote it; run the scene again."
-                )
-            arrays = {name: group[name][()] for name in names if name != "motion"}
-            motion, note = tuple(group["motion"].asstr()[()]), str(group.attrs.get("note", ""))
-    except UNREADABLE as trouble:
-        if isinstance(trouble, InputError):
-            raise
-        raise InputError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
+    unfit = f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(Path(path))}."
+    with MODES.opened(path, ("branches",), unfit) as file:
+        group = file[f"branches/{branch}/{row}"]
+        names = [name for name in Modes.__dataclass_fields__ if name != "note"]
+        if missing := [name for name in names if name not in group]:
+            raise InputError(
+                f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another version "
+                "of rodfem wrote it; run the scene again."
+            )
+        arrays = {name: group[name][()] for name in names if name != "motion"}
+        motion, note = tuple(group["motion"].asstr()[()]), str(group.attrs.get("note", ""))
     _check_arrays(arrays, motion, path)
     arrays["load"] = float(arrays["load"])
     return Modes(motion=motion, note=note, **arrays)
@@ -187,33 +183,28 @@ def rows_with_modes(path: Path) -> list[tuple[str, int]]:
     """Branches and rows that a file has modes of, none without a file; raises :class:`InputError` if it is unfit."""
     if not path.exists():
         return []
-    try:
-        with h5py.File(path, "r") as file:
-            MODES.check_hdf5(file, ("branches",))
-            return [(name, int(row)) for name, rows in file["branches"].items() for row in rows]
-    except UNREADABLE as trouble:
-        raise InputError(f"{path} is no {MODES.name} ({trouble}): give {MODES.file}.") from trouble
+    with MODES.opened(path, ("branches",)) as file:
+        return [(name, int(row)) for name, rows in file["branches"].items() for row in rows]
 
 
 def load_setting(path: Path, branch: str, row: int) -> Setting:
     """Supports and loads of the rod whose modes are in a file, as far as it has them."""
-    with h5py.File(path, "r") as file:
+    with MODES.opened(path) as file:
         return read(file[f"branches/{branch}/{row}"])
 
 
 def heading(path: Path) -> str:
     """Title of the rod whose modes a file has, to begin a caption with."""
-    with h5py.File(path, "r") as file:
+    with MODES.opened(path) as file:
         return f"{file.attrs['title']}, " if "title" in file.attrs else ""
 
 
-def _contents(path: Path | str) -> str:
+def _contents(path: Path) -> str:
     """Contents of a file of modes, in words."""
-    try:
-        with h5py.File(path, "r") as file:
-            return "it has " + "; ".join(f"{name}, row {', '.join(rows)}" for name, rows in file["branches"].items())
-    except UNREADABLE:
-        return f"run a scene with {Argument('Plan', 'modes')} and {Argument('Plan', 'at')}"
+    with suppress(InputError):
+        if found := rows_with_modes(path):
+            return "it has " + "; ".join(f"{name}, row {row}" for name, row in found)
+    return f"run a scene with {Argument('Plan', 'modes')} and {Argument('Plan', 'at')}"
 
 
 class Few(NamedTuple):

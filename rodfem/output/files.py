@@ -25,7 +25,7 @@ from rodfem.continuation.branch import Branch, not_followed
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import InputError
 from rodfem.fem.system import System
-from rodfem.file_format import DIAGRAM, STATES, UNREADABLE, read_json
+from rodfem.file_format import DIAGRAM, STATES, read_json, refusal
 from rodfem.modes.modes import Typical, write_typical
 from rodfem.modes.perturbation import Motion, Motions
 from rodfem.output.table import COLUMNS, branch_data
@@ -270,29 +270,20 @@ def load_state(path: Path, branch: str, row: int, solver: BranchSolver) -> PETSc
             f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
             "another scene, or by another version of rodfem; run the scene again."
         )
-    try:
+    with refusal(
+        f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({{}}): run the "
+        "scene again."
+    ):
         return solver.shape.restore(sample)
-    except UNREADABLE as trouble:
-        raise InputError(
-            f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
-            "run the scene again."
-        ) from trouble
 
 
 def _sample(path: Path, branch: str, row: int, formulation: str) -> dict[str, Any]:
     """Arrays of a row of a file, whose states have to be of a formulation."""
     import h5py
 
-    try:
-        with h5py.File(path, "r") as file:
-            STATES.check_hdf5(file, ("formulation", "branches"))
-            found, group = file.attrs["formulation"], file[f"branches/{branch}"]
-            if found != formulation:
-                raise InputError(f"{path} holds states of the {found} formulation: choose that, not {formulation}.")
-            return {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
-    except UNREADABLE as trouble:
-        if isinstance(trouble, InputError):
-            raise
-        raise InputError(
-            f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json next to it."
-        ) from trouble
+    unfit = f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json next to it."
+    with STATES.opened(path, ("formulation", "branches"), unfit) as file:
+        found, group = file.attrs["formulation"], file[f"branches/{branch}"]
+        if found != formulation:
+            raise InputError(f"{path} holds states of the {found} formulation: choose that, not {formulation}.")
+        return {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}

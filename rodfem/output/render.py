@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.errors import InputError
-from rodfem.file_format import STATES, UNREADABLE
+from rodfem.file_format import STATES
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.solids import Glyph, Solid, striped
 from rodfem.output.states import curve_at
@@ -144,25 +144,17 @@ class State:
 
 def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
     """Read a state of a file, interpolated at ``count`` places; raises ValueError where there is none."""
-    import h5py
-
-    try:
-        with h5py.File(states, "r") as file:
-            STATES.check_hdf5(file, ("branches", "parameter", "scene"))
-            group = _group(file["branches"], branch, row, states)
-            load = float(group["load"][row])
-            symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
-            first = file["branches"][file.attrs.get("first", branch)]
-            left = 0 if first == group else int(np.argmin(abs(first["load"][:] - load)))
-            s, centres, turned = curve_at(group, row, count)
-            reference, setting = curve_at(first, left, count)[1], read_setting(group, row)
-            caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
-            return State(s, centres, directors(turned), reference, setting, caption)
-    except UNREADABLE as error:
-        if isinstance(error, InputError):
-            raise
-        reason = "expected HDF5 with s and branches" if states.exists() else "no such file"
-        raise ValueError(f"cannot read {states}, {reason}: try the states.h5 of a scene") from error
+    unfit = f"cannot read {states} ({{}}): try the states.h5 of a scene"
+    with STATES.opened(states, ("branches", "parameter", "scene"), unfit) as file:
+        group = _group(file["branches"], branch, row, states)
+        load = float(group["load"][row])
+        symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
+        first = file["branches"][file.attrs.get("first", branch)]
+        left = 0 if first == group else int(np.argmin(abs(first["load"][:] - load)))
+        s, centres, turned = curve_at(group, row, count)
+        reference, setting = curve_at(first, left, count)[1], read_setting(group, row)
+        caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
+        return State(s, centres, directors(turned), reference, setting, caption)
 
 
 def _group(branches: Any, branch: str, row: int, states: Path) -> Any:
@@ -279,7 +271,7 @@ def draw_shape_safely(
     in seconds that it may take.  Returns None where the picture was written, else a sentence that says what failed and
     what to do.
     """
-    command = [sys.executable, "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
+    command = [sys.executable, "-P", "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
     command += [f"--{key}={value}" for key, value in {"output": path, **options}.items() if value is not None]
     environment = {key: value for key, value in os.environ.items() if not key.startswith(MPI_VARIABLES)}
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(HOME), os.environ.get("PYTHONPATH")]))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rodfem.errors import InputError
-from rodfem.file_format import DIAGRAM, STATES, UNREADABLE, read_json
+from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.problem.quaternions import directors
 from rodfem.tolerances import same_place
 
@@ -49,19 +49,12 @@ def rows_of(folder: Path) -> Iterator[Rows]:
     import h5py
 
     data, path = read_json(folder / "diagram.json", DIAGRAM, ("branches",)), folder / "states.h5"
-    try:
-        with h5py.File(path, "r") as file:
-            STATES.check_hdf5(file, ("branches",))
-            for branch in data["branches"]:
-                group = file["branches"][branch["name"]]
-                stored = {name: np.asarray(x) for name, x in group.items() if isinstance(x, h5py.Dataset)}
-                yield Rows(branch["name"], _columns(branch["columns"], stored), _fields(stored))
-    except UNREADABLE as trouble:
-        if isinstance(trouble, InputError):
-            raise
-        raise InputError(
-            f"{path} does not hold the states of diagram.json next to it: run the scene again."
-        ) from trouble
+    unfit = f"{path} does not hold the states of diagram.json next to it ({{}}): run the scene again."
+    with STATES.opened(path, ("branches",), unfit) as file:
+        for branch in data["branches"]:
+            group = file["branches"][branch["name"]]
+            stored = {name: np.asarray(x) for name, x in group.items() if isinstance(x, h5py.Dataset)}
+            yield Rows(branch["name"], _columns(branch["columns"], stored), _fields(stored))
 
 
 def _columns(columns: Mapping[str, list[Any]], stored: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -79,6 +72,7 @@ def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
     s, out = stored["s"], dict[str, list[Floats]]()
     others = {POINTS, *PROFILES, *PROFILES.values()}
     nodal = {name: x for name, x in stored.items() if x.shape[:2] == s.shape and name not in others}
+    nodal |= {name: stored[name] for name in ("r", "q")}
     for row, there in enumerate(np.isfinite(s)):
         here = {name: x[row, there] for name, x in nodal.items()}
         frames = directors(here["q"])
@@ -132,14 +126,8 @@ def profiles_of(group: Mapping[str, Any], row: int) -> Profiles:
 
 def check_run(data: dict[str, Any], states: Path) -> None:
     """Raise :class:`InputError` where ``states.h5`` is of another run than the ``data`` of a ``diagram.json``."""
-    import h5py
-
-    try:
-        with h5py.File(states, "r") as file:
-            STATES.check_hdf5(file)
-            run = file.attrs.get("run")
-    except OSError as trouble:
-        raise InputError(f"{states} is no {STATES.name} ({trouble}): give {STATES.file}.") from trouble
+    with STATES.opened(states) as file:
+        run = file.attrs.get("run")
     if run != data.get("run"):
         raise InputError(
             f"{states} and the diagram.json next to it are of different runs: keep the files of one run together, or "

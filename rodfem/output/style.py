@@ -18,7 +18,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import offset_copy
 
-from rodfem.errors import InputError
+from rodfem.errors import InputError, printable
 from rodfem.file_format import UNREADABLE
 from rodfem.output.digits import with_unit
 from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE
@@ -171,9 +171,9 @@ def status_of(draw: Callable[[], Path], what: Path) -> int:
     try:
         print(draw())
     except (ImportError, RuntimeError, ValueError, OSError) as error:
-        print(str(error).split("\n", 1)[0], file=sys.stderr)
+        print(printable(str(error).split("\n", 1)[0]), file=sys.stderr)
     except UNREADABLE as error:  # of matplotlib, h5py or numpy
-        print(f"cannot draw {what} ({error!r}): give the file that a run has written", file=sys.stderr)
+        print(printable(f"cannot draw {what} ({error!r}): give the file that a run has written"), file=sys.stderr)
     else:
         return 0
     return 2

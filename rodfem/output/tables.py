@@ -12,7 +12,7 @@ from rodfem.continuation.branch import COLUMNS, Branch
 from rodfem.file_format import DIAGRAM, read_json
 from rodfem.libraries import optional
 from rodfem.output.states import Rows, rows_of
-from rodfem.stability.soft_mode import is_stable
+from rodfem.stability.soft_mode import is_stable, stability
 
 Columns = Mapping[str, np.ndarray]
 VECTORS = {
@@ -45,8 +45,11 @@ def of_files(folder: Path) -> Any:
 def _columns(rows: Rows, branch: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Columns of a branch in files, nan where there is none; files leave out what is decided all along."""
     none, columns = [None] * len(rows.columns["load"]), branch["columns"]
-    parts = [columns.get(name) or none for name in ("negative", "undecided", "kink")]
-    stable = [is_stable(negative, undecided or 0, kink or "") for negative, undecided, kink in zip(*parts, strict=True)]
+    parts = [columns.get(name) or none for name in ("negative", "undecided", "kink", "uncompared", "negative_in_space")]
+    stable = [
+        is_stable(stability(negative, undecided or 0, kink or uncompared or "", in_space))
+        for negative, undecided, kink, uncompared, in_space in zip(*parts, strict=True)
+    ]
     known = (
         {"undecided": np.zeros(len(none))}
         | rows.columns

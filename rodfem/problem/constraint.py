@@ -35,7 +35,7 @@ class Constraint(Contribution):
     def __post_init__(self) -> None:
         """Check the place; raises :class:`InputError`."""
         if self.s is not None:
-            finite("s", self.s, 0.5)
+            object.__setattr__(self, "s", finite("s", self.s, 0.5))
 
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """One scalar multiplier."""

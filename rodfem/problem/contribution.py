@@ -204,7 +204,7 @@ class Attachment(Contribution):
 
     def __post_init__(self) -> None:
         """Check the place, and that there is something; raises :class:`InputError`."""
-        finite("s", self.s, 0.5)
+        object.__setattr__(self, "s", finite("s", self.s, 0.5))
         if all(value is None for name, value in vars(self).items() if name != "s"):
             raise InputError(
                 f"Nothing is attached at s = {self.s:g}: give the attachment a force, a follower force, an energy, a "

@@ -11,7 +11,7 @@ import ufl
 
 from rodfem.errors import SceneError
 from rodfem.forms import loads
-from rodfem.problem.arguments import check_vector, plain, yes_or_no
+from rodfem.problem.arguments import check_vector, number_of, plain, yes_or_no
 from rodfem.problem.contribution import (
     DEAD_AT_END,
     FOLLOWER,
@@ -29,6 +29,7 @@ from rodfem.problem.contribution import (
 )
 from rodfem.problem.roles import Role, role_field
 from rodfem.problem.setting import AXIS, HELD, TURNS
+from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants, Given, OfPlace, Quaternion
@@ -162,15 +163,26 @@ class End(Contribution):
             check_vector(f"hinge of the {side} end", self.hinge, 3)
             if not 0 < np.linalg.norm(_numbers(f"hinge of the {side} end", self.hinge)) < np.inf:
                 raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
-        if len(self.fixed(scene.constants())) == 3 and (self.force or self.follower):
-            raise SceneError(
-                f"A force acts on the {side} end, whose position is held: leave it out, or leave the position free in "
-                "one direction."
-            )
+        self._check_force(side, scene)
         if self.fixed_rotation is not None and (self.moment or self.follower_moment):
             raise SceneError(
                 f"A moment acts on the {side} end, whose directors are held: leave its rotation free, or use a hinge."
             )
+
+    def _check_force(self, side: str, scene: Scene) -> None:
+        for c in map(scene.constants, scene.loads()):
+            fixed = self.fixed(c)
+            if len(fixed) == 3 and (self.force or self.follower):
+                raise SceneError(
+                    f"A force acts on the {side} end, whose position is held: leave it out, or leave the position free "
+                    "in one direction."
+                )
+            force = np.array([0.0] * 3 if self.force is None else [number_of(x) for x in self.force(c)])
+            if (abs(fixed @ force) > NEGLIGIBLE * np.linalg.norm(force)).any():
+                raise SceneError(
+                    f"A force acts on the {side} end in a direction in which its position is held: leave that "
+                    "component out, or leave the position free there."
+                )
 
     def _check_rotation(self, side: str, scene: Scene, c: Constants) -> None:
         rotation = self.frame(c)

@@ -12,7 +12,10 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import wraps
 from logging import getLogger
+from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from rodfem.errors import SceneError
 
@@ -116,7 +119,7 @@ def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
         silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True  # what it prints is in what it raises
         try:
             value = function(*arguments) if role.placed else function(*map(Placeless, arguments))
-            return value if role.returns is None else role.returns(value)
+            return in_floats(value) if role.returns is None else role.returns(value)
         except UnnamedError as trouble:
             raise SceneError(f"The {what} {trouble}") from None
         except SceneError:
@@ -131,6 +134,16 @@ def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
 
     call.guards = what  # type: ignore[attr-defined]
     return call
+
+
+def in_floats(value: Any) -> Any:
+    """Replace fractions and numbers of numpy by floats, in tuples, lists and arrays, too, which UFL does not know."""
+    if type(value) in (tuple, list):
+        floats = type(value)(map(in_floats, value))
+        return value if all(a is b for a, b in zip(floats, value, strict=True)) else floats
+    if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
+        return value.astype(float, copy=False)
+    return float(value) if isinstance(value, Real) and not isinstance(value, (int, float)) else value
 
 
 def derived(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
@@ -177,7 +190,7 @@ def _visited(owner: Any, declared: Any, value: Any, visit: Visit, place: str) ->
     if role is not None:
         role = role if isinstance(role, Role) else role(owner)
         if role.or_value and not callable(value):
-            return value
+            return in_floats(value)
         return visit(role.words.format(place), value, role)
     if is_object(value):
         return _changed(value, visit, place)

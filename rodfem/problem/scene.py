@@ -62,9 +62,9 @@ class Parameter:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        """Check the kinds; raises :class:`InputError`."""
-        real("value", self.value, 1.0)
-        reals("admissible", self.admissible, (0.0, inf), 2)
+        """Check the kinds, and have floats; raises :class:`InputError`."""
+        object.__setattr__(self, "value", real("value", self.value, 1.0))
+        object.__setattr__(self, "admissible", reals("admissible", self.admissible, (0.0, inf), 2))
         for name in ("label", "words", "unit"):
             text("P")(name, getattr(self, name))
 
@@ -148,7 +148,7 @@ class Ordinate:
         for name in ("name", "label", "unit"):
             text("tip")(name, getattr(self, name))
         if self.s is not None:
-            finite("s", self.s, 1.0)
+            object.__setattr__(self, "s", finite("s", self.s, 1.0))
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -275,6 +275,7 @@ class Scene(Contribution, metaclass=Stated):
             object.__setattr__(self, field_name, value)
         for pair in ("interval", "span"):
             object.__setattr__(self, pair, reals(pair, getattr(self, pair), (0.0, 1.0), 2))
+        object.__setattr__(self, "breaks", tuple(map(float, self.breaks)))
         named = {n: p if isinstance(p, Parameter) else Parameter(p) for n, p in self.parameters.items()}
         object.__setattr__(self, "parameters", named)
         self._check_values()

@@ -11,7 +11,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.arguments import number_of
 from rodfem.problem.end import SIDES
 from rodfem.problem.local_state import STATES, asked_for, asks_where, floats, functions_of_places
-from rodfem.problem.trials import check_functions
+from rodfem.problem.trials import check_functions, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -55,6 +55,13 @@ def check_load(scene: Scene) -> None:
 
 def check_ordinate(scene: Scene) -> None:
     """Raise :class:`SceneError` if the ordinate at a point is no number in any state; it may be undefined in one."""
+    values = ordinates(scene)
+    if values and not any(map(isfinite, values)):
+        raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
+
+
+def ordinates(scene: Scene) -> list[float]:
+    """Values of an ordinate at a point in the trial states in which it has one; raises :class:`SceneError`."""
     values = []
     for q, r, *_ in STATES if scene.ordinate.places else ():
         try:
@@ -62,8 +69,22 @@ def check_ordinate(scene: Scene) -> None:
         except SceneError as trouble:
             if isinstance(trouble.__cause__, (TypeError, LookupError, AttributeError, NameError)):
                 raise
-    if values and not any(map(isfinite, values)):
-        raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
+    return values
+
+
+def statement(scene: Scene) -> str:
+    """Numbers, expressions and trial ordinates of a scene, in which two that state one rod agree."""
+    numbers = (
+        scene.name,
+        scene.interval,
+        scene.rod,
+        scene.parameters,
+        scene.load,
+        scene.span,
+        scene.breaks,
+        scene.planar,
+    )
+    return repr((numbers, [part.s for part in scene.parts], ordinates(scene), list(map(str, expressions_of(scene)))))
 
 
 def check_start(scene: Scene) -> None:

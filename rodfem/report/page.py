@@ -21,8 +21,7 @@ from typing import Any
 
 import h5py
 
-from rodfem.errors import InputError
-from rodfem.file_format import DIAGRAM, STATES, UNREADABLE, read_json
+from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.output.digits import with_unit
 from rodfem.output.states import check_run
 from rodfem.output.style import mesh_in_words, ordinate_in_words
@@ -35,7 +34,17 @@ STATIC = files("rodfem.report") / "static"
 LIBRARIES = {"three": "three.module.min.js", "three/orbit": "OrbitControls.js"}
 PLACE = re.compile(r"\{\{(\w+)\}\}")
 """A place in the template."""
-NEEDED = ("parameter", "parameter_label", "constants", "branches", "meshes", "discretization", "ordinate", "range")
+NEEDED = (
+    "scene",
+    "parameter",
+    "parameter_label",
+    "constants",
+    "branches",
+    "meshes",
+    "discretization",
+    "ordinate",
+    "range",
+)
 
 
 @dataclass(frozen=True)
@@ -121,14 +130,9 @@ def payload_of(folder: Path) -> dict[str, Any]:
     """Everything that the page of a folder shows; raises :class:`InputError` where its files are unfit."""
     data = read_json(folder / "diagram.json", DIAGRAM, NEEDED)
     check_run(data, folder / "states.h5")
-    try:
-        with h5py.File(folder / "states.h5", "r") as file:
-            STATES.check_hdf5(file, ("branches",))
-            return _about(data, folder) | rods_of(data, Loaded(file["branches"]), folder)
-    except UNREADABLE as trouble:
-        if isinstance(trouble, InputError):
-            raise
-        raise InputError(f"The files in {folder} do not belong together ({trouble}): run the scene again.") from trouble
+    unfit = f"The files in {folder} do not belong together ({{}}): run the scene again."
+    with STATES.opened(folder / "states.h5", ("branches",), unfit) as file:
+        return _about(data, folder) | rods_of(data, Loaded(file["branches"]), folder)
 
 
 def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:

@@ -49,7 +49,7 @@ class Judgement:
 def stability(negative: int, undecided: int, doubt: str = "", in_space: int | None = None) -> str:
     """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`: the one decision that all words follow.
 
-    ``negative`` is the index, or the number of unstable frequencies, ``undecided`` eigenvalues may be negative besides;
+    ``negative`` is the index, or the number of unstable frequencies, ``undecided`` eigenvalues may be negative as well;
     ``in_space`` is the index among all perturbations of a planar rod (None: unknown).  In ``doubt``, as on a kink or
     where a richer mesh has no such state, an index is no decision.
     """

@@ -69,6 +69,7 @@ def test_a_file_with_a_rod(text: str, tmp_path: Path, capsys: pytest.CaptureFixt
         (FUNCTION.replace("EI: float = 1", "EI=None"), "The argument EI of column has the default None"),
         (FUNCTION.replace("EI: float = 1", "degree=1, EI=1.0"), "has the name of an option of all rods"),
         (FUNCTION.replace("return Scene(", "return (lambda **_: 3)("), "column returns 3"),
+        (FUNCTION.replace("return Scene(", "raise KeyError('x'); return Scene("), "KeyError: 'x'; correct column, or"),
         (SCENE + "exit(0)", "line 16: SystemExit: 0"),
     ],
 )

@@ -18,6 +18,7 @@ from rodfem import compat
 from rodfem.errors import SetupError
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
+from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 
 pytestmark = pytest.mark.versions
@@ -158,6 +159,24 @@ def test_forms_are_compiled_beside_this_process(folder: Path, monkeypatch: pytes
         form_compiler.compile_forms([x**4 * ufl.dx])
 
 
+@pytest.mark.alone
+def test_options_in_the_current_folder_change_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files that FFCx and dolfinx read would change what is compiled, and one that is no JSON would end the run."""
+    monkeypatch.chdir(folder)
+    for module, reader in compat._OPTION_FILES:
+        getattr(module, reader).cache_clear()
+    (folder / "ffcx_parameters.json").write_text('{"epsilon": 0.05, "table_rtol": 0.05}')
+    (folder / "ffcx_options.json").write_text('{"epsilon": 0.05, "table_rtol": 0.05}')
+    for name in ("parameters", "options"):
+        (folder / f"dolfinx_jit_{name}.json").write_text("no JSON")
+    said: list[str] = []
+    with form_compiler.announce_compilation(lambda: said.append("compiling")):
+        System(scene(), Discretization("reduced", 9, 6))
+    for module, reader in compat._OPTION_FILES:
+        getattr(module, reader).cache_clear()
+    assert (said, len(compat._OPTION_FILES)) == ([], 2)
+
+
 @pytest.mark.short
 def test_complex_petsc_gives_one_sentence(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
@@ -171,3 +190,16 @@ def test_complex_petsc_gives_one_sentence(
     out, err = capfd.readouterr()
     if COMM.rank == 0:
         assert (out, err.count("\n"), err[:7]) == ("", 1, "error: ")
+
+
+@pytest.mark.short
+def test_least_stretch_is_that_of_all_elements() -> None:
+    """Of equal waves, which elements have at other places between their samples; on whatever number of ranks."""
+    system = System(scene(), Discretization("reduced", 7, 6))
+    shape, fields = Shape(system), system.fields
+    strains = np.zeros((*fields.dofs["v"].shape[:2], len(system.scene.free_strains)))
+    strains[..., -1] = 1.0 + 0.1 * np.cos(4.9 * fields.coordinates(5))
+    state = system.vector(fields.filled({"v": strains}))
+    fine = compat.lagrange_basis(5, np.linspace(0, 1, 4001))
+    values = system.at(state).values("v")[shape.cells, :, -1] @ fine.T
+    assert abs(shape.stretch(state) - COMM.allreduce(values.min(), op=MPI.MIN)) < 1e-7

@@ -82,7 +82,11 @@ def test_a_kill_at_any_moment(folder: Path, diagrams: tuple[Diagram, Diagram]) -
     """Files are those of one run, all that was finished is there, and the next run finds no drafts."""
     earlier, later = diagrams
     earlier.save(folder / "earlier")
-    (folder / "earlier" / "diagram.png").write_bytes(b"an earlier picture")
+    named = load_json(folder / "earlier" / "diagram.json") | {"files": ["diagram.png", "notes.txt", "../x.png"]}
+    (folder / "earlier" / "diagram.json").write_text(json.dumps(named))
+    own = ("notes.txt", "modes-mine.png", "locus-1.json", ".mine.part.tex", "report.html")
+    for name in ("diagram.png", *own):
+        (folder / "earlier" / name).write_bytes(b"an earlier picture, or a file of a person")
     status, moment, states, between = KILLED, 0, set(), 0
     while status == KILLED:
         here = folder / "killed"
@@ -99,6 +103,7 @@ def test_a_kill_at_any_moment(folder: Path, diagrams: tuple[Diagram, Diagram]) -
             continue
         assert data["run"] == (later.run if finished else data["run"])
         assert (here / "diagram.png").exists() <= (data["run"] == earlier.run)
+        assert all((here / name).exists() for name in own)
         with h5py.File(here / "states.h5") as file:
             for branch in data["branches"]:
                 assert file[f"branches/{branch['name']}/load"][:].tolist() == branch["columns"]["load"]
@@ -136,7 +141,12 @@ def test_a_full_disk(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     room = (folder / "states.h5").stat().st_size // 2  # less than a file of states needs; a compiled form has it
     before = {file.name: file.read_bytes() for file in folder.iterdir()}
     COMM.barrier()
-    with files_of_at_most(room), pytest.raises(InputError, match=r"cannot be written \(File too large\): choose"):
+    with (
+        files_of_at_most(room),
+        pytest.raises(
+            InputError, match=r"^The output folder \S+ cannot be written \(File too large\): choose [^()]+\S+$"
+        ),
+    ):
         later.save(folder)
     with (
         files_of_at_most(room),
@@ -192,7 +202,7 @@ def test_a_second_run_in_a_folder(folder: Path, diagrams: tuple[Diagram, Diagram
         lambda: rodfem.many([diagrams[0].scene], lambda scene: {}, folder),
         lambda: diagrams[0].save(folder),
     ):
-        with pytest.raises(InputError, match=rf"in use by process {holder} on \S+: choose another one with run.output"):
+        with pytest.raises(InputError, match=rf"^The output folder \S+ is in use by process {holder} on"):
             refused()
     if COMM.rank == 0:
         os.kill(holder, signal.SIGKILL)

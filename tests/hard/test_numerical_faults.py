@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,7 @@ from rodfem.app.run import run
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.diagram.diagram import Diagram
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 MESH, PLAN = rodfem.Discretization("reduced", 8, 6), rodfem.Plan((0.0, 0.35), depth=1)
@@ -165,3 +167,31 @@ def test_many_rods_go_on(folder: Path) -> None:
     found = many(rods, work, folder, MPI.COMM_WORLD)
     assert [r.get("done") for r in found] == [True, None, True]
     assert found[1]["error"].startswith("Memory is exhausted")
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("name", ["constant", "number", "ordinate", "discretisation", "plan"])
+def test_ranks_with_different_input(name: str) -> None:
+    """One sentence on every rank that names what differs."""
+    own, rod = MPI.COMM_WORLD.rank, scene(span=(0.0, 0.1))
+    energy, of = rod.energy, rod.ordinate.of
+    scenes = {
+        "constant": lambda: rod.varying(A=-3.0 + 0.1 * own),
+        "number": lambda: replace(rod, energy=lambda v, k, c: energy(v, k, c) + 0.1 * own * k[0] ** 2),
+        "ordinate": lambda: replace(rod, ordinate=replace(rod.ordinate, of=lambda r, q: own + of(r, q))),
+    }
+    stated, what = (scenes[name](), "scene") if name in scenes else (rod, name)
+    mesh = rodfem.Discretization("reduced", 8 + own * (name == "discretisation"), 6)
+    plan = rodfem.Plan(depth=own * (name == "plan"), error_bars=False)
+    several = MPI.COMM_WORLD.size > 1
+    with pytest.raises(InputError, match=rf"different input \({what}\)") if several else nullcontext():
+        rodfem.trace(stated, mesh, plan)
+
+
+def test_an_ordinate_that_is_no_number() -> None:
+    """It is one in the trial states, and none in those of the branch."""
+    rod = scene(span=(0.0, 0.1))
+    rod = replace(rod, ordinate=replace(rod.ordinate, of=lambda r, q: 0.0 if abs(q[1]) > 1e-3 else np.nan))
+    diagram = rodfem.trace(rod, MESH, rodfem.Plan(depth=0, error_bars=False))
+    sentence = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
+    assert diagram.warnings == [f"straight: at lam = 0 {sentence}"]

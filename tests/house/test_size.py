@@ -14,10 +14,10 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 34879,
+    "lines of Python": 35273,
     "files of Python": 184,
     "lines of C": 957,
-    "module constants with a number": 387,
+    "module constants with a number": 388,
     "functions of a complexity above 10": 47,
     "functions of six parameters or more": 21,
     "places that warn": 32,

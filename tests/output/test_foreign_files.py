@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +14,14 @@ import h5py
 import hemitropic_cases
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import rodfem
 from rodfem import Discretization, Plan
+from rodfem.app import console
 from rodfem.errors import InputError
 from rodfem.output import plot_diagram, plot_modes, render
+from rodfem.whole_files import draft_of, locked
 
 pytestmark = pytest.mark.alone
 SCENE = hemitropic_cases.scene(span=(0.0, 0.1))
@@ -170,6 +175,90 @@ def test_modes(name: str, value: Any, bad: Path, capfd: Any) -> None:
         sentence = refused(read, capfd)
         assert "modes.h5" in sentence
         assert "\n" not in sentence
+
+
+def larger_than_memory(file: h5py.File) -> None:
+    del file[f"{HERE}/r"]
+    file.create_dataset(f"{HERE}/r", shape=(200_000, 20_000, 3), chunks=(1000, 100, 3), compression="gzip")
+
+
+def without(name: str) -> Callable[[h5py.File], None]:
+    return lambda file: file.__delitem__(name)
+
+
+def entries(folder: Path, *path: str | int, to: Any = ...) -> None:
+    data = json.loads((folder / "diagram.json").read_text())
+    changed(*path, to=to)(data)
+    (folder / "diagram.json").write_text(json.dumps(data))
+
+
+def fifo(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+PROGRAMS: list[tuple[Callable[[Path], None], str, str]] = [
+    (lambda bad: spoil(bad / "states.h5", larger_than_memory), "view convert load", "a part of the array branches/"),
+    (lambda bad: spoil(bad / "states.h5", without(f"{HERE}/r")), "view convert", "'r'"),
+    (lambda bad: spoil(bad / "states.h5", put(f"{HERE}/s", np.zeros((50, 49)))), "view", "states.h5"),
+    (lambda bad: entries(bad, "scene"), "info list view", "has no scene"),
+    (lambda bad: entries(bad, "branches", 0, "columns", "negative"), "info list", "'negative'"),
+    (lambda bad: entries(bad, "meshes", to=[3]), "info", "diagram.json"),
+    (lambda bad: fifo(bad / "diagram.json"), "info list view convert load", "diagram.json"),
+    (lambda bad: fifo(bad / "states.h5"), "view convert load", "states.h5"),
+]
+
+
+@pytest.mark.parametrize(("change", "commands", "words"), PROGRAMS)
+def test_programs(change: Callable[[Path], None], commands: str, words: str, bad: Path, capfd: Any) -> None:
+    """A sentence without a wait: nothing is read that is larger than its file, or no file."""
+    change(bad)
+    for command in commands.split():
+        if command == "load":
+            with pytest.raises(InputError, match=words):
+                rodfem.load(bad, SCENE)
+            continue
+        with pytest.raises(SystemExit) if command != "list" else nullcontext():
+            console.main([command, str(bad), *["--no-open"] * (command == "view")])
+        out, err = capfd.readouterr()
+        said = out.split("\n", 1)[1] if command == "list" else err
+        assert said.count("\n") == 1 and words in said and (command == "list" or said.startswith("error: "))
+
+
+@pytest.mark.parametrize("name", ["title", "scene"])
+def test_control_characters_do_not_reach_the_terminal(name: str, bad: Path, capfd: Any) -> None:
+    entries(bad, name, to="\x1b]0;a title\x07\x9b\ud800")
+    for command in ("info", "list"):
+        console.main([command, str(bad)])
+    entries(bad, "format", "name", to="\x1b[2J")
+    with pytest.raises(SystemExit):
+        console.main(["info", str(bad)])
+    out, err = capfd.readouterr()
+    assert r"\x1b]0;a title\x07\x9b\ud800" in out and r"\x1b[2J" in err.replace(r"\\", "\\")
+    assert not set(out + err) & set(map(chr, [*range(10), *range(11, 32), *range(127, 160)]))
+
+
+def test_links_out_of_a_folder(bad: Path, tmp_path: Path) -> None:
+    """What is written takes the place of a link, whatever it points at."""
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+    (bad / "csv").mkdir()
+    for place in ("report.html", "csv/rows.csv"):
+        with draft_of(bad / place) as draft:
+            draft.write_text("")
+        draft.symlink_to(mine)
+        (bad / place).unlink()
+        (bad / place).symlink_to(mine)
+    console.main(["view", str(bad), "--no-open"])
+    console.main(["convert", str(bad), "--to", "csv"])
+    assert not any((bad / place).is_symlink() for place in ("report.html", "csv/rows.csv"))
+    (bad / "vtkhdf").symlink_to(tmp_path)
+    with pytest.raises(SystemExit):
+        console.main(["convert", str(bad)])
+    (bad / ".lock").symlink_to(mine)
+    with pytest.raises(InputError, match="cannot be written"), locked(bad, MPI.COMM_SELF):
+        pass
+    assert mine.read_text() == "mine"
 
 
 def test_results_of_many(tmp_path: Path) -> None:

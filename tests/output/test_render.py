@@ -205,6 +205,13 @@ def test_only_what_holds_an_end_is_drawn(folder: Path, kind: str) -> None:
     assert not colors(old(file))
 
 
+def test_a_picture_imports_nothing_from_the_current_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    (folder / "json.py").write_text("open('ran', 'w')")
+    assert "No such file" in str(draw_shape_safely(Path("states.h5"), "straight", 0, folder / "shape.png"))
+    assert not (folder / "ran").exists()
+
+
 @pytest.mark.long
 def test_picture_shows_a_clamp_where_there_is_one(folder: Path) -> None:
     """Pixels: a grey block at the left end, and none at the free end."""

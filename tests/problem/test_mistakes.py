@@ -33,6 +33,7 @@ from rodfem import (
     free,
     hinged,
     integral,
+    pinned,
     section,
     sliding_hinge,
 )
@@ -96,6 +97,11 @@ def stiff(b: Any, k: Any) -> Any:
 
 
 SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
+    # forces that do no work
+    (
+        {"ends": (pinned(), pinned(lambda c: (0, 0, None), lambda c: (1 + c.P, 0, -c.P)))},
+        "A force acts on the right end in a direction in which its position is held",
+    ),
     # names, numbers, pairs
     ({"title": 3}, "title is 3"),
     *(
@@ -285,6 +291,10 @@ def test_a_constant_is_a_function_of_the_constants() -> None:
         {"name": "a b \N{GREEK SMALL LETTER LAMDA}"},
         {"interval": [0, np.int64(1)], "span": np.array([0.0, 3.0])},
         {"interval": (0, Fraction(1, 1))},
+        numbers(B=Fraction(1, 3)) | {"energy": lambda v, k, c: stiff(c.B, k)},
+        {"breaks": (Fraction(1, 2),), "attachments": (Attachment(Fraction(1, 2), mass=Fraction(1, 3)),)},
+        {"ends": right(force=lambda c: (Fraction(0), np.int64(0), np.float32(0) - c.P))},
+        {"ends": left((Fraction(0), np.int64(0), 0), (Fraction(1), np.int64(0), 0, 0))},
         {"ends": right(energy=lambda x, c: ufl.ln(x.d3[2] + 2))},
         {"ends": left(np.zeros(3), np.array([2.0, 0, 0, 0]))},
         {"potential": lambda x, c: loads.spring(x.r, np.ones(3))},
@@ -293,3 +303,14 @@ def test_a_constant_is_a_function_of_the_constants() -> None:
 def test_what_is_no_mistake(changes: dict[str, Any]) -> None:
     with pytest.raises(Computed):
         rodfem.trace(scene(**changes), Discretization(elements=np.int64(4)), Plan(depth=np.int64(1)))
+
+
+def test_numbers_are_floats() -> None:
+    """UFL knows no fractions and no numbers of numpy, and JSON none of the former."""
+    rod = scene(**numbers(B=Fraction(1, 3)), breaks=(np.float32(0.5),), distributed=lambda c: np.array([0, 0, 1]))
+    asked = Plan(accuracy=Fraction(1, 1000), locus=("B", Fraction(1, 4), np.int64(1)))
+    steps = StepControl(largest=Fraction(1, 10))
+    found = [rod.parameters["B"].value, *rod.breaks, *rod.distributed(rod.constants()), *asked.locus[1:], steps.largest]
+    assert all(isinstance(x, float) for x in (*found, asked.accuracy))
+    force = right(force=(Fraction(1, 3), np.int64(0), 0))[1]
+    assert scene(ends=(clamped(), force), distributed=lambda c: (0, 0, -c.P)).ends[1].force(None) == (1 / 3, 0.0, 0)
