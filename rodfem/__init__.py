@@ -22,23 +22,18 @@ finds and classifies the points where it is lost, follows what branches off, and
     diagram = trace(column)       # without
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
-  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy` has a few);
-  :mod:`section <rodfem.problem.section>` has stiffnesses of cross-sections, in any units.
+  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy`, :mod:`section
+  <rodfem.problem.section>`).
 * **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`, :func:`free`,
-  :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.
-* **Loads**: forces and moments of an :class:`End`; ``distributed``, ``follower`` and ``potential`` of a :class:`Scene`;
-  an :class:`Attachment` at any point.  Loads without a potential make ``Scene.conservative`` False: then frequencies
-  are computed, and flutter.
-* **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
-* **Tables**: :func:`tabulated` is a function of the arclength through rows of numbers, :func:`path` one of the load.
-* **Parameters**: any of them can be the load, :meth:`Scene.varying`; :meth:`Diagram.locus` follows a special point in
-  the plane of two of them.
+  :func:`elastic`, :class:`Ring`, or in full :class:`End`.  **Loads**: of an :class:`End`, of a :class:`Scene`, of an
+  :class:`Attachment`.  **Constraints**: :func:`at`, :func:`integral`, :func:`everywhere`.  **Tables**:
+  :func:`tabulated`, :func:`path`.
 * **Diagram**: :func:`trace` computes without files and returns a :class:`Diagram`: ``diagram["branch 1"]``,
   ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
-  ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.save(folder)``; :func:`load` reads a saved one.  :func:`run` is
-  the same with a terminal, files and pictures, :func:`many` shares a list of scenes among the ranks.
-* **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one;
-  ``solver.rebind(A=-1.5)`` is that of other constants, whose equations are not derived again.
+  ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.view()``, ``.save(folder)``; :func:`load` reads a saved one.
+  :func:`run` is the same with a terminal, files and pictures; :func:`many` shares a list of scenes among the ranks.
+* **One state**: a :class:`Solver` is a scene on a mesh; ``solver.rebind(A=-1.5)`` is that of other constants.  A
+  :class:`Point` has its shape, forces and reactions as arrays: ``point.r``, ``.moment``, ``.reactions``.
 
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
 that breaks one has a zero eigenvalue for it, which is counted as zero.

@@ -10,10 +10,9 @@ import os
 import signal
 import sys
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from difflib import get_close_matches
-from math import inf
 from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import fill
@@ -145,7 +144,7 @@ def _tables(data: Mapping[str, Any], rows: Sequence[Sequence[Any]]) -> list[str]
 
 
 def list_diagrams(words: Sequence[str]) -> None:
-    """Saved diagrams below a folder: scene, date, size, first loss of stability.
+    """Saved diagrams below a folder: scene, date, size, what the first branch does.
 
     Raises :class:`~rodfem.errors.InputError` where there is none.
     """
@@ -155,12 +154,13 @@ def list_diagrams(words: Sequence[str]) -> None:
     files = sorted(place.rglob("diagram.json"))
     if not files:
         raise InputError(f"No folder in {place} has a diagram.json: run a scene, or name a folder with results.")
-    print(printable("\n".join([_row(*HEADS, "first loss of stability"), *map(_diagram, files)])))
+    print(printable("\n".join([_row(*HEADS, "in words"), *map(_diagram, files)])))
 
 
 def _diagram(file: Path) -> str:
     """Line of a diagram; a file that is none has its reason in place of numbers."""
     from rodfem.file_format import DIAGRAM, read_json, refusal
+    from rodfem.output.summary import in_sentences
 
     name = str(file.parent)
     try:
@@ -169,8 +169,10 @@ def _diagram(file: Path) -> str:
             written = datetime.fromtimestamp(file.stat().st_mtime, UTC).isoformat()
             date = str((data.get("origin") or {}).get("date") or written)[: HEADS["date"]]
             branches = data["branches"]
-            special = sum(len(branch["special"]) for branch in branches)
-            return _row(name, data["scene"], date, str(len(branches)), str(special), first_loss(data))
+            special, words = sum(len(branch["special"]) for branch in branches), "no branches"
+            if branches:
+                words = in_sentences(data)[0].partition("\n")[0]
+            return _row(name, data["scene"], date, str(len(branches)), str(special), words)
     except InputError as trouble:
         return f"{name:<{HEADS['folder']}} {trouble}"
 
@@ -178,50 +180,6 @@ def _diagram(file: Path) -> str:
 def _row(*cells: str) -> str:
     *others, last = cells
     return " ".join([*(f"{cell:<{width}}" for cell, width in zip(others, HEADS.values(), strict=True)), last])
-
-
-def first_loss(data: Mapping[str, Any]) -> str:
-    """Kind and load of the first special point on the first branch from which on it is unstable, with its accuracy.
-
-    Of a planar rod it is the loss of stability in the plane, and the words say so.
-    """
-    from rodfem.output.summary import called
-
-    if not data["branches"]:
-        return "no branches"
-    branch = data["branches"][0]
-    columns, plane = branch["columns"], " in the plane" if data.get("planar") else ""
-    if branch.get("singular_start"):
-        return "the first state is singular"
-    if columns["negative"][0]:
-        return f"unstable{plane} from the first state on"
-    lost, unexplained = next(_losses(branch), None), [x["row"] for x in branch.get("unexplained") or ()]
-    if unexplained and (lost is None or lost["row"] > min(unexplained)):
-        load = columns["load"][min(unexplained)]
-        return f"unknown: the index changes near {data['parameter']} = {load:.6g} unexplained"
-    if lost is not None:
-        return f"{lost['kind']}{plane} at {data['parameter']} = {_load_of(lost)}"
-    if any(columns["negative"]):
-        return f"unstable{plane} somewhere, without a special point"
-    ends = f"from {columns['load'][0]:.6g} to {columns['load'][-1]:.6g}"
-    return f"none{plane}: {called(branch['name'])} is stable {ends}"
-
-
-def _losses(branch: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """Yield the special points of a branch at which stability is lost."""
-    from rodfem.continuation.kinds import KINDS
-
-    for special in branch["special"]:
-        if not KINDS[special["kind"]].given and not special["negative_before"] and special["negative_after"]:
-            yield special
-
-
-def _load_of(special: Mapping[str, Any]) -> str:
-    """Load of a special point, with its accuracy."""
-    from rodfem.output.digits import number
-
-    bar = special.get("error_estimate")
-    return number(special["load"], inf if bar is None else bar, special.get("resolved"))
 
 
 def run(words: Sequence[str]) -> None:

@@ -25,7 +25,6 @@ from rodfem.fem.fields import Discretization
 from rodfem.libraries import optional
 from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
-from rodfem.output import tables
 from rodfem.output.files import as_data, origin, save_run
 from rodfem.output.table import REMARK
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
@@ -326,6 +325,8 @@ class Diagram:
 
         Raises :class:`~rodfem.errors.SetupError` without xarray.  Collective.
         """
+        from rodfem.output import tables
+
         return tables.of_branches(self.branches, self.data)
 
     def view(self) -> Page:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from rodfem.app.console import first_loss
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
 from rodfem.output.digits import number
@@ -103,22 +102,6 @@ def test_words_warn() -> None:
     assert "does not resolve" in words[2].sentence
     given = words_of(branch([0, 0], special(1, "user", 0, 0, multiplicity=0)))
     assert given[1].verdict == "stable"
-
-
-@pytest.mark.parametrize(
-    ("data", "text"),
-    [
-        (branch([0, 0, 1], special(1)), "branch point at P = 1.000000 (1e-06)"),
-        (branch([0, 0, 0]), "none: first is stable from 0 to 2"),
-        (branch([1, 1]), "unstable from the first state on"),
-        (branch([0, 1]), "unstable somewhere, without a special point"),
-        (branch([0, 1]) | {"unexplained": [{"row": 0}]}, "unknown: the index changes near P = 0 unexplained"),
-        (branch([0, 0]) | {"singular_start": 1}, "the first state is singular"),
-        (branch([0, 0, 2], special(1, "flutter", 0, 2)), "flutter at P = 1.000000 (1e-06)"),
-    ],
-)
-def test_first_loss_of_stability(data: dict[str, Any], text: str) -> None:
-    assert first_loss({"branches": [data], "parameter": "P"}) == text
 
 
 def gauss_integral(curve: np.ndarray, tangent: np.ndarray) -> float:

@@ -149,8 +149,8 @@ def test_commands(results: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     (results / "broken" / "diagram.json").write_text("{}")
     console.main(["list", str(results)])
     listed = capsys.readouterr().out
-    assert "pinned" in listed and "flutter at" in listed and re.search(r"broken.* is no", listed)
-    assert re.search(r"short +pinned +20\d\d-\d\d-\d\d 1 +\d+ +none: ", listed)
+    assert "pinned" in listed and "flutter" in listed and re.search(r"broken.* is no", listed)
+    assert re.search(r"short +pinned +20\d\d-\d\d-\d\d 1 +\d+ +The first branch, .* is stable ", listed)
 
 
 @pytest.mark.long
