@@ -69,7 +69,7 @@ def in_copy(work: Callable[[int], None], killed_before: int | None = None) -> tu
 def saved_by(diagram: Diagram, folder: Path, its: int) -> None:
     """Save branch after branch, as a run does, and tell each that is finished."""
     with locked(folder, COMM):
-        terminal = Terminal(diagram.plan, folder, COMM, quiet=True)
+        terminal = Terminal(diagram.plan, folder, COMM, str, quiet=True, verbose=False)
         for n in range(1, len(diagram) + 1):
             part = Diagram(diagram.scene, diagram.plan, diagram.branches[:n], diagram.solvers)
             part.run = diagram.run
@@ -166,7 +166,7 @@ def test_files_of_two_runs(folder: Path, diagrams: tuple[Diagram, Diagram]) -> N
     if COMM.rank == 0:
         os.replace(folder / "states.h5", folder / diagrams[1].scene.name / "states.h5")
     COMM.barrier()
-    with pytest.raises(InputError, match=r"states.h5 and the diagram.json beside it are of different runs: keep"):
+    with pytest.raises(InputError, match=r"states.h5 and the diagram.json next to it are of different runs: keep"):
         rodfem.load(folder / diagrams[1].scene.name, diagrams[1].scene)
 
 
