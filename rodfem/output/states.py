@@ -1,8 +1,8 @@
 """States of a run as arrays, read from its ``states.h5``: shapes, and what varies along the rod.
 
-Strains, contact forces and moments are polynomials of each element, which jump between elements.  The file has them at
-equal places of each element, ends included where there is more than one: see :mod:`rodfem.fem.resultants`.  Where
-nothing acts at the end of an element the jump there is the error of the mesh.
+Strains, contact forces and moments are polynomials of each element.  The file has them at equal places of each, ends
+included where there is more than one: see :mod:`rodfem.fem.resultants`.  Where nothing acts at the end of an element
+strains and curvatures jump by the error of the mesh; forces and moments are continuous.
 """
 
 from __future__ import annotations

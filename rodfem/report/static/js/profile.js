@@ -22,7 +22,7 @@ const LINES = [
 const { length = 1, force = 1, moment = 1 } = data.natural; // an older file has none
 const NATURAL = { v: 1, k: 1 / length, n: force, m: moment };
 const LEAST = 1e-4; // difference of values, over their natural size, up to which a quantity is drawn as constant
-const ROUND_OFF = 1e-13; // jumps, relative, below which a quantity is continuous by its discretisation
+const ROUND_OFF = 1e-9; // jumps, relative, below which a quantity is continuous by its equations, as forces and moments are
 const PAUSE = 120; // milliseconds
 const FINE = 8; // points of a curve for each interval between two that an element has
 let waiting = 0, last = 0;

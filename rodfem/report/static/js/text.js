@@ -59,7 +59,7 @@ function about() {
   for (const [name, value] of Object.entries(data.constants)) line(list, name, digits(value, 17));
   line(list, "this page", `rodfem view ${data.folder}`, true);
   line(list, "shapes", "Rods are splines through the nodes of the mesh; states between rows are interpolated for their pictures.");
-  line(list, "forces", "Contact force n and moment m are what the part of the rod to the right exerts on that to the left, along the directors. Curves along the rod are those of the elements; where nothing acts they jump as much as they are accurate.");
+  line(list, "forces", "Contact force n and moment m are what the part of the rod to the right exerts on that to the left, along the directors. Where nothing acts strains and curvatures jump from element to element by as much as they are accurate; forces and moments are continuous, by the equations.");
   line(list, "libraries", "plotly.js and three.js, both under the MIT licence; the page needs no network.");
   at("about-button").addEventListener("click", () => at("about").showModal());
 }
