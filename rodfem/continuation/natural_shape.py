@@ -21,6 +21,7 @@ from rodfem.forms.rotation import IDENTITY
 from rodfem.problem.arguments import plain
 from rodfem.problem.quaternions import CONJUGATE, directors, of_vector, product
 from rodfem.problem.scene import Scene
+from rodfem.tolerances import NEGLIGIBLE
 
 SAMPLES = 33
 """Arclengths at which natural strains are computed, if they vary."""
@@ -28,8 +29,8 @@ STEPS = 2000
 """Steps of the integration along the rod."""
 SETTLED, STEP = 1e-8, 1e-5
 """Change of the natural strains, in natural units, at which Newton's method ends; step of its difference quotients."""
-FITS = 1e-6
-"""Distance from the ends, over the rod's length and in radian, within which a shape fits."""
+FITS = 0.05
+"""Distance from the ends, over the rod's length and in radian, within which a shape fits: Newton's method mends it."""
 
 
 class NaturalShape(NamedTuple):
@@ -125,7 +126,7 @@ def _aligned(chord: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     if not sizes > 0:
         return np.array(IDENTITY)
     cosine, axis = float(chord @ wanted / sizes), np.cross(chord, wanted) / sizes
-    if cosine <= -1 + FITS:
+    if cosine <= -1 + NEGLIGIBLE:
         return np.array(IDENTITY)
     out = np.array([1 + cosine, *axis])
     return np.asarray(out / np.linalg.norm(out))

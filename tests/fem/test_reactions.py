@@ -113,7 +113,11 @@ def test_a_turning_clamp_has_the_moment_that_does_its_work() -> None:
 
 def cable() -> Scene:
     """Power cable of 300 m: EI = 1e4 N m2, EA = 3e8 N, 250 N/m, clamped level at the sea bed, pinned 90 m up."""
-    turn = lambda s: 0.6 - 1.05 * np.cos(pi * s / 300.0)  # noqa: E731
+
+    def start(s: np.ndarray) -> np.ndarray:
+        turn = 0.6 - 1.05 * np.cos(pi * s / 300.0)
+        return np.stack([np.cos(turn), 0 * s, np.sin(turn), 0 * s], axis=1)
+
     return Scene(
         "cable",
         (0.0, 300.0),
@@ -126,8 +130,34 @@ def cable() -> Scene:
         (170.0, 171.0),
         distributed=lambda c: (-250.0, 0.0, 0.0),
         planar="e2",
-        start=lambda s: np.stack([np.cos(turn(s)), 0 * s, np.sin(turn(s)), 0 * s], axis=1),
+        start=start,
     )
+
+
+def test_a_helical_spring_of_natural_curvature_and_twist() -> None:
+    """Stiffness of a helix whose ends do not turn, by Kirchhoff's equations, but for what holds them across the axis.
+
+    With the pitch angle a, ``1/k = R^2 L (c^2/C + s^2/B) - (R L s c (1/C - 1/B))^2 / (L (s^2/C + c^2/B))``.
+    """
+    R, B, C, turns = 1.0, 1.3, 1.0, 8
+    size = float(np.hypot(R, 0.3))
+    c, s, length = R / size, 0.3 / size, 2 * pi * turns * size
+    axis, height = np.array([0.0, c, s]), 2 * pi * turns * 0.3
+    spring = Scene(
+        "spring",
+        (0.0, length),
+        "unshearable and inextensible",
+        lambda v, k, _: bending_and_twist((k[0], k[1] - c / size, k[2] - s / size), (B, B, C)),
+        {"x": Parameter(0.0)},
+        "x",
+        (clamped(), clamped(lambda p: tuple((height - p.x) * float(a) for a in axis))),
+        Ordinate("middle", s=length / 2, of=lambda r, q: float(r @ axis)),
+        (0.0, 1e-3),
+    )
+    point = rodfem.Solver(spring, Discretization(elements=32)).equilibrium(1e-3)
+    soft = R**2 * length * (c**2 / C + s**2 / B)
+    soft -= (R * length * s * c * (1 / C - 1 / B)) ** 2 / (length * (s**2 / C + c**2 / B))
+    assert -point.reactions.right.force @ axis / 1e-3 == pytest.approx(1 / soft, rel=0.01)
 
 
 def test_the_moment_at_a_clamp_of_a_boundary_layer() -> None:
