@@ -123,12 +123,10 @@ def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> np.ndarr
 def _aligned(chord: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Shortest rotation of a ``chord`` into the direction that is ``wanted``; none if that is not known."""
     sizes = np.linalg.norm(chord) * np.linalg.norm(wanted)
-    if not sizes > 0:
-        return np.array(IDENTITY)
-    cosine, axis = float(chord @ wanted / sizes), np.cross(chord, wanted) / sizes
+    cosine = float(chord @ wanted / sizes) if sizes > 0 else -1.0
     if cosine <= -1 + NEGLIGIBLE:
         return np.array(IDENTITY)
-    out = np.array([1 + cosine, *axis])
+    out = np.array([1 + cosine, *np.cross(chord, wanted) / sizes])
     return np.asarray(out / np.linalg.norm(out))
 
 

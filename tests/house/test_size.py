@@ -14,7 +14,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 35227,
+    "lines of Python": 35226,
     "files of Python": 184,
     "lines of C": 957,
     "module constants with a number": 388,
