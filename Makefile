@@ -60,7 +60,7 @@ notebooks: setup ## the lessons of the course as notebooks, in results/notebooks
 	@tools/setup.sh docs
 	@$(PYTHON) tools/notebooks.py results/notebooks
 
-bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (80 minutes)
+bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md and their logs (80 minutes)
 	$(PYTHON) -m benchmarks.speed
 	$(PYTHON) -m benchmarks.stability
 	$(PYTHON) -m benchmarks.robustness

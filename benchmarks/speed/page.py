@@ -1,4 +1,4 @@
-"""The page: every number in it comes from the store."""
+"""The page, and the log of all that was measured: every number comes from the store."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from benchmarks.store import Store
 
 Row = dict[str, Any]
 WORK = ("setup", "equilibrium", "count")
+LOG = "speed-log.md"
 FAR = 5000
 """Exponents are fitted from so many unknowns on."""
 
@@ -106,12 +107,29 @@ def another_day(store: Store, prefix: str) -> str:
 
 
 def write(store: Store, path: Path) -> None:
-    """Write what there is of the page."""
+    """Write the page, which is read to the end: what one picks between, and what a diagram costs by stage."""
+    low, high = store.loads()
+    runs = max((r["runs"] for r in store.rows("branches")), default=1)
+    lines = [
+        "# Speed against error",
+        words.PAGE.format(machine=machine(), day=store.day(), low=low, high=high, runs=runs, log=LOG),
+    ]
+    if store.rows("branches"):
+        lines += [_figure("special", "Error of special points against time of a branch"), words.FIGURE]
+        lines += ["## What one picks between", words.CHOICE, tables.choice(store)]
+    if store.rows("stages"):
+        lines += ["## What a diagram costs", words.STAGES, tables.stages(store)]
+    lines += ["## What else was measured", words.ELSE.format(log=LOG)]
+    path.write_text("\n\n".join(line.strip() for line in lines if line) + "\n")
+
+
+def write_log(store: Store, path: Path) -> None:
+    """Write everything that was measured."""
     low, high = store.loads()
     found = versions("fenics-dolfinx", "petsc4py", "slepc4py", "numpy", "scipy")
     runs = max((r["runs"] for r in store.rows("branches")), default=1)
     lines = [
-        "# Speed against error",
+        "# Log of the speed measurements",
         f"Written by `make bench` (`python -m benchmarks.speed`) in {store.took() / 60:.0f} minutes on {machine()};\n"
         f"{found}, {auto_version()}; one thread;\nload of the machine between {low:.1f} and {high:.1f}; "
         f"measured on {store.day()}.",

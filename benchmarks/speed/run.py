@@ -90,6 +90,8 @@ def everything(store: Store, size: Size) -> None:
         for formulation, grid in grids.items():
             for degree, elements in grid.items():
                 _rows(store, "branches", "branches", (scene, formulation, degree, size.runs, *elements))
+    for scene in ("cord", "hemitropic", "ruler", "follower"):
+        store.measure(f"stages/{scene}", partial(_run, "stages", (scene, size.runs)))
     for name, formulations in (
         ("cord", ("reduced", "pointwise")),
         ("cord with mass", ("pointwise",)),

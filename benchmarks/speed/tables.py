@@ -101,6 +101,36 @@ def beside_auto(store: Store) -> str:
     return table(head, out)
 
 
+def choice(store: Store) -> str:
+    """The fastest mesh of rodfem and AUTO at three errors, time of the whole branch, and the paper's mesh."""
+    out = []
+    for scene, branch, rows in branches_of(store):
+        (paper_row,) = [r for r in rows if (r["elements"], r["degree"], r["formulation"]) == (*PAPER, "reduced")] or [
+            None
+        ]
+        for accuracy in ACCURACIES:
+            mine = fastest(rows, accuracy, lambda r: float(r["seconds"]))
+            theirs = peers(store, scene, branch).get(scene, [])
+            (other,) = [r for r in theirs if r["asked"] == accuracy] or [None]
+            if mine is None:
+                continue
+            out.append([f"{scene}, {branch}", f"{accuracy:.0e}", what(mine).removesuffix(" reduced")])
+            out[-1] += [milliseconds(mine["seconds"]), milliseconds(other["seconds"]) if other else ""]
+            out[-1] += [digits(mine["seconds"] / other["seconds"], 2) if other else ""]
+        if out and paper_row and (best := fastest(rows, worst(paper_row), per_point)):
+            out[-1].append(digits(per_point(paper_row) / per_point(best), 2))
+    return table(
+        ["branch", "error", "mesh", "rodfem, ms", "AUTO, ms", "ratio", "paper"], [r + [""] * (7 - len(r)) for r in out]
+    )
+
+
+def stages(store: Store) -> str:
+    """What the diagrams of the demos cost by stage, in milliseconds."""
+    names = ("set-up", "following", "special points", "error bars", "all", "second rod")
+    rows = [[r["scene"], *(f"{1e3 * r[name]:.0f}" for name in names)] for r in store.rows("stages")]
+    return table(["demo", *names], rows)
+
+
 def _columns(row: Row | None, auto: bool) -> list[str]:
     if row is None:
         return [""] * 6

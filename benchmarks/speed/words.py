@@ -1,5 +1,34 @@
-"""What the page says in words; numbers come from elsewhere."""
+"""What the page and its log say in words; numbers come from elsewhere."""
 
+PAGE = """
+How long is the wait, and how many digits come out of it? Written by `make bench` on {machine}, one thread, on {day}
+(load of the machine between {low:.1f} and {high:.1f}). Times are medians of {runs} runs with warm caches, in
+processor time. Errors are relative to closed forms and to shooting, which neither rodfem nor AUTO-07p has computed.
+Everything that was measured, with the references and the versions of all libraries, is in the [log]({log}).
+"""
+FIGURE = """
+Each panel is one branch, followed from end to end with its index at every row and its special points located. Lines
+join meshes of one degree, from coarse to fine; crosses are AUTO-07p, which has no index; a star is the
+discretisation of Kumar & Healey (2010), 150 linear elements with the midpoint rule. Degree 6 or 8 on a few elements
+is the choice for every error below 1e-4: that is rodfem's default, and why `--elements` is rarely needed.
+"""
+CHOICE = """
+For three errors the fastest mesh of either program and the time of the whole branch with its special points (AUTO
+counts no index). `ratio` is rodfem's time over AUTO's: below one rodfem is faster. `paper` is how many times longer
+a row takes with the paper's mesh, which reaches errors of 1e-2 to 1e-5 only, than with the fastest mesh that is as
+accurate.
+"""
+STAGES = """
+Processor time in milliseconds of the demos' diagrams on the default mesh, forms compiled: *set-up* (spaces, forms,
+first equilibrium), *following* all branches with their index, *special points* (locating them, switching branches),
+*error bars* (everything about the second mesh), and all of it. A *second rod* is the same scene with other
+constants: equations and spaces are kept, error bars left away.
+"""
+ELSE = """
+The [log]({log}) has: each mesh with its error and time; AUTO's and scipy's (`solve_bvp`) at each error; how time
+and memory grow with the number of elements, up to 100,000; eigenvalues of straight rods against closed forms; many
+rods on several ranks; whole processes with imports, files and terminal.
+"""
 INTRODUCTION = """
 Errors are relative to references that neither rodfem nor what it is compared with has computed. Times are medians of
 {runs} with warm caches, after one that is not counted, in processor time (user and system) except where wall time is
