@@ -20,7 +20,8 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.fem.fields import Discretization, Fields, turning_of
+from rodfem.fem.fields import Discretization, Fields
+from rodfem.fem.formulations import turning_of
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
 

@@ -52,7 +52,7 @@ class CompiledNewton:
         drifts = np.array(system.drifts, dtype=np.int32)
         self.conditions, self.offsets = np.zeros((len(drifts), n)), np.zeros(len(drifts))
         self.active, self.border = np.zeros(len(drifts), dtype=np.int32), np.zeros(n)
-        self.forces = np.zeros_like(self.conditions) if system.drift_forces else self.conditions
+        self.forces = np.zeros_like(self.conditions) if system.rigid else self.conditions
         starts, load, every = own.pattern.indptr, system.load_index, np.arange(n)
         # scalars are the last columns of each row, and their own rows are dense
         column = {i: starts[1:] - (n - i) for i in (load, *system.drifts)}

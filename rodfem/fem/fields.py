@@ -22,8 +22,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.errors import InputError
 from rodfem.fem import formulations
-from rodfem.fem.formulations import CONTACT_FORCE, Formulation
-from rodfem.fem.rotation_field import AngleField, QuaternionField, Turning
+from rodfem.fem.formulations import CONTACT_FORCE, Formulation, turning_of
 from rodfem.fem.state import LOAD
 from rodfem.problem.arguments import reals, whole
 from rodfem.problem.contribution import Block, Group, Unknown
@@ -33,8 +32,6 @@ from rodfem.tolerances import SAME_PLACE, same_place
 
 FACTORS = CHAIN, PETSC = "chain", "petsc"
 """What assembles and factors the matrices of a discretisation."""
-MOST = 1_000_000
-"""Largest number of elements: 100000 of degree 2 take 4 GB."""
 HIGHEST = 12
 """Highest degree of elements."""
 FEW = 4000
@@ -63,31 +60,23 @@ class Discretization:
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
-        known, elements, vertices = formulations.names(), self.elements, self.vertices or ()
-        ascending = all(a + SAME_PLACE * (vertices[-1] - vertices[0]) < b for a, b in pairwise(vertices))
-        for wrong, sentence in (
-            (
-                self.formulation not in known,
-                f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}, and give numbers by "
-                "name, as in elements=8, degree=6.",
-            ),
-            (
-                self.factors not in FACTORS,
-                f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.",
-            ),
-            (
-                not 1 <= elements <= MOST,
-                f"A mesh of {elements} elements holds no rod, or is too large: give 1 to {MOST}.",
-            ),
-            (not 1 <= self.degree <= HIGHEST, f"Degree {self.degree} is not available: choose 1 to {HIGHEST}."),
-            (
-                vertices and len(vertices) != elements + 1,
-                f"{len(vertices)} vertices do not bound {elements} elements: give {elements + 1}.",
-            ),
-            (not ascending, "The vertices of a mesh must ascend along the rod: sort them, each once."),
-        ):
-            if wrong:
-                raise InputError(sentence)
+        names, elements, vertices = formulations.names(), self.elements, self.vertices or ()
+        most = 1_000_000  # of which 100000 of degree 2 take 4 GB
+        if self.formulation not in names:
+            raise InputError(
+                f"Unknown formulation {self.formulation!r}: choose one of {', '.join(names)}, and give numbers by "
+                "name, as in elements=8, degree=6."
+            )
+        if self.factors not in FACTORS:
+            raise InputError(f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.")
+        if not 1 <= elements <= most:
+            raise InputError(f"A mesh of {elements} elements holds no rod, or is too large: give 1 to {most}.")
+        if not 1 <= self.degree <= HIGHEST:
+            raise InputError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
+        if vertices and len(vertices) != elements + 1:
+            raise InputError(f"{len(vertices)} vertices do not bound {elements} elements: give {elements + 1}.")
+        if any(a + SAME_PLACE * (vertices[-1] - vertices[0]) >= b for a, b in pairwise(vertices)):
+            raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
 
     def finer(self, factor: int, richer: int = 0) -> Discretization:
         """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""
@@ -98,16 +87,8 @@ class Discretization:
         return replace(self, elements=factor * self.elements, degree=self.degree + richer, vertices=vertices)
 
 
-def turning_of(scene: Scene) -> Turning:
-    """How the rotation of a scene's rod is described."""
-    return QuaternionField() if scene.normal is None else AngleField(scene.normal)
-
-
 def blocks_of(scene: Scene, formulation: Formulation, k: int) -> list[Block]:
-    """Fields: ``q`` and ``eta``, in a plane ``angle``; ``v`` where strains are free; those of the formulation.
-
-    In addition to what the parts of the scene bring: multipliers of constraints that hold all along the rod.
-    """
+    """Fields: rotation with its multiplier, free strains, those of the formulation and of the parts of the scene."""
     turning = turning_of(scene)
     blocks = [Block(turning.name, turning.size, k, True, False)]
     if turning.name == "q":
@@ -118,11 +99,9 @@ def blocks_of(scene: Scene, formulation: Formulation, k: int) -> list[Block]:
 
 
 def scalars_of(scene: Scene, formulation: Formulation) -> list[Unknown]:
-    """Scalar unknowns of a scene, without the load: those of the formulation, and of the parts of the scene."""
-    out = formulation.unknowns(scene)
-    for part in scene.parts:
-        out += part.of.unknowns(part.number, scene.normal, formulation.centreline)
-    return list(dict.fromkeys(out))
+    """Scalar unknowns of the formulation and of the parts of a scene, without the load."""
+    parts = [x for part in scene.parts for x in part.of.unknowns(part.number, scene.normal, formulation.centreline)]
+    return list(dict.fromkeys(formulation.unknowns(scene) + parts))
 
 
 def check_mesh(scene: Scene, discretization: Discretization, ranks: int = 1) -> None:
@@ -131,24 +110,24 @@ def check_mesh(scene: Scene, discretization: Discretization, ranks: int = 1) -> 
     elements, given, pieces = discretization.elements, discretization.vertices, len(scene.joints) + 1
     if ranks > elements:
         raise InputError(f"{elements} elements cannot be shared by {ranks} ranks: use more elements or fewer ranks.")
-    if given is not None:
-        ends = (given[0], given[-1]) == tuple(scene.interval)
-        if not ends or any(not same_place(given, s, scene.length).any() for s in scene.joints):
-            raise InputError(
-                f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
-                "and hold every joint of the scene: add what is missing."
-            )
-    elif elements < pieces:
+    if given is None and elements < pieces:
         raise InputError(
             f"The rod has {pieces} pieces between joints, and needs an element for each: use more than {elements} "
             "elements."
+        )
+    if given is not None and not (
+        (given[0], given[-1]) == tuple(scene.interval)
+        and all(same_place(given, s, scene.length).any() for s in scene.joints)
+    ):
+        raise InputError(
+            f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
+            "and hold every joint of the scene: add what is missing."
         )
 
 
 def most_eigenvalues(scene: Scene, discretization: Discretization) -> int:
     """Bound of the number of finite eigenvalues of the discrete rod: what can turn, and what moves with a mass."""
-    planar = scene.normal is not None
-    turning, moving = (1, 2) if planar else (3, 3)
+    turning, moving = (3, 3) if scene.normal is None else (1, 2)
     at_a_node = turning + (moving if scene.has_inertia or not scene.conservative else 0)
     return at_a_node * (discretization.elements * discretization.degree + 1)
 
@@ -172,17 +151,12 @@ class Fields:
     """
 
     def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-        """Make the mesh of a ``discretization`` on the ranks of ``comm``, and number the unknowns of the ``scene``.
-
-        Raises :class:`InputError` for more ranks than elements.
-        """
         check_mesh(scene, discretization, comm.size)
-        self.asked = discretization
+        self.asked, self.scene, self.comm = discretization, scene, comm
         self.formulation = formulations.chosen(discretization.formulation, scene)
         least = 1 if discretization.vertices else len(scene.vertices) + 1
         elements = max(discretization.elements, least)
         self.discretization = replace(discretization, formulation=self.formulation.name, elements=elements)
-        self.scene, self.comm = scene, comm
         self.turning = turning_of(scene)
         self.blocks = blocks_of(scene, self.formulation, discretization.degree)
         self.unknown_scalars = scalars_of(scene, self.formulation)
@@ -196,9 +170,9 @@ class Fields:
         self.owned_cells, local_cells = cells.size_local, cells.size_local + cells.num_ghosts
         self.vertices = compat.cell_vertices(self.mesh, local_cells)
         self.dofs = {b.name: self._block_dofs(i, b.size, local_cells) for i, b in enumerate(self.blocks)}
-        copies = self._block_dofs(len(self.blocks), len(names), local_cells)[:, 0, :]
+        self.copies = self._block_dofs(len(self.blocks), len(names), local_cells)[:, 0, :]
         self.clamped = self._clamped()
-        self._number(copies, names)
+        self._number(names)
         self.clamps = self._clamps()
 
     def bound(self, scene: Scene) -> Fields | None:
@@ -221,19 +195,17 @@ class Fields:
         scene, elements, given = self.scene, self.discretization.elements, self.discretization.vertices
         pieces = np.array([scene.interval[0], *scene.vertices, scene.interval[1]])
         mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
-        uniform = np.linspace(*scene.interval, elements + 1)
+        if given is None and len(pieces) > 2:
+            shares = np.diff(pieces) / scene.length * elements
+            counts = np.maximum(np.floor(shares).astype(int), 1)
+            while counts.sum() > elements:
+                counts[np.argmax(np.where(counts > 1, counts / shares, 0))] -= 1
+            while counts.sum() < elements:
+                counts[np.argmax(shares / counts)] += 1
+            ends = zip(pieces, pieces[1:], counts, strict=False)
+            given = (*np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in ends]), pieces[-1])
         if given is not None:
-            compat.move_vertices(mesh, uniform, np.array(given))
-            return mesh
-        shares = np.diff(pieces) / scene.length * elements
-        counts = np.maximum(np.floor(shares).astype(int), 1)
-        while counts.sum() > elements:
-            counts[np.argmax(np.where(counts > 1, counts / shares, 0))] -= 1
-        while counts.sum() < elements:
-            counts[np.argmax(shares / counts)] += 1
-        vertices = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
-        if len(pieces) > 2:
-            compat.move_vertices(mesh, uniform, np.append(np.concatenate(vertices), pieces[-1]))
+            compat.move_vertices(mesh, np.linspace(*scene.interval, elements + 1), np.array(given))
         return mesh
 
     def _block_dofs(self, part: int, size: int, cells: int) -> np.ndarray:
@@ -242,52 +214,40 @@ class Fields:
         return np.stack([compat.cell_dofs(component, cells) for component in components], axis=-1)
 
     def _clamped(self) -> np.ndarray:
-        """Local degrees of freedom that an end holds: ``q`` and ``eta`` at clamped directors, ``r`` where held.
-
-        Of a planar rod also all that would leave the plane.
-        """
-        found = [dofs.ravel() for dofs in self.out_of_plane(self.scene.normal).values()]
+        """Local degrees of freedom that an end clamps, and of a planar rod all that would leave the plane."""
+        found = [np.array([], dtype=int), *(dofs.ravel() for dofs in self.out_of_plane(self.scene.normal).values())]
         c = self.scene.constants()
         for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
             for block in (b for b in self.blocks if b.continuous):
-                x = self.coordinates(block.degree)
-                at_end = self.dofs[block.name][same_place(x, s, self.scene.length)]
+                at_end = self.dofs[block.name][same_place(self.coordinates(block.degree), s, self.scene.length)]
                 found.append(at_end[:, np.broadcast_to(end.clamps(block, c), block.size)].ravel())
-        return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
+        return np.unique(np.concatenate(found))
 
     def out_of_plane(self, normal: int | None) -> dict[str, np.ndarray]:
         """Degrees of freedom of each field that vanish for a rod in the plane across ``normal``; None: in space."""
         if normal is None:
             return {}
-        components = {
-            "r": [normal],
-            "n": [normal],
-            "v": [place for place, i in enumerate(self.scene.free_strains) if i == normal],
-        }
+        strains = [place for place, i in enumerate(self.scene.free_strains) if i == normal]
+        components = {"r": [normal], "n": [normal], "v": strains}
         return {name: self.dofs[name][..., chosen] for name, chosen in components.items() if name in self.dofs}
 
-    def _number(self, copies: np.ndarray, names: list[str]) -> None:
+    def _number(self, names: list[str]) -> None:
         """Number free unknowns rank by rank; scalars come last and belong to the last rank."""
         index_map = self.space.dofmap.index_map
-        owned, local = index_map.size_local, index_map.size_local + index_map.num_ghosts
-        free = np.ones(local, dtype=bool)
+        free = np.ones(index_map.size_local + index_map.num_ghosts, dtype=bool)
         free[self.clamped] = False
-        free[copies.ravel()] = False
-        self.free_owned = np.flatnonzero(free[:owned])
+        free[self.copies.ravel()] = False
+        self.free_owned = np.flatnonzero(free[: index_map.size_local])
         count = len(self.free_owned)
         self.offset = sum(self.comm.allgather(count)[: self.comm.rank])
         self.field_unknowns = self.comm.allreduce(count)
-        numbers = compat.fem.Function(self.space, dtype=compat.REAL)
-        numbers.x.array[:] = -1.0
-        numbers.x.array[self.free_owned] = self.offset + np.arange(count)
-        numbers.x.scatter_forward()
-        self.number = np.rint(numbers.x.array).astype(np.int32)
+        numbers = np.full(len(free), -1.0)
+        numbers[self.free_owned] = self.offset + np.arange(count)
+        self.number = np.rint(self.scattered(numbers)).astype(np.int32)
         self.scalars: dict[str, int] = {}
         self.unknowns, self.local_unknowns = self.field_unknowns, count
         self._append(names)
-        for i, name in enumerate(names):
-            self.number[copies[:, i]] = self.scalars[name]
-        self.copies = copies
+        self.number[self.copies] = [self.scalars[name] for name in names]
 
     def _append(self, names: list[str]) -> None:
         """Give scalars the next numbers; all are on the last rank."""
@@ -319,8 +279,7 @@ class Fields:
         units, out = self.scene.units, np.ones(len(self.number))
         for block in self.blocks:
             out[self.dofs[block.name]] = units.of_field(block)
-        for size, copies in zip([*map(units.of_scalar, self.unknown_scalars), units.load], self.copies.T, strict=True):
-            out[copies] = size
+        out[self.copies] = [*map(units.of_scalar, self.unknown_scalars), units.load]
         return out
 
     def scattered(self, local: np.ndarray) -> np.ndarray:
@@ -336,11 +295,6 @@ class Fields:
         """Arclengths at which elements meet, of all ranks in ascending order, (E + 1,)."""
         mine = self.vertices[: self.owned_cells, 0]
         return np.append(np.sort(np.concatenate(self.comm.allgather(mine))), self.scene.interval[1])
-
-    @cached_property
-    def arclength(self) -> Arclength:
-        """Matrices of the derivative in arclength."""
-        return Arclength(self)
 
     @property
     def compiled(self) -> bool:
@@ -401,15 +355,12 @@ class Fields:
             "n": "contact force n",
         }
         words = [f"{names.get(b.name, f'multiplier {b.name}')} (P{b.degree})" for b in self.blocks]
-        for group, members in self.groups.items():
-            words.append(f"{group.words} {', '.join(x.name for x in members)} (scalar)")
+        words += [f"{g.words} {', '.join(x.name for x in members)} (scalar)" for g, members in self.groups.items()]
         return ", ".join(words)
 
     def left_out(self) -> list[str]:
         """Fields and strains that are not unknowns of this scene, each with the reason."""
-        scene = self.scene
-        fixed = [i for i in range(3) if i not in scene.free_strains]
-        lines = []
+        scene, lines = self.scene, []
         if scene.normal is not None:
             lines.append(
                 f"rotations, displacement, force and strain out of the plane across {scene.planar}: "
@@ -417,71 +368,59 @@ class Fields:
             )
             if scene.conservative and (loads := scene.without_potential(in_space=True)):
                 lines.append(f"the index in space: no potential there has the {loads[0]}")
-        if fixed:
-            lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
+        if fixed := [f"v{i + 1}" for i in range(3) if i not in scene.free_strains]:
+            lines.append(f"strain {', '.join(fixed)}: the rod is {scene.rod}")
         return lines + self.formulation.left_out(scene)
 
-
-class Arclength:
-    """Derivatives of states on the cells of one :class:`~rodfem.fem.fields.Fields`; each made when it is asked for."""
-
-    def __init__(self, fields: Fields) -> None:
-        """Keep the fields."""
-        self._fields = fields
+    # --- derivatives in arclength ------------------------------------------------------------------------------
 
     @cached_property
     def derivative(self) -> sp.csr_matrix:
-        """Matrix (local size, local size) of the derivative at nodes, the mean of the cells that share one.
+        """Matrix (local size, local size) of the derivative in arclength at nodes, the mean of cells that share one.
 
         Zero for scalars and at clamped degrees of freedom.
         """
-        fields, size = self._fields, len(self._fields.number)
+        size = len(self.number)
         mean = sp.csr_matrix((size, size))
-        for block in fields.blocks:
-            (columns, values), dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+        for block in self.blocks:
+            (columns, values), dofs = self._slopes(block), self.dofs[block.name].ravel()
             rows = np.arange(len(dofs) + 1) * columns.shape[1]
             slopes = sp.csr_matrix((values.ravel(), columns.ravel(), rows), shape=(len(dofs), size))
             sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
             shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
             mean += sp.diags(1.0 / shared) @ sums @ slopes
-        return sp.diags(np.where(fields.number < 0, 0.0, 1.0)) @ mean.tocsr()
+        return sp.diags(np.where(self.number < 0, 0.0, 1.0)) @ mean.tocsr()
 
     @cached_property
-    def jumps(self) -> sp.csr_matrix:
+    def derivative_jumps(self) -> sp.csr_matrix:
         """Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline."""
-        fields = self._fields
         columns, values = [], []
-        for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
-            slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+        for block in (b for b in self.blocks if b.name in (self.turning.name, "r")):
+            slopes, dofs = self._slopes(block), self.dofs[block.name].ravel()
             order = np.argsort(dofs, kind="stable")
             twins = np.flatnonzero(np.diff(dofs[order]) == 0)
             sides = order[twins + 1], order[twins]
             columns.append(np.hstack([slopes[0][side] for side in sides]))
             values.append(np.hstack([sign * slopes[1][side] for sign, side in zip((1, -1), sides, strict=True)]))
-        rows = sum(len(c) for c in columns)
         starts = np.cumsum([0, *(c.shape[1] for c in columns for _ in range(len(c)))])
         entries = (np.concatenate([x.ravel() for x in parts]) for parts in (values, columns))
-        return sp.csr_matrix((*entries, starts), shape=(rows, len(fields.number)))
+        return sp.csr_matrix((*entries, starts), shape=(len(starts) - 1, len(self.number)))
 
-
-def _slopes(fields: Fields, block: Block) -> tuple[np.ndarray, np.ndarray]:
-    """Derivative of a field at the nodes of each cell, in the order of the flattened ``fields.dofs``.
-
-    Columns and values of as many rows, (dofs, nodes) each.
-    """
-    dofs, ends = fields.dofs[block.name], fields.vertices
-    cells, nodes, components = dofs.shape
-    sizes = (ends[:, 1] - ends[:, 0]) / fields.scene.units.length
-    weights = differentiation(block.degree) / sizes[:, None, None]
-    shape = (cells, nodes, components, nodes)
-    columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape)
-    values = np.broadcast_to(weights[:, :, None, :], shape)
-    return columns.reshape(-1, nodes), values.reshape(-1, nodes)
+    def _slopes(self, block: Block) -> tuple[np.ndarray, np.ndarray]:
+        """Columns and values (dofs, nodes) of the rows of the derivative of a field at the nodes of each cell."""
+        dofs, ends = self.dofs[block.name], self.vertices
+        cells, nodes, components = dofs.shape
+        sizes = (ends[:, 1] - ends[:, 0]) / self.scene.units.length
+        weights = _differentiation(block.degree) / sizes[:, None, None]
+        shape = (cells, nodes, components, nodes)
+        columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape)
+        values = np.broadcast_to(weights[:, :, None, :], shape)
+        return columns.reshape(-1, nodes), values.reshape(-1, nodes)
 
 
 @cache
-def differentiation(degree: int) -> np.ndarray:
-    """Matrix of the derivative of the polynomial through values at the nodes of an element, at the nodes: (m, m)."""
+def _differentiation(degree: int) -> np.ndarray:
+    """Matrix (m, m) of the derivative of a polynomial at the nodes of an element."""
     nodes = compat.nodes(degree)
     powers = np.vander(2 * nodes - 1, increasing=True)
     slopes = np.zeros_like(powers)

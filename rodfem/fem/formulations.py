@@ -1,9 +1,10 @@
-"""Formulations of a rod: a class derived from :class:`Formulation` each, registered by name in :data:`FORMULATIONS`."""
+"""How a rod's rotations and centreline are described: classes of rotation fields, and of formulations by name."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -11,9 +12,12 @@ import ufl
 
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.forms import lagrangian
+from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
 from rodfem.problem.end import LETTERS, SIDES
 from rodfem.problem.local_state import needs_centreline
+from rodfem.problem.quaternions import of_vector, product
+from rodfem.problem.validation import PLACES
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
@@ -26,6 +30,145 @@ if TYPE_CHECKING:
 
 CONTACT_FORCE = "n"
 """Name of the contact force: a field, or the beginning of the names of scalars."""
+Start = Callable[[np.ndarray], np.ndarray] | None
+
+
+# --- rotation ------------------------------------------------------------------------------------------------------
+
+
+class Turning(ABC):
+    """A field of rotations: values (..., ``size``) that stand for quaternions (..., 4).
+
+    ``expression`` and ``variation`` are the quaternion and its change in UFL, ``quaternion`` and ``change`` the same in
+    numbers, and ``functional`` the weights (..., 4) of changes of quaternions, of weights of changes of the field.
+    ``turned`` are values turned by rotation vectors (..., 3) along the directors.
+    """
+
+    name: ClassVar[str]
+    size: ClassVar[int]
+
+    def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
+        """Values (m, size) at arclengths (m,) of a scene's ``start``, a straight rod without one.
+
+        The signs that the start gives its quaternions are a matter of choice: values are made to be continuous along
+        the rod from its left end.
+        """
+        if start is None:
+            return np.tile(IDENTITY[: self.size] if self.size > 1 else np.zeros(1), (s.size, 1))
+        every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
+        return self._continuous(np.asarray(start(every), dtype=float))[place.ravel()[PLACES:]]
+
+    @abstractmethod
+    def _continuous(self, q: np.ndarray) -> np.ndarray:
+        """Values (m, size) of quaternions (m, 4) along the rod."""
+
+
+@dataclass(frozen=True)
+class QuaternionField(Turning):
+    """Rotation as a quaternion ``q`` of four components, whose unit norm is a constraint."""
+
+    name = "q"
+    size = 4
+
+    def expression(self, value: Any) -> Any:
+        """Quaternion of the field."""
+        return value
+
+    def variation(self, value: Any, change: Any) -> Any:
+        """Change of the quaternion."""
+        return change
+
+    def quaternion(self, values: np.ndarray) -> np.ndarray:
+        """Quaternions of values."""
+        return values
+
+    def change(self, values: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Changes of quaternions."""
+        return change
+
+    def functional(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Weights of changes of quaternions."""
+        return weights
+
+    def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
+        """Values turned by rotation vectors."""
+        return product(values, of_vector(vector))
+
+    def normalised(self, values: np.ndarray) -> np.ndarray:
+        """Values of unit quaternions."""
+        return np.asarray(values / np.linalg.norm(values, axis=-1, keepdims=True))
+
+    def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
+        """Quaternion ``rotation`` of a clamped end at ``s``, or its negative: next to the ``start`` of the rod."""
+        value = np.array(rotation)
+        return np.asarray(-value if value @ self.start(start, np.array([s]), interval)[0] < 0 else value)
+
+    def _continuous(self, q: np.ndarray) -> np.ndarray:
+        signs = np.cumprod(np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+        return np.asarray(q * np.append(1.0, signs)[:, None])
+
+
+@dataclass(frozen=True)
+class AngleField(Turning):
+    """The angle about the normal of the plane, e1 or e2 (``normal`` 0 or 1), from the undeformed state.
+
+    It is not confined to one turn: rotations tell angles apart up to ``2 pi``, and the number of whole turns is that of
+    the scene's start.
+    """
+
+    normal: int
+    name = "angle"
+    size = 1
+
+    def expression(self, value: Any) -> Any:
+        """Quaternion of the field."""
+        return turn(value, self.normal)
+
+    def variation(self, value: Any, change: Any) -> Any:
+        """Change of the quaternion."""
+        return turn_change(value, change, self.normal)
+
+    def quaternion(self, values: np.ndarray) -> np.ndarray:
+        """Quaternions of values."""
+        q = np.zeros((*values.shape[:-1], 4))
+        q[..., 0], q[..., self.normal + 1] = np.cos(values[..., 0] / 2), np.sin(values[..., 0] / 2)
+        return q
+
+    def change(self, values: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Changes of quaternions."""
+        return self.quaternion(values + np.pi) * change / 2
+
+    def functional(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Weights of changes of quaternions."""
+        return 4 * self.change(values, weights)
+
+    def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
+        """Values turned by the components of rotation vectors along the normal."""
+        return np.asarray(values + vector[..., [self.normal]])
+
+    def normalised(self, values: np.ndarray) -> np.ndarray:
+        """Values as they are."""
+        return values
+
+    def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
+        """Angle (1,) of the quaternion ``rotation`` of a clamped end at ``s``: next to the ``start`` of the rod."""
+        angle = self._angle(np.array(rotation))
+        near = self.start(start, np.array([s]), interval)[0]
+        return np.asarray(angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi)))
+
+    def _continuous(self, q: np.ndarray) -> np.ndarray:
+        return np.asarray(np.unwrap(self._angle(q), period=2 * np.pi)[:, None])
+
+    def _angle(self, q: np.ndarray) -> np.ndarray:
+        return np.asarray(2 * np.arctan2(q[..., self.normal + 1], q[..., 0]))
+
+
+def turning_of(scene: Scene) -> QuaternionField | AngleField:
+    """How the rotation of a scene's rod is described."""
+    return QuaternionField() if scene.normal is None else AngleField(scene.normal)
+
+
+# --- centreline ----------------------------------------------------------------------------------------------------
 
 
 class Formulation(ABC):
@@ -65,17 +208,14 @@ class Formulation(ABC):
 
     @abstractmethod
     def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
-        """Position (3,) where ``at`` restricts a field to, None if there is none.
-
-        It is one in the ``equations``, where the constants are ``c``; ``side`` is 0 or 1 at an end.
-        """
+        """Position (3,) where ``at`` restricts a field to, at an end that of its ``side`` 0 or 1; None without one."""
 
     @abstractmethod
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Share of this rank in the position at a place without its offset (3,), or in that and the chord (2, 3).
 
         ``integral`` are weights (2, points) of slopes in their integrals to the place and over the rod, ``value``
-        (nodes,) of nodal values in the value there; ``shape`` has the nodes, ``state`` the values.
+        (nodes,) of nodal values in the value there.
         """
 
     @abstractmethod
@@ -84,17 +224,11 @@ class Formulation(ABC):
 
     @abstractmethod
     def offset(self, fields: Fields, state: NodalValues, s: np.ndarray, chord: np.ndarray) -> np.ndarray:
-        """Offset of the positions of a ``state`` on ``fields`` at the arclengths ``s`` (...,): (..., 3) or (3,).
-
-        ``chord`` (3,) is the difference of its ends.
-        """
+        """Offset (..., 3) or (3,) of the positions at arclengths ``s`` (...,); ``chord`` (3,) is that of the ends."""
 
     @abstractmethod
     def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
-        """Write positions ``r`` (cells, nodes, 3) above the lift, and those of the ``ends``, into local values ``out``.
-
-        ``shape`` has the owned cells and their nodes.
-        """
+        """Write positions ``r`` (cells, nodes, 3) above the lift, and those of the ends, into local values ``out``."""
 
     @abstractmethod
     def displacement(self, motions: Motions, state: NodalValues, change: NodalValues) -> np.ndarray:
@@ -102,9 +236,9 @@ class Formulation(ABC):
 
 
 class Pointwise(Formulation):
-    """Centreline and contact force are fields.
+    """Centreline and contact force are fields: it applies to all scenes.
 
-    It applies to all scenes; the field ``r`` is measured from the lift of the ends' positions.
+    The field ``r`` is measured from the lift of the ends' positions.
     """
 
     name, words, centreline = "pointwise", "all fields", True
@@ -152,7 +286,8 @@ class Reduced(Formulation):
 
     It applies where nothing acts along the rod, and nothing there asks where the rod is.  The centreline is recovered
     by integrating ``r' = R v`` with the quadrature of the weak form, so that it closes exactly where the integral
-    constraints say it does, and is as accurate as the pointwise one.
+    constraints say it does, and is as accurate as the pointwise one.  Positions ``a1``.., ``b1``.. of an end are
+    unknown where other than dead forces act on it.
     """
 
     name, words, centreline = "reduced", "no centreline, the contact force as scalars", False
@@ -163,11 +298,7 @@ class Reduced(Formulation):
         return reason and f"has no centreline, which {reason} needs"
 
     def unknowns(self, scene: Scene) -> list[Unknown]:
-        """Scalar unknowns in the place of fields.
-
-        Components ``n1``.. of a constant contact force, positions ``a1``.., ``b1``.. of the left and right end where
-        other than dead forces act on it.
-        """
+        """Components ``n1``.. of a constant contact force, and positions of ends."""
         c, inside = scene.constants(), [i for i in range(3) if i != scene.normal]
         force = Group(
             CONTACT_FORCE,
@@ -197,7 +328,7 @@ class Reduced(Formulation):
     def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
         """With the integral of ``r' = R v``."""
         force = self.contact_force(equations)
-        left, right = self._ends(equations, equations.constants)
+        left, right = (self._end(equations, equations.constants, side) for side in range(2))
         chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / equations.length)
 
@@ -208,11 +339,11 @@ class Reduced(Formulation):
 
     def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Known at an end that is held or whose position is a scalar unknown."""
-        r = [None] if side is None else self._ends(equations, c)[side]
+        r = [None] if side is None else self._end(equations, c, side)
         return None if None in r else ufl.as_vector(r)
 
-    def _ends(self, equations: Equations, c: Constants) -> list[list[Any]]:
-        return [_end_position(side, equations.fields.scene, c, equations.unknowns.scalars) for side in range(2)]
+    def _end(self, equations: Equations, c: Constants, side: int) -> list[Any]:
+        return _end_position(side, equations.fields.scene, c, equations.unknowns.scalars)
 
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Integrals of the slope."""
@@ -250,9 +381,8 @@ def _end_position(
 
     Across the plane of a planar rod an end that nothing holds is where the plane is: at zero.
     """
-    letter = LETTERS[side]
     return [
-        given(x) if x is not None else scalars.get(f"{letter}{i + 1}", 0.0 if i == scene.normal else None)
+        given(x) if x is not None else scalars.get(f"{LETTERS[side]}{i + 1}", 0.0 if i == scene.normal else None)
         for i, x in enumerate(scene.sides[side].held(c))
     ]
 

@@ -54,25 +54,8 @@ INVARIANT = 1e-12
 Up to 4e-13 were measured for symmetries of rods with elements of 1e-6.  A rod that bends less alike than this, next to
 the stiffest of its strains, is taken for one that bends alike.
 """
-NEARLY = 1e-6
-"""The same of motions of which those are chosen that do not change what acts on the rod."""
-STEP, LOADS = 1e-3, 1e-8
-"""Step of differences of what acts on the rod, in units of the state, and their round-off, relative to its size."""
 SLIDING = 1e-8
 """The same for the motion of a closed rod along itself: the error of a fine mesh."""
-SIMPLE = 1e-9
-"""Weights of a symmetry below this, relative to its greatest, are round-off of the elimination."""
-RESIDUAL = 1e-8
-"""Residual ``S g`` of a symmetry, relative to ``|S| |g|``."""
-ZERO = 1e-10
-"""Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, apart from round-off: what Newton's
-method makes of a state."""
-ROUND_OFF = 10.0
-"""Times the effect of independent relative errors eps of all entries of ``S`` on the quotient: its round-off."""
-DECAY = 0.6
-"""Ratio of one Fourier coefficient of a generic state to the next."""
-NEARER = (1.0, 0.1, 0.01, 1e-3)
-"""Sizes of its displacements, in turn, until the equations are numbers: a barrier admits no large ones."""
 
 
 def find_symmetries(equations: Equations) -> list[Symmetry]:
@@ -103,7 +86,8 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
     # the round-off of wild states hides that of all others
     asked_at = np.flatnonzero(greatest <= 1e4 * greatest.min())
     conditions, magnitudes = np.vstack([rows[i] for i in asked_at]), np.max([sizes[i] for i in asked_at], axis=0)
-    moving = _moving(_kept(free, conditions, magnitudes, NEARLY), moved)
+    nearly = 1e-6  # of these motions those are chosen that do not change what acts on the rod
+    moving = _moving(_kept(free, conditions, magnitudes, nearly), moved)
     keeping = moving @ _keeping_loads(equations, [Symmetry(w, parts) for w in moving.T])
     basis = _moving(_kept(keeping, conditions, magnitudes, INVARIANT), moved)
     return [Symmetry(w, parts) for w in simplest(basis).T]
@@ -144,22 +128,27 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     size = max(largest for _, largest in along)
     if size == 0.0:
         return np.eye(len(found))
-    return np.asarray(_null_space(np.array([row for row, _ in along]) / size, LOADS) / lengths[:, None])
+    round_off = 1e-8  # of the differences, relative to the potential
+    return np.asarray(_null_space(np.array([row for row, _ in along]) / size, round_off) / lengths[:, None])
 
 
-def _along(state: Evaluation, changes: np.ndarray) -> tuple[np.ndarray, float]:
+def _along(state: Evaluation, changes: np.ndarray, step: float = 1e-3) -> tuple[np.ndarray, float]:
     """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its largest value.
 
     By central differences of fourth order.
     """
     equations, loads = state.equations, state.equations.loads
     assert loads is not None
-
-    def value(change: np.ndarray, step: float) -> float:
-        return Evaluation(equations, state.local + step * change, state.line).integral(loads)
-
-    values = np.array([[value(change, side * STEP) for side in (-2, -1, 1, 2)] for change in changes])
-    return values @ [1.0, -8.0, 8.0, -1.0] / (12 * STEP), float(abs(values).max())
+    values = np.array(
+        [
+            [
+                Evaluation(equations, state.local + side * step * change, state.line).integral(loads)
+                for side in (-2, -1, 1, 2)
+            ]
+            for change in changes
+        ]
+    )
+    return values @ [1.0, -8.0, 8.0, -1.0] / (12 * step), float(abs(values).max())
 
 
 def find_motion_along(equations: Equations) -> Symmetry | None:
@@ -259,7 +248,7 @@ def simplest(basis: np.ndarray) -> np.ndarray:
         rows[i] /= rows[i, column]
         others = np.arange(len(rows)) != i
         rows[others] -= np.outer(rows[others, column], rows[i])
-    return np.where(abs(rows) > SIMPLE, rows, 0.0).T
+    return np.where(abs(rows) > 1e-9, rows, 0.0).T  # the rest is round-off of the elimination
 
 
 def _held(fields: Fields) -> np.ndarray:
@@ -269,15 +258,12 @@ def _held(fields: Fields) -> np.ndarray:
     return used[fields.number[used] < 0]
 
 
-def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, no_multipliers: bool = False) -> Evaluation:
+def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_multipliers: bool = False) -> Evaluation:
     """Generic state with a random load: the same on any number of ranks, ends held.
 
-    ``equations`` are those of the rod, ``seed`` that of the random numbers, and ``decay`` the ratio of one Fourier
-    coefficient to the next.  With ``no_multipliers`` these are zero.
-
-    Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients: whatever
-    function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
-    translation, say, only shows there.
+    Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients, of which each
+    is smaller than the one before by the ratio ``decay``: whatever function of the arclength a load is, it does work.
+    Those of a ring are closed: whether a pressure is felt by a translation, say, only shows there.
     """
     fields, scene = equations.fields, equations.fields.scene
     values, part = derived(equations, ("generic values", seed, decay), lambda: _generic_values(fields, seed, decay))
@@ -290,7 +276,7 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, no_m
     low, high = sorted(scene.span)
     named[LOAD] = low + (high - low) * part
     r = named.get("r", 0.0)
-    for size in NEARER:
+    for size in (1.0, 0.1, 0.01, 1e-3):  # of displacements: a barrier admits no large ones
         state = Evaluation(equations, fields.filled(named | {"r": size * r} if "r" in named else named), equations.line)
         known = equations.loads is None or np.isfinite(state.integral(equations.loads))
         if fields.comm.allreduce(bool(known and np.isfinite(state.covector()).all()), op=MPI.LAND):
@@ -354,7 +340,7 @@ def _toward_clamps(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndar
         if end.fixed_rotation is not None:
             clamp = turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
             values = (1 - at_end) * values + at_end * clamp
-    return turning.normalised(values) if turning.name == "q" else values
+    return turning.normalised(values)
 
 
 class Verification:
@@ -365,11 +351,9 @@ class Verification:
     """
 
     def __init__(self, system: System) -> None:
-        """Nothing is dropped."""
-        self.system = system
+        self.system, self.norm = system, 0.0
         self.dropped: set[int] = set()
         self.notices: list[str] = []
-        self.norm = 0.0
         self._closing: list[PETSc.Vec] | None = None
         self._left, self._generator, self._none = system.new_vector(), system.new_vector(), np.zeros(len(system.drifts))
 
@@ -380,8 +364,12 @@ class Verification:
             equations = self.system.new_vector()
             state.residual(equations)
             failed = self._failing(matrix, state, equations)
-        for i in failed:
-            self.drop(i, state.load)
+        self.dropped |= {*failed}
+        self.notices += [
+            f"No symmetry is the {self.system.symmetries[i]}: it was taken for one, but is no null vector of the "
+            f"second variation at {self.system.scene.load} = {state.load:.6g}; it is left out from there on."
+            for i in failed
+        ]
         return not failed
 
     def _failing(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None) -> list[int]:
@@ -396,15 +384,6 @@ class Verification:
         if self._holds(matrix, tried, state, equations):
             return []
         return [i for i in tried if not self._holds(matrix, [i], state, equations)]
-
-    def drop(self, i: int, at: float) -> None:
-        """Drop a symmetry that failed at a load, in words."""
-        load = self.system.scene.load
-        self.dropped.add(i)
-        self.notices.append(
-            f"No symmetry is the {self.system.symmetries[i]}: it was taken for one, but is no null vector of the "
-            f"second variation at {load} = {at:.6g}; it is left out from there on."
-        )
 
     def read(self) -> list[str]:
         """Notices that nobody has read."""
@@ -425,19 +404,19 @@ class Verification:
             left.setValues(system.drifts, self._none)  # phase conditions, no part of S
         left.assemble()
         size, length = system.norm(g) ** 2, system.in_units(g, -1).norm()
-        quotient = float(np.real(left.dot(g)))
-        # a generator of a hundredth of a unit rotation is small: the state has the symmetry itself, nearly
-        small = RESIDUAL * self.norm * (length + 0.01)
         if equations is not None:
             pulled = system.generators.pulled_back(self._unloaded(state, equations))
             left.array[:own] += weights @ pulled[chosen]
-            quotient = float(np.real(left.dot(g)))
+        quotient = float(np.real(left.dot(g)))
+        # a generator of a hundredth of a unit rotation is small: the state has the symmetry itself, nearly
+        small = 1e-8 * self.norm * (length + 0.01)  # of S g, relative to |S| |g|
         left = system.in_units(left, 1)
         if left.norm() > small:
             self._across_closing(matrix, left)
-        # a generator below SYMMETRIC_STATE explains no eigenvalue
-        excess = abs(quotient) - ZERO * system.stiffness_scale * max(size, SYMMETRIC_STATE**2)
-        return left.norm() <= small and (excess <= 0 or excess <= ROUND_OFF * rounding(matrix, g, g))
+        # what Newton's method makes of a state; a generator below SYMMETRIC_STATE explains no eigenvalue
+        zero = 1e-10 * system.stiffness_scale * max(size, SYMMETRIC_STATE**2)  # relative to the lowest of bending
+        excess = abs(quotient) - zero
+        return left.norm() <= small and (excess <= 0 or excess <= 10 * rounding(matrix, g, g))
 
     def _unloaded(self, state: State, equations: PETSc.Vec) -> PETSc.Vec:
         """The equations without the forces of the drift scalars."""

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from math import sqrt
 from typing import TYPE_CHECKING
 
@@ -51,12 +52,6 @@ twist 1e4 times as stiff as bending.  At a state that it moves by 1e-8/mu, the e
 it is counted as it is down to 1e-8/SYMMETRIC_STATE.  At states that it moves farther the symmetry is verified
 to the round-off of its eigenvalue, and dropped.
 """
-NAMED = 1e-3
-"""Weight of a part, relative to the greatest, above which it is named."""
-ALONG = 1e-5
-"""As :data:`SYMMETRIC_STATE`, of the part of a ring's motion along itself that exact symmetries leave over."""
-SHARE = 0.3
-"""Largest weight of a rigid motion of metric norm one in a drift's force, relative to the symmetry of the same norm."""
 
 
 @dataclass(frozen=True)
@@ -99,25 +94,22 @@ class Symmetry:
                 dofs = np.unique(fields.dofs[target].reshape(-1, len(matrix)), axis=0)
                 places = list(enumerate(dofs.T))
             else:
-                members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group.name == target]
-                places = [(component, fields.copies[:1, i]) for i, component in members]
-            for i, row in places:
-                for j, column in places:
-                    if matrix[i, j]:
-                        rows.append(row)
-                        columns.append(column)
-                        values.append(np.full(len(row), matrix[i, j]))
+                places = [(component, fields.copies[:1, i]) for component, i in _members(fields, target).items()]
+            for (i, row), (j, column) in product(places, places):
+                if matrix[i, j]:
+                    rows.append(row)
+                    columns.append(column)
+                    values.append(np.full(len(row), matrix[i, j]))
         where = (np.concatenate(rows), np.concatenate(columns))
         linear = sp.csr_matrix((np.concatenate(values), where), shape=(len(fields.number),) * 2)
-        return linear + self.along * fields.arclength.derivative if self.along else linear
+        return linear + self.along * fields.derivative if self.along else linear
 
     def __str__(self) -> str:
         """In words what moves: the names of the parts, the rotations and translations of other fields left out."""
-        parts = [p for p, w in zip(self.parts, self.weights, strict=True) if abs(w) > NAMED * abs(self.weights).max()]
+        least = 1e-3 * abs(self.weights).max()  # less of a part is not named
+        parts = [p for p, w in zip(self.parts, self.weights, strict=True) if abs(w) > least]
         names = list(dict.fromkeys(p.name for p in parts if p.name))
-        if self.along:
-            names.insert(0, "motion along itself")
-        return " with ".join(names) or "change of multipliers"
+        return " with ".join(["motion along itself"] * bool(self.along) + names) or "change of multipliers"
 
     @cached_property
     def _targets(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -126,10 +118,8 @@ class Symmetry:
         for weight, part in zip(self.weights, self.parts, strict=True):
             if weight:
                 matrix, constant = out.get(part.target, (0.0, 0.0))
-                out[part.target] = (
-                    matrix + weight * np.array(part.matrix),
-                    constant + weight * np.array(part.constant),
-                )
+                matrix = matrix + weight * np.array(part.matrix)
+                out[part.target] = matrix, constant + weight * np.array(part.constant)
         return out
 
 
@@ -137,54 +127,35 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     """All elementary generators of a scene's fields and groups of scalars; translations are by its natural length."""
     counts = {motion: {g.name: len(fields.groups[g]) for g in fields.groups if g.motion is motion} for motion in Motion}
     positions = {"r", *counts[Motion.POSITION]}
-    vectors = [
-        *(b.name for b in fields.blocks if b.name in ("r", "n")),
-        *counts[Motion.VECTOR],
-        *counts[Motion.POSITION],
-    ]
-    none, still, length = ((0.0,) * 3,) * 3, (0.0,) * 3, fields.scene.units.length
-    out = list[Elementary]()
+    vectors = [b.name for b in fields.blocks if b.name in ("r", "n")]
+    vectors += [*counts[Motion.VECTOR], *counts[Motion.POSITION]]
+    normal, length, out = fields.scene.normal, fields.scene.units.length, list[Elementary]()
     for i, axis in enumerate(AXES, start=1):
-        out += _turning(fields, i)
-        along = tuple(x * length for x in axis)
+        if normal is None:
+            out.append(Elementary("q", left(axis), (0.0,) * 4, f"rotation about e{i}"))
+            out.append(Elementary("q", right(axis), (0.0,) * 4, f"turning of the cross-sections about d{i}"))
+        elif normal == i - 1:
+            out.append(Elementary("angle", ((0.0,),), (1.0,), f"rotation about e{i}"))
         for target in sorted(vectors):
-            out.append(Elementary(target, cross(axis), still, ""))
+            out.append(Elementary(target, cross(axis), (0.0,) * 3, ""))
             if target in positions:
-                out.append(Elementary(target, none, along, f"translation along e{i}"))
-    out += _of_strains(fields)
-    for name, count in sorted(counts[Motion.MIXED].items()):
-        out += _mixing(name, count)
-    return tuple(out)
-
-
-def _turning(fields: Fields, i: int) -> list[Elementary]:
-    """Changes of the rotation by turning about axis ``i`` = 1, 2, 3 of space and of the cross-sections."""
-    axis, turn, none = AXES[i - 1], f"rotation about e{i}", (0.0,) * 4
-    if fields.scene.normal is None:
-        own = Elementary("q", right(axis), none, f"turning of the cross-sections about d{i}")
-        return [Elementary("q", left(axis), none, turn), own]
-    return [Elementary("angle", ((0.0,),), (1.0,), turn)] if fields.scene.normal == i - 1 else []
-
-
-def _mixing(name: str, count: int) -> list[Elementary]:
-    """Rotations in all planes of a group of ``count`` scalars."""
-    out = []
-    for i in range(count):
-        for j in range(i):
+                along = tuple(x * length for x in axis)
+                out.append(Elementary(target, ((0.0,) * 3,) * 3, along, f"translation along e{i}"))
+    if normal is None:
+        out += _of_strains(list(fields.scene.free_strains))
+    for name, count in sorted(counts[Motion.MIXED].items()):  # rotations in all planes of a group of scalars
+        for i, j in zip(*np.tril_indices(count, -1), strict=True):
             turned = np.zeros((count, count))
             turned[i, j], turned[j, i] = 1.0, -1.0
             out.append(Elementary(name, tuple(map(tuple, turned)), (0.0,) * count, ""))
-    return out
+    return tuple(out)
 
 
-def _of_strains(fields: Fields) -> list[Elementary]:
-    """Changes of the strains that are unknowns by turnings of the cross-sections of a rod in space, about each axis.
+def _of_strains(free: list[int]) -> list[Elementary]:
+    """Changes of the ``free`` strains by turnings of the cross-sections about each axis.
 
     A strain that the rod constrains is zero, a stretch one.
     """
-    free = list(fields.scene.free_strains)
-    if not free or fields.scene.normal is not None:
-        return []
     turned, constrained = np.array([cross(axis) for axis in AXES])[:, free], np.array([0.0, 0.0, 1.0])
     constrained[free] = 0.0
     changed = [(x[:, free], x @ constrained) for x in turned]
@@ -204,12 +175,6 @@ def rigid_motions(parts: tuple[Elementary, ...]) -> dict[str, Symmetry]:
     return out
 
 
-def capable(fields: Fields) -> list[Symmetry]:
-    """Rigid motions of space of which the rod is capable: rotations by radian, translations by its natural length."""
-    motions = rigid_motions(elementary_generators(fields)).values()
-    return [motion for motion in motions if motion.weights.any()]
-
-
 def summed(parts: tuple[Elementary, ...], chosen: list[bool]) -> Symmetry:
     """Sum of the ``chosen`` of some elementary generators."""
     return Symmetry(np.array(chosen, dtype=float), parts)
@@ -224,36 +189,25 @@ def add_change(state: NodalValues, target: str, matrix: np.ndarray, constant: np
             values = values + fields.lift(fields.coordinates(fields.discretization.degree), state.constants())
         out[dofs] += values @ matrix.T + constant  # of dofs that cells share, once: the sum is buffered
         return
-    members = {x.component: i for i, x in enumerate(fields.unknown_scalars) if x.group.name == target}
-    change = matrix @ _scalars(state, members, len(constant)) + constant
+    members, values = _members(fields, target), np.zeros(len(constant))
+    known = fields.unknown_scalars[next(iter(members.values()))].group.known
+    if len(members) != len(constant) and known:
+        values[:] = [0.0 if x is None else float(x) for x in known(state.constants())]
+    for component, i in members.items():
+        values[component] = state.local[fields.copies[0, i]]
+    change = matrix @ values + constant
     for component, i in members.items():
         out[fields.copies[:, i]] += change[component]
 
 
-def _scalars(state: NodalValues, members: dict[int, int], count: int) -> np.ndarray:
-    """Values (count,) of a group of scalars, of which the ``members`` are unknown: component and number of each."""
-    fields, values = state.fields, np.zeros(count)
-    known = fields.unknown_scalars[next(iter(members.values()))].group.known
-    if len(members) != count and known:
-        values[:] = [0.0 if x is None else float(x) for x in known(state.constants())]
-    for component, i in members.items():
-        values[component] = state.local[fields.copies[0, i]]
-    return values
+def _members(fields: Fields, group: str) -> dict[int, int]:
+    """Number of each unknown scalar of a group, by its component."""
+    return {x.component: i for i, x in enumerate(fields.unknown_scalars) if x.group.name == group}
 
 
 def derivative(state: NodalValues) -> np.ndarray:
     """Derivative in arclength of a state, local values, the mean of elements at nodes; zero for scalars."""
-    return np.asarray(state.fields.scattered(state.fields.arclength.derivative @ state.local))
-
-
-def mismatch(state: NodalValues) -> float:
-    """Greatest jump between elements of the derivative of rotation or centreline.
-
-    It measures how far the mesh is from the invariance under the motion along itself.
-    """
-    worst = float(abs(times(state.fields.arclength.jumps, state.local)).max(initial=0.0))
-    comm = state.fields.comm
-    return worst if comm.size == 1 else float(comm.allreduce(worst, op=MPI.MAX))
+    return np.asarray(state.fields.scattered(state.fields.derivative @ state.local))
 
 
 def may_slide(scene: Scene) -> bool:
@@ -263,19 +217,14 @@ def may_slide(scene: Scene) -> bool:
 
 
 class Generators:
-    """Changes of states of one :class:`~rodfem.fem.system.System` by its symmetries, in the order of those.
-
-    Of any other motions where they are given: ``g(x) = A x + c``, by one sparse matrix.
-    """
+    """Changes ``g(x) = A x + c`` of the states of a ``system`` by ``motions``, or by its symmetries."""
 
     def __init__(self, system: System, motions: Sequence[Symmetry] | None = None) -> None:
-        """Make the matrices."""
         fields = system.fields
-        self.motions = system.symmetries if motions is None else list(motions)
-        self.system, self.count = system, len(self.motions)
+        self.system, self.motions = system, system.symmetries if motions is None else list(motions)
         scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
         self._rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
-        self._linear = [symmetry.linear(fields) for symmetry in self.motions]
+        self._linear = [motion.linear(fields) for motion in self.motions]
         self._forth = self._stacked(self._linear)
         self._line: Line | None = None
 
@@ -289,39 +238,35 @@ class Generators:
 
     @cached_property
     def _back(self) -> sp.csr_matrix:
-        """``A^t`` of all generators, one below the other."""
         return self._stacked([A.T.tocsr() for A in self._linear])
 
     def _constant(self, state: State) -> np.ndarray:
-        """``c`` of all generators: with ends that are held, and forces that are known, they vary with the load."""
-        fixed = self.fixed(state.line)
-        return self._constant_at(state.line, state.load) if fixed is None else fixed
+        """``c`` of all generators, (count, own rows): with held ends and known forces it may vary with the load."""
+        fields, line = self.system.fields, state.line
 
-    def fixed(self, line: Line) -> np.ndarray | None:
-        """``c`` of all generators along a ``line``, (count, own rows), unless it varies with the load."""
+        def at(load: float) -> np.ndarray:
+            values = NodalValues(fields, fields.filled({LOAD: load}), line)
+            return np.array([motion.change(values)[self._rows] for motion in self.motions])
+
         if line is not self._line:
             low, high = self.system.scene.span
-            found = [self._constant_at(line, load) for load in (low, 0.62 * low + 0.38 * high, high)]
+            found = [at(load) for load in (low, 0.62 * low + 0.38 * high, high)]
             varies = any(np.any(c != found[0]) for c in found)
             self._varies = bool(self.system.comm.allreduce(varies, op=MPI.LOR))
             self._line, self._fixed = line, found[0]
-        return None if self._varies else self._fixed
-
-    def _constant_at(self, line: Line, load: float) -> np.ndarray:
-        fields = self.system.fields
-        at_load = NodalValues(fields, fields.filled({LOAD: load}), line)
-        return np.array([symmetry.change(at_load)[self._rows] for symmetry in self.motions])
+        return at(state.load) if self._varies else self._fixed
 
     def at(self, state: State) -> np.ndarray:
         """All generators at a state, (count, own rows): see :meth:`vector`."""
-        if not self.count:
+        if not self.motions:
             return np.zeros((0, len(self._rows)))
-        return times(self._forth, state.local[self._columns]).reshape(self.count, -1) + self._constant(state)
+        linear = times(self._forth, state.local[self._columns])
+        return linear.reshape(len(self.motions), -1) + self._constant(state)
 
     def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
         """``A^t y`` of all generators, (count, own rows)."""
         own = self.system.gathered(covector)[: len(self._columns)]
-        return times(self._back, own).reshape(self.count, -1)
+        return times(self._back, own).reshape(len(self.motions), -1)
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
         """Vector of the system with these own rows, without component along drifts."""
@@ -350,14 +295,15 @@ class Phase:
     @cached_property
     def conditions(self) -> tuple[PETSc.Vec | None, ...]:
         """``M g`` for each drift scalar as vectors, None where none is active."""
-        return tuple(self.vector(self.rows[i]) if i in self.rows else None for i in range(len(self.offsets)))
+        return self._vectors(self.rows)
 
     @cached_property
     def pushes(self) -> tuple[PETSc.Vec | None, ...]:
         """Forces of the drift scalars as vectors, None where no condition is active."""
-        if self.forces is self.rows:
-            return self.conditions
-        return tuple(self.vector(self.forces[i]) if i in self.rows else None for i in range(len(self.offsets)))
+        return self.conditions if self.forces is self.rows else self._vectors(self.forces)
+
+    def _vectors(self, rows: dict[int, np.ndarray]) -> tuple[PETSc.Vec | None, ...]:
+        return tuple(self.vector(rows[i]) if i in rows else None for i in range(len(self.offsets)))
 
     @property
     def count(self) -> int:
@@ -367,37 +313,6 @@ class Phase:
     def belongs_to(self, x: PETSc.Vec) -> bool:
         """Whether ``x`` is the reference state, or no state can have a phase condition."""
         return not len(self.offsets) or (self.reference is not None and bool(self.reference.equal(x)))
-
-    def motions(self, symmetries: list[Symmetry]) -> list[str]:
-        """In words the motions that carry the reference state through equivalent ones, one for each condition."""
-        out = []
-        for weights in self.broken.values():
-            sums = sum((w * s.weights for w, s in zip(weights, symmetries, strict=True)), 0.0 * weights[:1])
-            along = sum(w * s.along for w, s in zip(weights, symmetries, strict=True))
-            out.append(str(Symmetry(sums, symmetries[0].parts, along)))
-        return out
-
-
-class DriftForces:
-    """What is added to ``M g`` for each drift scalar of one :class:`~rodfem.fem.system.System`."""
-
-    def __init__(self, system: System, rigid: Generators) -> None:
-        """Take the ``rigid`` motions of which the rod of the ``system`` is capable."""
-        self.system, self._rigid = system, rigid
-
-    def __call__(self, state: State, numbers: Sequence[int]) -> np.ndarray:
-        """``M sum_j w_j m_j`` at a ``state`` for the drift scalars of these ``numbers``, (count, own rows).
-
-        The weights ``w`` are at most :data:`SHARE` and differ from number to number, ``m`` are the rigid motions of
-        which the rod is capable, of metric norm one.
-        """
-        motions, system = self._rigid.at(state), self.system
-        images = system.weighed(motions)
-        squares = _summed(system, np.einsum("ij,ij->i", motions, images))
-        sizes = np.sqrt(np.maximum(squares, 0.0))
-        moving = sizes > 0.0
-        generic = np.random.default_rng(0).uniform(-SHARE, SHARE, (len(system.drifts), len(sizes)))
-        return np.asarray((generic[list(numbers)][:, moving] / sizes[moving]) @ images[moving])
 
 
 def no_phase(system: System, reference: PETSc.Vec | None = None) -> Phase:
@@ -412,10 +327,8 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     if count == len(dropped):
         return no_phase(system, reference)
     state: State = system.at(reference)
-    generators = state.generators
-    images = system.weighed(generators)
-    gram = _summed(system, generators @ images.T)
-    combinations, sizes, least = _orthogonal(system, state, gram, dropped)
+    images = system.weighed(state.generators)
+    combinations, sizes, least = _orthogonal(system, state, system.sum(state.generators @ images.T), dropped)
     numbers = [i for i, (size, bound) in enumerate(zip(sizes, least, strict=True)) if size >= bound]
     kept = combinations[[i for i in range(len(sizes)) if i not in numbers]]
     if not numbers:  # a straight rod has all of them itself
@@ -423,16 +336,24 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     weights = combinations[numbers] / np.array([sizes[i] for i in numbers])[:, None]
     rows, offsets, own = weights @ images, np.zeros(count), system.fields.free_owned
     offsets[numbers] = rows[:, : len(own)] @ state.local[own]
-    conditions, more = dict(zip(numbers, rows, strict=True)), system.drift_forces
-    return Phase(
-        conditions,
-        dict(zip(numbers, rows + more(state, numbers), strict=True)) if more else conditions,
-        _summed(system, offsets),
-        dict(zip(numbers, weights, strict=True)),
-        kept,
-        reference.copy(),
-        system.generators.vector,
-    )
+    conditions = forces = dict(zip(numbers, rows, strict=True))
+    if system.rigid is not None:
+        forces = dict(zip(numbers, rows + _generic_forces(system, system.rigid, state, numbers), strict=True))
+    broken = dict(zip(numbers, weights, strict=True))
+    return Phase(conditions, forces, system.sum(offsets), broken, kept, reference.copy(), system.generators.vector)
+
+
+def _generic_forces(system: System, rigid: Generators, state: State, numbers: list[int]) -> np.ndarray:
+    """``M sum_j w_j m_j`` at a ``state`` for the drift scalars of these ``numbers``, (count, own rows).
+
+    The weights ``w`` differ from number to number, ``m`` are the ``rigid`` motions, of metric norm one.
+    """
+    motions = rigid.at(state)
+    images = system.weighed(motions)
+    sizes = np.sqrt(np.maximum(system.sum(np.einsum("ij,ij->i", motions, images)), 0.0))
+    moving = sizes > 0.0
+    generic = np.random.default_rng(0).uniform(-0.3, 0.3, (len(system.drifts), len(sizes)))
+    return np.asarray((generic[numbers][:, moving] / sizes[moving]) @ images[moving])
 
 
 def _orthogonal(
@@ -459,10 +380,8 @@ def _orthogonal(
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
         sizes.append(system.norm(system.generators.vector(rest @ state.generators)))
         combinations = np.vstack([combinations, rest])
-        least.append(max(10.0 * mismatch(state), ALONG))
+        # the jumps of the derivative between elements say how far the mesh is from this invariance
+        jumps = float(abs(times(state.fields.derivative_jumps, state.local)).max(initial=0.0))
+        jumps = jumps if system.comm.size == 1 else float(system.comm.allreduce(jumps, op=MPI.MAX))
+        least.append(max(10.0 * jumps, 1e-5))  # as SYMMETRIC_STATE, of what is left over
     return combinations, sizes, least
-
-
-def _summed(system: System, own: np.ndarray) -> np.ndarray:
-    """Sum over the ranks."""
-    return own if system.comm.size == 1 else np.asarray(system.comm.allreduce(own, op=MPI.SUM))

@@ -28,7 +28,15 @@ from rodfem.fem.equations import Equations
 from rodfem.fem.fields import FEW, Discretization
 from rodfem.fem.invariance import Verification, find_motion_along, find_symmetries
 from rodfem.fem.state import LOAD, Line, NodalValues, State
-from rodfem.fem.symmetries import DriftForces, Generators, Symmetry, capable, may_slide, no_phase, phase_at
+from rodfem.fem.symmetries import (
+    Generators,
+    Symmetry,
+    elementary_generators,
+    may_slide,
+    no_phase,
+    phase_at,
+    rigid_motions,
+)
 from rodfem.linalg.chain import Chain, factors_of
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
@@ -41,11 +49,11 @@ from rodfem.timing import Clock
 class System:
     """Residual, Jacobian and metric of a scene at a discretisation, and their borders.
 
-    ``symmetries`` are those found in the equations of the scene; the motion of a closed rod along itself comes last.
-    ``line`` has the parameters that the load of a state stands for if nothing else is said: the scene's load, unless a
-    locus in two parameters is followed.  ``damping`` is a multiple of the metric added to every Jacobian.  It is not
-    zero if a state belongs to a family of equilibria at one and the same load that no symmetry explains: the Jacobian
-    is singular there, and Newton's method must not move along the family.
+    ``symmetries`` are those found in the equations of the scene, or those of another system of it; the motion of a
+    closed rod along itself comes last.  ``line`` has the parameters that the load of a state stands for if nothing else
+    is said: the scene's load, unless a locus in two parameters is followed.  ``damping`` is a multiple of the metric
+    added to every Jacobian.  It is not zero if a state belongs to a family of equilibria at one and the same load that
+    no symmetry explains: the Jacobian is singular there, and Newton's method must not move along the family.
     """
 
     def __init__(
@@ -56,16 +64,10 @@ class System:
         clock: Clock | None = None,
         symmetries: Sequence[Symmetry] | None = None,
     ) -> None:
-        """Allocate all matrices, with the forms that scenes of the same functions share; with known symmetries if any.
-
-        The ``scene`` on the mesh of ``discretization`` is shared among the ranks of ``comm``; ``clock`` measures times;
-        ``symmetries`` are those of another system of the scene.
-        """
         self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.equations = Equations.of(scene, discretization, comm)
-        self.fields = self.equations.fields
-        self.line = self.equations.line
+        self.fields, self.line = self.equations.fields, self.equations.line
         self.symmetries = self._symmetries() if symmetries is None else list(symmetries)
         self.fields.add_drifts(len(self.symmetries))
         number, self.scalars = self.fields.number, self.fields.scalars
@@ -74,12 +76,8 @@ class System:
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
         self._recent: list[tuple[bytes, State]] = []
-        # a row is left for its neighbours and met again
-        self._kept = 4 if self.fields.unknowns <= FEW else 1
-        self._ordinary = scene.units.ordinary
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
-        self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
-        self._no_load = PETSc.LGMap().create(without_load, comm=comm)
+        self._maps = {load: PETSc.LGMap().create(columns, comm=comm) for load, columns in self._columns.items()}
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
         dofs = self.equations.cells.dofs
@@ -98,8 +96,10 @@ class System:
         own, fixed = shared(self.metric), self.fields.unknowns - len(self.drifts)
         self._weights = None if own is None else own.matrix[:fixed, :fixed]
         self.generators = Generators(self)
-        generic = floats(scene) and bool(self.symmetries) and bool(scene.without_potential())
-        self.drift_forces = DriftForces(self, Generators(self, capable(self.fields))) if generic else None
+        self.rigid: Generators | None = None
+        if floats(scene) and self.symmetries and scene.without_potential():
+            motions = rigid_motions(elementary_generators(self.fields)).values()
+            self.rigid = Generators(self, [motion for motion in motions if motion.weights.any()])
         self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
@@ -109,10 +109,7 @@ class System:
             self.compiled = CompiledNewton(self, self.matrix, self.lu)
 
     def _symmetries(self) -> list[Symmetry]:
-        """Symmetries of the scene; found with few elements, which have the same ones, where there are many.
-
-        The motion of a closed rod along itself comes last.
-        """
+        """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
         scene, equations, few = self.scene, self.equations, max(6, 2 * len(self.scene.joints) + 2)
         d = replace(self.fields.discretization, vertices=None)
         if self.fields.unknowns > FEW or self.comm.size > 1:
@@ -152,6 +149,10 @@ class System:
         self.set_load(row, 1.0)
         return row
 
+    def sum(self, own: np.ndarray) -> np.ndarray:
+        """Sum over the ranks."""
+        return own if self.comm.size == 1 else np.asarray(self.comm.allreduce(own, op=MPI.SUM))
+
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors of which this rank has these rows each, (count, own rows)."""
         if self._weights is not None:
@@ -179,15 +180,15 @@ class System:
         line = line or self.line
         # each row is asked for the same state ten times over: what it has derived of itself is kept with it
         values = x.array_r.tobytes() if self.comm.size == 1 else b""
-        for known, state in self._recent:
-            if values == known and line is state.line:
+        for recent, state in self._recent:
+            if values == recent and line is state.line:
                 return state
         gathered, local = self.gathered(x), self.fields.clamps.copy()
         local[self._numbered] = gathered[: len(self._numbered)]
         self.tidy()
         state = State(self, local, gathered[len(self._numbered) :], line)
-        if values:
-            self._recent = [(values, state), *self._recent[: self._kept - 1]]
+        if values:  # a row is left for its neighbours and met again
+            self._recent = [(values, state), *self._recent[: 3 if self.fields.unknowns <= FEW else 0]]
         return state
 
     def tidy(self, vectors: int = 1) -> None:
@@ -250,8 +251,7 @@ class System:
                 if self.has_scalars:
                     matrix.setValue(index, index, 1.0, addv=True)
                 continue
-            begin, end = phase.getOwnershipRange()
-            own = np.arange(begin, end, dtype=PETSc.IntType)
+            own = np.arange(*phase.getOwnershipRange(), dtype=PETSc.IntType)
             matrix.setValues([index], own, phase.array_r, addv=True)
             matrix.setValues(own, [index], push.array_r, addv=True)
 
@@ -277,7 +277,7 @@ class System:
 
     def matrix_in_units(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Second variation at fixed load for unknowns in units of their natural sizes."""
-        if self._ordinary:
+        if self.scene.units.ordinary:
             return matrix
         scaled, sizes = matrix.copy(), self.sizes.copy()
         self.set_load(sizes, 0.0)  # its row is that of a unit matrix, without units
@@ -286,7 +286,7 @@ class System:
 
     def in_units(self, vector: PETSc.Vec, power: int) -> PETSc.Vec:
         """Vector times a power of the natural sizes: 1 for equations, -1 for a change of state."""
-        if self._ordinary:
+        if self.scene.units.ordinary:
             return vector
         out = vector.copy()
         (out.pointwiseMult if power > 0 else out.pointwiseDivide)(vector, self.sizes)
@@ -301,11 +301,20 @@ class System:
 
     def state_matrix(self, *, load: bool = False) -> PETSc.Mat:
         """Allocate a matrix for the second variation at fixed load (row of the load empty, column unless ``load``)."""
-        return new_matrix(self.fields, self._pattern, self._no_load, self._all if load else self._no_load)
+        return new_matrix(self.fields, self._pattern, self._maps[False], self._maps[load])
 
     def metric_matrix(self) -> PETSc.Mat:
         """Allocate a matrix for a metric (of rotations and centreline), whose pattern is part of the other's."""
-        return new_matrix(self.fields, self._metric_pattern, self._no_load, self._no_load)
+        return new_matrix(self.fields, self._metric_pattern, self._maps[False], self._maps[False])
+
+    def _assemble_metric(self) -> PETSc.Mat:
+        metric = self.metric_matrix()
+        self.at(self.new_vector()).assemble_into(metric, self.equations.metric)
+        if self.has_scalars:
+            a, b = self.scene.span
+            metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
+        metric.assemble()
+        return metric
 
     # --- symmetry ----------------------------------------------------------------------------------------------
 
@@ -352,15 +361,8 @@ class System:
     def free_motions(self, x: PETSc.Vec) -> list[str]:
         """In words the motions that carry the state ``x`` through equivalent ones, one for each phase condition."""
         self.set_phase(x)
-        return self.phase.motions(self.symmetries)
-
-    # --- set-up ------------------------------------------------------------------------------------------------
-
-    def _assemble_metric(self) -> PETSc.Mat:
-        metric = self.metric_matrix()
-        self.at(self.new_vector()).assemble_into(metric, self.equations.metric)
-        if self.has_scalars:
-            a, b = self.scene.span
-            metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
-        metric.assemble()
-        return metric
+        if not self.phase.broken:
+            return []
+        parts, along = self.symmetries[0].parts, np.array([s.along for s in self.symmetries])
+        every = np.array([s.weights for s in self.symmetries])
+        return [str(Symmetry(w @ every, parts, float(w @ along))) for w in self.phase.broken.values()]
