@@ -15,8 +15,8 @@ import numpy as np
 
 import rodfem
 from rodfem import Attachment, Discretization, Ordinate, Parameter, Plan, Scene, StepControl, clamped, free, pinned
+from rodfem.continuation.arc import Piece
 from rodfem.continuation.crossings import at
-from rodfem.continuation.piece import Piece
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.reduced_stiffness import Condensation
 

@@ -225,7 +225,7 @@ class Gaps:
         x = richer.transfer(found.x, state=True)
         modes = [richer.transfer(v, state=False) for v in special.null_vectors]
         orthonormalize(modes, richer.system.metric)
-        again = SingularSystem(richer.solver, modes, np.eye(len(modes)), fold=False).solve(x)
+        again = SingularSystem(richer.solver, modes, len(modes), fold=False).solve(x)
         if again is not None and again.size < 0.5 * found.size + again.noise:  # lowered by half: the mesh's own
             return None
         return Gap(special, found)

@@ -93,7 +93,7 @@ class Singular:
 
     def __init__(self, solver: BranchSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
         self.solver, self.plane, self.fold = solver, plane, fold
-        self.states = SingularSystem(solver, near.modes, np.eye(len(near.modes))[:, : near.multiplicity], fold=fold)
+        self.states = SingularSystem(solver, near.modes, near.multiplicity, fold=fold)
         self.inertia, self.metric = self.states.inertia, self.states.inertia.metric
         self.frequencies = NonsymmetricSolver(solver.system) if near.left else None
         self.others = UNSTABLE if near.left else VANISHED
@@ -191,7 +191,7 @@ def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[
     By inverse iteration, of borders that are arbitrary at first.  Of several the left ones are turned to be along the
     right ones of the same number: if a symmetry relates them ``G`` is a multiple of one.
     """
-    states = SingularSystem(solver, [], np.eye(number), fold=False)
+    states = SingularSystem(solver, [], number, fold=False)
     metric = states.inertia.metric
     right = left = [states.inertia.seed(i) for i in range(number)]
     for _ in range(3):

@@ -1,7 +1,8 @@
 """States of a branch between two of its points: the polynomial through both, corrected by Newton's method on a plane.
 
 An :class:`Arc` answers where the branch is at an arclength, and at a load.  A :class:`Chord` is the same between nodes
-of a number or a matrix of which the derivative is known as well; its planes are across the chord.
+of a number or a matrix of which the derivative is known as well, as in a :class:`Piece` the reduced stiffness; its
+planes are across the chord.
 """
 
 from __future__ import annotations
@@ -23,19 +24,14 @@ from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import correct, linear_step
 from rodfem.roots import zero_between
+from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
 from rodfem.tolerances import INSIDE
 
-EXACT = 1e-15
-"""Arclength, in the metric, to which a load is located before it is set."""
 STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
-SETTLES = 1e-2
-"""Distance, in the metric, that a state which was solved for with damping may move without it."""
-STRAYED = 0.3
+STRAYED, LEAST = 0.3, 1e-9
 """Distance of a state from where it is expected, over that from the nearer end, at which it is another branch's; of a
-singular state over the piece."""
-LEAST = 1e-9
-"""That distance, in the metric, which is round-off."""
+singular state over the piece.  The second one, in the metric, is round-off."""
 DIFFERENCE = 1e-5
 """Step of the difference quotients of a margin of convexity, relative to the arc."""
 
@@ -56,13 +52,13 @@ def corrected(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.V
 
 
 class Arc:
-    """The branch of a ``solver`` from a point ``a`` to another one, ``b``, by their states and what tangents they have.
+    """The branch of a ``solver`` from a point ``a`` to another one, ``b``, both on its mesh.
 
-    Places are arclengths; states are on planes across the polynomial of least degree through both points.
+    Places are arclengths; states are on planes across the polynomial of least degree through both points and what
+    tangents they have.
     """
 
     def __init__(self, solver: BranchSolver, a: Point, b: Point) -> None:
-        """Take the points, which are on the mesh of the solver."""
         self.solver, self.a, self.b = solver, a, b
 
     def curve(self, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
@@ -114,7 +110,7 @@ class Arc:
 
         low, high = sorted(known)
         margin = INSIDE * (high - low)  # never onto an end: a branch point is a state of the other branch, too
-        return min(max(zero_between(beyond, first, last, EXACT), low + margin), high - margin)
+        return min(max(zero_between(beyond, first, last, 1e-15), low + margin), high - margin)
 
     def lost_convexity(self) -> str:
         """Why a branch ends on the arc; empty where the stored energy stays convex."""
@@ -145,7 +141,7 @@ def lost_between(
     margin = cache(lambda t: convexity.margin(state(t), scales))
 
     def node(t: float, other: float) -> Node:
-        return Node(t, np.array([[margin(t)]]), np.array([[(margin(other) - margin(t)) / (other - t)]]), 0)
+        return _number(t, margin(t), (margin(other) - margin(t)) / (other - t))
 
     last = 0.0
     for t in [*places(node(0.0, DIFFERENCE), node(1.0, 1.0 - DIFFERENCE), 1), 1.0]:
@@ -155,18 +151,22 @@ def lost_between(
     return None
 
 
-def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
-    """The equilibrium ``x`` of a mesh after more steps of Newton's method, one where that makes no difference.
+def _number(s: float, value: float, slope: float) -> Node:
+    """Node of a number."""
+    return Node(s, np.array([[value]]), np.array([[slope]]), 0)
 
-    They are made on the plane across ``row``, with factors of that state, and without damping: where an equilibrium was
-    solved for with it, its factors see little of what a soft mode has left.  A state that slides away along a family
-    makes one step with damping.  ``solver`` has the mesh.
+
+def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
+    """The equilibrium ``x`` after more steps of Newton's method, on the plane across ``row`` and without damping.
+
+    Where an equilibrium was solved for with damping its factors see little of what a soft mode has left.  A state that
+    slides away along a family makes one step with it.
     """
     system, settled = solver.system, x.copy()
     given = system.damping
     try:
         system.damping = 0.0
-        if correct(system, settled, row, reach=SETTLES).converged:
+        if correct(system, settled, row, reach=1e-2).converged:
             return settled
     finally:
         system.damping = given
@@ -177,14 +177,12 @@ def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
 
 @dataclass(frozen=True, eq=False)
 class Knot:
-    """A state of the branch: ``x``, and the derivative ``slope`` of the curve in the place.
-
-    The ``speed`` is the derivative of the place along the unit tangent.
-    """
+    """A state of the branch, and what is known there."""
 
     x: PETSc.Vec
-    slope: PETSc.Vec
-    speed: float
+    slope: PETSc.Vec  # derivative of the curve in the place
+    speed: float  # derivative of the place along the unit tangent
+    reduced: ReducedStiffness | None = None
 
 
 class Chord(ABC):
@@ -196,7 +194,6 @@ class Chord(ABC):
     """
 
     def __init__(self, solver: BranchSolver, a: Row, b: Row) -> None:
-        """Measure the chord."""
         self.solver, self.begin = solver, a.arclength
         self.chord = b.x - a.x
         self.length = self.solver.system.norm(self.chord)
@@ -230,3 +227,37 @@ class Chord(ABC):
         except ConvergenceError:  # a singular state
             return self.node(x, slope)
         return self.node(x, tangent if solver.row(slope).dot(tangent) > ALIGNED else slope)
+
+
+class Piece(Chord):
+    """The piece from the row ``a`` to the row ``b`` of a branch on one mesh, with the reduced stiffness along it."""
+
+    def __init__(self, solver: BranchSolver, condensation: Condensation, a: Point, b: Point, phi: np.ndarray) -> None:
+        """Take the border ``phi`` of the matrices that ``condensation`` makes for the ``solver``."""
+        super().__init__(solver, a, b)
+        self.condensation, self.phi = condensation, phi
+        self.moving = np.eye(phi.shape[1])
+
+    def leave_out(self, still: np.ndarray) -> None:
+        """Leave the amplitudes ``still`` (k, m), along which eigenvalues stay zero, out of nodes made from now on."""
+        self.moving = np.linalg.svd(still)[0][:, still.shape[1] :]
+
+    @property
+    def still(self) -> int:
+        """Number of amplitudes that were left out."""
+        return self.moving.shape[0] - self.moving.shape[1]
+
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, reduced: ReducedStiffness | None = None) -> Node:
+        """Node at a state with its unit tangent; its reduced stiffness may be known."""
+        reduced = reduced or self.condensation.at(x, tangent, self.phi)
+        speed, Q = float(self.row.dot(tangent)), self.moving
+        knot = Knot(x, tangent * (1.0 / speed), speed, reduced)
+        return Node(self.place(x), Q.T @ reduced.H @ Q, Q.T @ reduced.rate @ Q / speed, reduced.far, knot)
+
+    def turn(self, p: Node, q: Node) -> float | None:
+        """Where the load turns back between two nodes; None where it does not."""
+        load = self.solver.system.scalar
+        a, b = (_number(node.s, load(node.kept.x), load(node.kept.slope)) for node in (p, q))
+        if a.slope.item() * b.slope.item() >= 0:
+            return None
+        return next((p.s + t * (q.s - p.s) for t in places(a, b, 1)), None)

@@ -22,7 +22,7 @@ faster than the margin changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -35,35 +35,28 @@ from rodfem.stability.reduced_stiffness import negative
 from rodfem.stability.spectrum import FINITE
 from rodfem.tolerances import TINY
 
-AXIS = 0.4
-"""Imaginary part of a root, in pieces, below which it may be a pair of crossings."""
-REAL = 1e-6
-"""Imaginary part below which a zero of an interpolant, in lengths of its interval, is real."""
+AXIS, REAL = 0.4, 1e-6
+"""Imaginary parts of a root, in pieces: below the first it may be a pair of crossings, below the second it is real."""
 DEEPEST = 8
 """Divisions of a piece."""
 SHORTEST = 1e-8
 """Length of a piece, in the metric, that is not divided."""
-SAFE, NEAR = 10.0, 0.1
+SAFE = 10.0
 """Times the fourth derivative at one place that bounds it in a piece, and what the cubic is off that is less than the
-rate of an eigenvalue which passes zero once; distance from there, in pieces, at which it is far from zero."""
+rate of an eigenvalue which passes zero once."""
 PLACES = np.linspace(0.02, 0.98, 49)
 """Where other eigenvalues are compared with zero, in pieces."""
-SAME, ALIKE = 1e-12, 0.9
-"""Distance of crossings, in the metric, that are one; cosine of the modes of different ones, at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A state at a place ``s``: its reduced stiffness ``H``, the ``slope`` of that in s, both (k, k).
-
-    The index across the border is ``far``, and ``kept`` is what is to be known of the state otherwise.
-    """
+    """A state at a place ``s``: its reduced stiffness ``H``, the ``slope`` of that in s, both (k, k)."""
 
     s: float
     H: np.ndarray
     slope: np.ndarray
-    far: int
-    kept: Any = None
+    far: int  # the index across the border
+    kept: Any = None  # what else is known of the state
 
     @property
     def index(self) -> int:
@@ -73,17 +66,14 @@ class Node:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Eigenvalues that pass zero at ``s``: ``vectors`` (k, m) of H, the index ``before`` and ``after``.
-
-    The ``piece`` is that between two nodes in which they do, ``width`` the distance of the first from the last of them.
-    """
+    """Eigenvalues that pass zero at ``s`` in a ``piece`` between two nodes."""
 
     s: float
-    vectors: np.ndarray
-    before: int
+    vectors: np.ndarray  # (k, m), of H
+    before: int  # the index on either side
     after: int
     piece: tuple[Node, Node]
-    width: float = 0.0
+    width: float  # distance of the first from the last of them
 
 
 def coefficients(a: Node, b: Node) -> list[np.ndarray]:
@@ -93,18 +83,48 @@ def coefficients(a: Node, b: Node) -> list[np.ndarray]:
     return [a.H, h * a.slope, 3 * d - h * (2 * a.slope + b.slope), h * (a.slope + b.slope) - 2 * d]
 
 
+def at(a: Node, b: Node, t: float) -> np.ndarray:
+    """The cubic at t."""
+    A = coefficients(a, b)
+    return np.asarray(A[0] + t * (A[1] + t * (A[2] + t * A[3])))
+
+
+def rate(a: Node, b: Node, t: float) -> np.ndarray:
+    """Its derivative in t."""
+    A = coefficients(a, b)
+    return np.asarray(A[1] + t * (2 * A[2] + 3 * t * A[3]))
+
+
+def roots(a: Node, b: Node) -> np.ndarray:
+    """All places t at which the cubic is singular, (3k,) complex."""
+    A = coefficients(a, b)
+    # congruence: units in which the largest of the matrices is of size one in each direction
+    size = np.sqrt(sum(abs(np.diagonal(X)) for X in A)) + TINY
+    A = [X / np.outer(size, size) for X in A]
+    k = len(A[0])
+    one, zero = np.eye(k), np.zeros((k, k))
+    left = np.block([[zero, one, zero], [zero, zero, one], [-A[0], -A[1], -A[2]]])
+    p, q = scipy.linalg.eig(left, scipy.linalg.block_diag(one, one, A[3]), right=False, homogeneous_eigvals=True)
+    keep = abs(q) > FINITE * abs(p)
+    return p[keep] / q[keep]
+
+
+def places(a: Node, b: Node, order: int) -> list[float]:
+    """Where a cubic of one row vanishes, or its derivative of an ``order``: all t from 0 to 1, rising."""
+    cubic = Polynomial([A.item() for A in coefficients(a, b)])
+    found = cubic.deriv(order).roots()
+    return sorted(float(t.real) for t in found if abs(t.imag) < REAL and 0.0 <= t.real <= 1.0)
+
+
 def fourth(a: Node, b: Node, c: Node) -> np.ndarray:
     """Size ``|H''''|/4!`` of the fourth derivative (k, k), by what node ``c`` is off the cubic, and its slope."""
     h, left, right = b.s - a.s, c.s - a.s, c.s - b.s
     steep = 2 * abs(left * right) * max(abs(left + right), h / 2)  # in the middle slopes do not tell
-    value = _size(c.H - at(a, b, left / h)) / (left * right) ** 2
-    return value + _size(c.slope - rate(a, b, left / h) / h) / steep
-
-
-def _size(A: np.ndarray) -> np.ndarray:
-    """``(A^2)^(1/2)`` of a symmetric matrix."""
-    values, vectors = np.linalg.eigh(A)
-    return np.asarray(vectors * abs(values) @ vectors.T)
+    out = np.zeros_like(c.H)
+    for off, scale in ((c.H - at(a, b, left / h), (left * right) ** 2), (c.slope - rate(a, b, left / h) / h, steep)):
+        values, vectors = np.linalg.eigh(off)
+        out += vectors * abs(values) @ vectors.T / scale  # (off^2)^(1/2)
+    return out
 
 
 def clear(a: Node, b: Node, off: np.ndarray) -> bool:
@@ -118,34 +138,6 @@ def clear(a: Node, b: Node, off: np.ndarray) -> bool:
         (n == 0 or np.linalg.eigvalsh(turned[:, :n, :n] + margin[:n, :n])[:, -1].max() < 0)
         and (n == len(values) or np.linalg.eigvalsh(turned[:, n:, n:] - margin[n:, n:])[:, 0].min() > 0)
     )
-
-
-def roots(a: Node, b: Node) -> np.ndarray:
-    """All places t at which the cubic is singular, (3k,) complex."""
-    A = coefficients(a, b)
-    # congruence: units in which the largest of the matrices is of size one in each direction
-    size = np.sqrt(sum(abs(np.diagonal(X)) for X in A)) + TINY
-    A = [X / np.outer(size, size) for X in A]
-    k = len(A[0])
-    one, zero = np.eye(k), np.zeros((k, k))
-    left = np.block([[zero, one, zero], [zero, zero, one], [-A[0], -A[1], -A[2]]])
-    right = np.eye(3 * k)
-    right[2 * k :, 2 * k :] = A[3]
-    p, q = scipy.linalg.eig(left, right, right=False, homogeneous_eigvals=True)
-    keep = abs(q) > FINITE * abs(p)
-    return p[keep] / q[keep]
-
-
-def at(a: Node, b: Node, t: float) -> np.ndarray:
-    """The cubic at t."""
-    A = coefficients(a, b)
-    return np.asarray(A[0] + t * (A[1] + t * (A[2] + t * A[3])))
-
-
-def rate(a: Node, b: Node, t: float) -> np.ndarray:
-    """Its derivative in t."""
-    A = coefficients(a, b)
-    return np.asarray(A[1] + t * (2 * A[2] + 3 * t * A[3]))
 
 
 @dataclass
@@ -169,34 +161,31 @@ class Zeros:
         if off is not None and a.far == b.far and clear(a, b, off):
             return []
         found = roots(a, b)
-        real = np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)])
-        groups = together(a, b, real, self.tolerance)
-        ask, miss = _open(a, b, found, groups, off)
-        middle = self._divided(a, b, ask) if depth < DEEPEST else None
-        if middle is None:
-            return list(_passed(a, b, groups))
+        groups = together(a, b, found, self.tolerance)
+        t, miss = _division(a, b, found, groups, off)
+        if t is None or depth >= DEEPEST or b.s - a.s <= SHORTEST:
+            return _passed(a, b, groups)
+        if (middle := self.solve(a, b, a.s + t * (b.s - a.s))) is None:
+            return _passed(a, b, groups)
         known, size = len(self.misses), fourth(a, b, middle)
         out = [*self.between(a, middle, size, depth + 1), *self.between(middle, b, size, depth + 1)]
         if miss and not out and len(self.misses) == known:
             self.misses.append(middle)
         return out
 
-    def _divided(self, a: Node, b: Node, t: float | None) -> Node | None:
-        """Node at t, unless that is None, or the piece short."""
-        return None if t is None or b.s - a.s <= SHORTEST else self.solve(a, b, a.s + t * (b.s - a.s))
 
-
-def _passed(a: Node, b: Node, groups: list[list[float]]) -> Iterator[Crossing]:
+def _passed(a: Node, b: Node, groups: list[list[float]]) -> list[Crossing]:
     """Crossings at the roots of the cubic, in ``groups``."""
-    index, h = a.index, b.s - a.s
+    out, index, h = list[Crossing](), a.index, b.s - a.s
     for group in groups:
         own, rates = _passing(a, b, group)
         after = index - int(np.sign(rates).sum())
-        yield Crossing(a.s + float(np.mean(group)) * h, own, index, after, (a, b), (group[-1] - group[0]) * h)
+        out.append(Crossing(a.s + float(np.mean(group)) * h, own, index, after, (a, b), (group[-1] - group[0]) * h))
         index = after
+    return out
 
 
-def _open(
+def _division(
     a: Node, b: Node, found: np.ndarray, groups: list[list[float]], off: np.ndarray | None
 ) -> tuple[float | None, bool]:
     """Where a piece is to be divided, None if it need not, and whether that is at a near miss of zero.
@@ -205,16 +194,14 @@ def _open(
     """
     near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0) & (found.real < 1)]
     if a.far == b.far and len(groups) > 1:
-        gaps = [q[0] - p[-1] for p, q in pairwise(groups)]
-        i = int(np.argmax(gaps))
-        return float(np.clip((groups[i][-1] + groups[i + 1][0]) / 2, 0.01, 0.99)), False
+        _, last, first = max((q[0] - p[-1], p[-1], q[0]) for p, q in pairwise(groups))
+        return float(np.clip((last + first) / 2, 0.01, 0.99)), False
     if a.far == b.far and len(near):
         return float(np.clip(near[abs(near.imag).argmin()].real, 0.02, 0.98)), True
     if a.far != b.far or off is None or not groups:
         return 0.47, False
-    if _alone(a, b, groups[0], off):
-        return None, False
-    return float(np.mean(groups[0]) + (1 if np.mean(groups[0]) < 0.5 else 0)) / 2, False
+    place = float(np.mean(groups[0]))
+    return None if _alone(a, b, groups[0], off) else (place + (1 if place < 0.5 else 0)) / 2, False
 
 
 def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
@@ -224,7 +211,7 @@ def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
         return False
     values, vectors = np.linalg.eigh([at(a, b, t) for t in PLACES])
     doubt = np.einsum("t,tki,kl,tli->ti", 16 * PLACES**2 * (1 - PLACES) ** 2, vectors, off, vectors)
-    allowed = np.where(abs(PLACES - np.mean(group)) < NEAR, len(group), 0)
+    allowed = np.where(abs(PLACES - np.mean(group)) < 0.1, len(group), 0)  # next to the group its own are near zero
     return bool(((abs(values) <= doubt).sum(axis=1) <= allowed).all())
 
 
@@ -236,25 +223,18 @@ def _passing(a: Node, b: Node, group: list[float]) -> tuple[np.ndarray, np.ndarr
     return own, np.linalg.eigvalsh(own.T @ rate(a, b, t) @ own)
 
 
-def places(a: Node, b: Node, order: int) -> list[float]:
-    """Where a cubic of one row vanishes, or its derivative of an ``order``: all t from 0 to 1, rising."""
-    cubic = Polynomial([float(A[0, 0]) for A in coefficients(a, b)])
-    found = cubic.deriv(order).roots()
-    return sorted(float(t.real) for t in found if abs(t.imag) < REAL and 0.0 <= t.real <= 1.0)
+def together(a: Node, b: Node, found: np.ndarray, tolerance: float) -> list[list[float]]:
+    """Crossings between nodes ``a``, ``b`` among the roots that are ``found``, in order.
 
-
-def together(a: Node, b: Node, places: np.ndarray, tolerance: float) -> list[list[float]]:
-    """``places`` of crossings between nodes ``a``, ``b`` in order, in groups.
-
-    A group has those of different modes that are one point within the ``tolerance``.
+    Those of different modes that are one point within the ``tolerance`` are a group.
     """
     out: list[list[float]] = []
     before, fast = np.zeros(len(a.H)), 0.0
-    for t in places.tolist():
+    for t in np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)]).tolist():
         values, vectors = np.linalg.eigh(at(a, b, t))
         v = vectors[:, abs(values).argmin()]
         speed, apart = abs(float(v @ rate(a, b, t) @ v)), t - out[-1][-1] if out else 1.0
-        alike = abs(v @ before) >= ALIKE and apart * (b.s - a.s) >= SAME
+        alike = abs(v @ before) >= 0.9 and apart * (b.s - a.s) >= 1e-12  # one mode, at two places
         if out and apart * max(speed, fast) <= tolerance and not alike:
             out[-1].append(t)
         else:

@@ -28,14 +28,13 @@ Newton's step is ``dx = s + dlam w + sum_j xi_j V_j``, which changes
 
 the derivatives by central differences, whose errors do not enter the converged result.
 
-*In two parameters* solutions form curves.  The second parameter ``t`` is one more column: its response ``w`` and its
-``b`` are solutions with the same factors and another right-hand side.  One more equation is that of a plane across the
-curve.  Without it the rows have a null vector ``(dlam, dt, xi)``, which is the tangent.  For folds they are regular
-also at a *cusp*, where ``V.y = 0`` and neither parameter changes (Doedel, Keller & Kernevez, Int. J. Bifurcation Chaos
-1 (1991) 493-520); but not where ``b = 0`` for both parameters: there the fold ends on a branch point.  Along a curve of
-branch points ``lam`` leads across it, and ``b_z`` changes by minus the rate of the eigenvalue, times ``xi``: because of
-the symmetry ``s`` and ``w`` have no part along the null vectors.  No difference is taken in a parameter, which next to
-its bounds may make no sense.
+*In two parameters* solutions form curves.  The second parameter ``t`` has a response ``w`` and a ``b``, too, and one
+more equation is that of a plane across the curve.  Without it the null vector ``(dlam, dt, xi)`` of the rows is the
+tangent.  For folds they are regular also at a *cusp*, where ``V.y = 0`` and neither parameter changes (Doedel, Keller &
+Kernevez, Int. J. Bifurcation Chaos 1 (1991) 493-520); but not where ``b = 0`` for both parameters: there the fold ends
+on a branch point.  Along a curve of branch points ``lam`` leads across it, and ``b_z`` changes by minus the rate of the
+eigenvalue, times ``xi``: because of the symmetry ``s`` and ``w`` have no part along the null vectors.  No difference is
+taken in a parameter, which next to its bounds may make no sense.
 
 *Divergence* under loads without a potential: S is not symmetric.  The columns of the border are ``M`` times the left
 null vectors, its rows ``M`` times the right ones; the left ones ``W`` of the transposed equations take the place of
@@ -65,23 +64,18 @@ from rodfem.tolerances import TINY
 
 FARTHEST = 0.5
 """A point farther than this from where it is expected, in the metric, is another one."""
-NOISE = 100.0
-"""Times the rounding errors of ``phi . F``, independent and as large as those of ``phi . S x``, up to which ``beta`` is
-round-off."""
-LEAST = 1e-15
-"""Round-off of ``beta`` where all of these vanish, over the lowest bending eigenvalue."""
-Vectors = Sequence[PETSc.Vec]
 FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""
+Vectors = Sequence[PETSc.Vec]
 
 
 @dataclass(frozen=True)
 class Section:
-    """Plane across a curve of singular states, in the space of the state, the load and a second parameter ``t``.
+    """Plane ``weight t + row . dx = 0`` across a curve of singular states; ``t = 0`` without a ``row`` (n,).
 
     The load of a state stands for what is on the ``line`` of t, and t for what is on the ``second`` line of the load;
-    both are one in natural size, and zero at the state that :meth:`SingularSystem.solve` begins with.  The plane
-    through it is ``weight t + row . dx = 0``, and ``t = 0`` without a ``row`` (n,).  ``reach`` bounds the distance.
+    both are one in natural size, and zero at the state that :meth:`SingularSystem.solve` begins with.  The ``reach``
+    bounds the distance from there.
     """
 
     line: Callable[[float], Line]
@@ -93,56 +87,43 @@ class Section:
 
 @dataclass(frozen=True)
 class Curve:
-    """The curve of singular states through one of them, in the load and a second parameter ``t``.
+    """The curve of singular states through one of them, in the load and a second parameter ``t``."""
 
-    Both changed by ``last`` (2,) at last.  A tangent, of any size, is ``slope`` (2,) in both and ``dx`` in the state;
-    the defining function grows on its ``side``, -1 or 1.  Derivatives in both are ``rates`` (2,) of the mean of the
-    eigenvalues that vanish and ``work`` (2, k) of the equations along the left null vectors; that of the tangent is a
-    ``part`` of the sum of its terms, zero where it is round-off, and of a fold.  ``curvature`` is that of the
-    eigenvalue along the first null vector.  Of the ``modes`` of the border the null vectors are first, ``left`` are the
-    left ones.  ``negative`` counts the other eigenvalues below zero, and is -1 where S is not symmetric.
-    """
-
-    last: np.ndarray
-    slope: np.ndarray
+    last: np.ndarray  # (2,), of both the last change
+    slope: np.ndarray  # (2,), with dx a tangent of any size
     dx: PETSc.Vec
-    side: int
-    rates: np.ndarray
-    work: np.ndarray
-    part: float
-    curvature: float
-    modes: list[PETSc.Vec]
-    left: list[PETSc.Vec]
-    negative: int
+    side: int  # sign of the defining function on the left of the tangent
+    rates: np.ndarray  # (2,), derivatives of the mean of the eigenvalues that vanish
+    work: np.ndarray  # (2, k), derivatives of the equations along the left null vectors
+    part: float  # of the sum of its terms that the work of the tangent is; zero of round-off, and of a fold
+    curvature: float  # derivative of the eigenvalue along the first null vector
+    modes: list[PETSc.Vec]  # of the border, the null vectors first
+    left: list[PETSc.Vec]  # left null vectors
+    negative: int  # other eigenvalues below zero; -1 where S is not symmetric
 
 
 @dataclass(frozen=True)
 class SingularState:
-    """A solution of the singular system: state ``x``, ``load``, and the null ``vectors``, of metric norm 1.
+    """A solution of the singular system: a state ``x`` with null ``vectors`` of metric norm 1.
 
-    Relative to the metric, as eigenvalues are: the unfolding parameters ``beta`` (k,) are an eigenvalue times an
-    amplitude in radian, ``noise`` is the round-off of their size.  ``directions`` are those of the two branches that
-    cross at a branch point with one null vector, unit vectors.  ``response`` is the change of state with the load, the
-    null vectors left out, ``rate`` the derivative of the eigenvalue along it, and ``spread`` what several eigenvalues,
-    whose mean vanishes, differ from that.  ``modes`` are all of the border, relaxed, ``others`` the eigenvalues of
-    those that do not vanish; ``last`` is what Newton's method leaves of the state.  With two parameters ``second`` is
-    the other one, and it is on a ``curve``.
+    The unfolding parameters ``beta`` (k,) are relative to the metric, as eigenvalues are: an eigenvalue times an
+    amplitude in radian.
     """
 
     x: PETSc.Vec
     load: float
     vectors: list[PETSc.Vec]
-    response: PETSc.Vec
+    response: PETSc.Vec  # change of state with the load, the null vectors left out
     beta: np.ndarray
-    noise: float
-    directions: list[PETSc.Vec]
-    rate: float
-    spread: float
-    modes: list[PETSc.Vec]
-    others: np.ndarray
-    last: PETSc.Vec
-    second: float
-    curve: Curve | None
+    noise: float  # round-off of their size
+    directions: list[PETSc.Vec]  # unit vectors along both branches that cross, of one null vector
+    rate: float  # derivative of the eigenvalue along the response
+    spread: float  # what several eigenvalues, whose mean vanishes, differ from that
+    modes: list[PETSc.Vec]  # of the border, relaxed
+    others: np.ndarray  # the eigenvalues of those that do not vanish
+    last: PETSc.Vec  # what Newton's method leaves of the state
+    second: float  # the second parameter
+    curve: Curve | None  # with two parameters
 
     @property
     def size(self) -> float:
@@ -152,47 +133,46 @@ class SingularState:
 
 @dataclass(frozen=True)
 class _Linear:
-    """Solutions of the bordered equations at a state: (V, G), (s, c), a (w, b) for each parameter's column.
+    """The equations linearised at a state; ``y`` and ``f`` (parameters,) are sums over the null vectors."""
 
-    Columns ``Z`` (m, k) and ``N`` (m, m - k) of combinations are of the modes that are to vanish and of the others.  Of
-    the former are the ``left`` null vectors, and the sums ``y`` and ``f`` (parameters,).
-    """
-
-    V: list[PETSc.Vec]
-    G: np.ndarray
-    s: PETSc.Vec
-    c: np.ndarray
-    columns: list[PETSc.Vec]
-    w: list[PETSc.Vec]
-    b: np.ndarray
+    vectors: list[PETSc.Vec]  # s, a w for each parameter, V
+    border: np.ndarray  # (m, 1 + parameters + m): c, b, G
+    columns: list[PETSc.Vec]  # derivatives in the parameters
     Z: np.ndarray
     N: np.ndarray
     left: list[PETSc.Vec]
     y: PETSc.Vec
     f: np.ndarray
 
+    @property
+    def V(self) -> list[PETSc.Vec]:
+        return self.vectors[-len(self.border) :]
+
+    @property
+    def b(self) -> np.ndarray:
+        return self.border[:, 1 : -len(self.border)]
+
+    @property
+    def G(self) -> np.ndarray:
+        return self.border[:, -len(self.border) :]
+
 
 @dataclass(frozen=True)
 class _Step:
-    """Newton's step ``dx``, ``dt``: the ``share`` (parameters + m,) of responses and modes, by ``rows`` of them."""
+    """Newton's step ``dx``: the ``share`` (parameters + m,) of parameters and modes, by ``rows`` of equations."""
 
     dx: PETSc.Vec
-    dt: float
     share: np.ndarray
     rows: np.ndarray
 
 
 class SingularSystem:
-    """The singular system of one mesh, with a border of so many modes."""
+    """The singular system of one mesh, at a ``fold`` or at a branch point, with a border of modes."""
 
-    def __init__(self, solver: BranchSolver, modes: Vectors, critical: np.ndarray, *, fold: bool) -> None:
-        """Border with ``modes``, made orthonormal in M, of which the combinations ``critical`` (m, k) are to vanish.
-
-        At a ``fold``, or at a branch point; the ``solver`` has the mesh.
-        """
-        self.solver, self.system = solver, solver.system
-        self.inertia = solver.inertia
-        self.fold, self.Z = fold, critical
+    def __init__(self, solver: BranchSolver, modes: Vectors, count: int, *, fold: bool) -> None:
+        """Border with ``modes``, of which the first ``count`` are to vanish; the ``solver`` has the mesh."""
+        self.solver, self.system, self.inertia = solver, solver.system, solver.inertia
+        self.fold, self.count = fold, count
         self._bordered, self._transposed = list[Bordered](), PETSc.Mat()
         self._section: Section | None = None
         self.border(modes)
@@ -201,6 +181,7 @@ class SingularSystem:
         """Border with these modes from now on; where S is not symmetric its columns are as many ``left`` ones."""
         self.phi = self._duals(modes)
         self.psi = self._duals(left) if left else self.phi
+        self.Z = np.eye(len(modes), self.count)
 
     def _duals(self, vectors: Vectors) -> list[PETSc.Vec]:
         """M times vectors, made orthonormal."""
@@ -246,7 +227,7 @@ class SingularSystem:
                 return None
             size = self._length(step)
             x.axpy(1.0, step.dx)
-            t += step.dt
+            t += step.share[1] if section else 0.0
             moved += size
             return Correction(moved, size)
 
@@ -263,7 +244,7 @@ class SingularSystem:
             return False
         found = self.inertia.at(x)
         noise = max(found.noise(combine(at.V, z)) for z in at.Z.T)
-        return bool(abs(self.system.scalar(step.dx) * step.rows[-1, 0]) <= noise * at.Z.shape[1])
+        return bool(abs(self.system.scalar(step.dx) * step.rows[-1, 1]) <= noise * self.count)
 
     def _length(self, step: _Step) -> float:
         """Size of a step: in the metric, or in that of the state and in both parameters."""
@@ -272,9 +253,9 @@ class SingularSystem:
         return float(np.sqrt(step.dx.dot(self.inertia.metric * step.dx) + (step.share[:2] ** 2).sum()))
 
     def _at(self, x: PETSc.Vec, t: float, *, moved: bool = False) -> Factored:
-        """S at a state, and at a value of the second parameter where there is one; ``moved`` from the last state.
+        """S at a state and a second parameter; ``moved`` from the last state, with its phase conditions.
 
-        Phase conditions stay then: their changes are felt by no vector without drift.
+        Changes of these are felt by no vector without drift.
         """
         if self._section is not None:
             self.system.line = self._section.line(t)
@@ -311,19 +292,20 @@ class SingularSystem:
         found = self._at(x, t)
         self._factor(found.matrix)
         columns.insert(0, found.border.copy())
-        equations = system.new_vector()
-        system.at(x).residual(equations)
-        s, c = self._bordered[0].solve(-equations, none)
+        residual = system.new_vector()
+        system.at(x).residual(residual)
+        s, c = self._bordered[0].solve(-residual, none)
         V, G = self._modes(self._bordered[0])
         if old is not None:
-            return replace(old, V=V, G=G, s=s, c=c)
+            return replace(old, vectors=[s, *old.vectors[1 : -len(V)], *V], border=np.column_stack([c, old.b, G]))
         responses = [self._bordered[0].solve(-column, none) for column in columns]
         system.set_load(responses[0][0], 1.0)
         Z, N = self._split(G)
         sides = [V, V if self.psi is self.phi else self._modes(self._bordered[1])[0]]
         null, left = ([combine(side, z) for z in Z.T] for side in sides)
-        w, b = [w for w, _ in responses], np.array([b for _, b in responses])
-        return _Linear(V, G, s, c, columns, w, b, Z, N, left, *self._along_null(x, t, null, left))
+        border = np.column_stack([c, *(b for _, b in responses), G])
+        y, f = self._along_null(x, t, null, left)
+        return _Linear([s, *(w for w, _ in responses), *V], border, columns, Z, N, left, y, f)
 
     def _split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The modes that are to vanish, and the others: eigenvectors of G, by what they have of the last ones."""
@@ -334,15 +316,13 @@ class SingularSystem:
         order = np.argsort(-np.linalg.norm(self.Z.T @ vectors, axis=0))
         return vectors[:, order[:k]], vectors[:, order[k:]]
 
-    def _equations(self, x: PETSc.Vec, at: _Linear) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (m + 1, parameters + m) for changes of the parameters and along V, and right-hand sides (m + 1,)."""
-        still = np.hstack([at.N, at.Z]).T if self.fold else at.N.T
-        trace = np.array([*(at.f + [w.dot(at.y) for w in at.w]), *(v.dot(at.y) for v in at.V)])
-        rows, right = np.hstack([still @ at.b.T, still @ at.G]), -still @ at.c
-        if not self.fold:
-            held, free = self._held(x, at, trace)
-            rows, right = np.vstack([rows, held]), np.append(right, free)
-        return np.vstack([rows, trace]), np.append(right, np.trace(at.Z.T @ at.G @ at.Z) - at.s.dot(at.y))
+    def _equations(self, x: PETSc.Vec, at: _Linear) -> np.ndarray:
+        """Rows (m + 1, 1 + parameters + m) whose products with ``(1, share)`` are to vanish."""
+        forces = (np.hstack([at.N, at.Z]).T if self.fold else at.N.T) @ at.border
+        trace = np.array([v.dot(at.y) for v in at.vectors])
+        trace[1 : 1 + len(at.f)] += at.f
+        trace[0] -= np.trace(at.Z.T @ at.G @ at.Z)
+        return np.vstack([forces, *([] if self.fold else [self._work(x, at, trace)]), trace])
 
     def _along_null(self, x: PETSc.Vec, t: float, null: Vectors, lefts: Vectors) -> tuple[PETSc.Vec, np.ndarray]:
         """Sums over the null vectors, and the left ones, of ``y`` and of ``f`` (parameters,)."""
@@ -357,13 +337,14 @@ class SingularSystem:
                 y.axpy(share, self._image(found.matrix, left))
         return y, f
 
-    def _held(self, x: PETSc.Vec, at: _Linear, trace: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (k, parameters + m) and right-hand sides (k,) of ``Z^t b = 0``."""
-        k = at.Z.shape[1]
+    def _work(self, x: PETSc.Vec, at: _Linear, trace: np.ndarray) -> np.ndarray:
+        """Rows (k, 1 + parameters + m) of ``Z^t b = 0``."""
+        constant = -at.Z.T @ at.b[:, 0]
         if self._section is not None:
-            return np.hstack([np.zeros((k, 2)), trace[0] / k * at.Z.T]), at.Z.T @ at.b[0]
-        (w,), h = at.w, DIFFERENCE / self.system.norm(at.w[0])
-        r, bend = [self.system.new_vector() for _ in range(k)], self.system.new_vector()
+            return np.column_stack([constant, np.zeros((self.count, 2)), trace[1] / self.count * at.Z.T])
+        w = at.vectors[1]
+        h, r, bend = DIFFERENCE / self.system.norm(w), [self.system.new_vector() for _ in at.left], w.duplicate()
+        bend.set(0.0)
         for sign in (1.0, -1.0):
             found = self.inertia.moved(x + w * (sign * h))
             for image, left in zip(r, at.left, strict=True):
@@ -371,8 +352,10 @@ class SingularSystem:
             bend.axpy(sign / (2 * h), found.matrix * w)
             bend.axpy(sign / (2 * h), found.border)
         self.system.set_load(bend, 0.0)
-        rows = [[bend.dot(left), *(v.dot(image) for v in at.V)] for left, image in zip(at.left, r, strict=True)]
-        return np.array(rows), at.Z.T @ at.b[0] - [at.s.dot(image) for image in r]
+        rows = [[v.dot(image) for v in at.vectors] for image in r]
+        for row, left in zip(rows, at.left, strict=True):
+            row[1] = bend.dot(left)
+        return np.array(rows) + np.pad(constant[:, None], ((0, 0), (0, len(at.vectors) - 1)))
 
     def _image(self, matrix: PETSc.Mat, left: PETSc.Vec) -> PETSc.Vec:
         """``S^t W``, which is known without a transpose where S is symmetric."""
@@ -381,62 +364,60 @@ class SingularSystem:
         self.system.set_load(image, 0.0)
         return image
 
-    def _step(self, at: _Linear, equations: tuple[np.ndarray, np.ndarray], moved: PETSc.Vec, t: float) -> _Step:
+    def _step(self, at: _Linear, rows: np.ndarray, moved: PETSc.Vec, t: float) -> _Step:
         """Newton's step, from ``moved`` and ``t`` off where the section is."""
-        (rows, right), (m, k) = equations, at.Z.shape
+        m, k = at.Z.shape
         if self._section is not None:
-            plane, off = self._plane(at, self._section, moved, t)
-            own, rest = self._follow(at)
-            table, known = np.vstack([rows[m - k :], plane]), np.append(right[m - k :], off)
-            known, table = known - table @ rest, table @ own
-            size = abs(table).max(axis=1)
-            share = own @ np.linalg.solve(table / size[:, None], known / size) + rest
+            own = self._own(at)
+            table = np.vstack([rows[m - k :], self._plane(at, self._section, moved, t)]) @ own
+            size = abs(table[:, 1:]).max(axis=1)
+            share = (own @ [1.0, *np.linalg.solve(table[:, 1:] / size[:, None], -table[:, 0] / size)])[1:]
         else:  # in natural units of eigenvalues and loads: what these do not determine, a free motion, stays as it is
             units, least = np.array([self.solver.units.load, *np.ones(m)]), np.full(m + 1, self.inertia.scale)
             least[m if self.fold else m - k : m] /= units[0]
-            size = np.maximum(least, abs(rows * units).max(axis=1))
-            share = units * np.linalg.lstsq(rows * units / size[:, None], right / size, rcond=FREE)[0]
+            table = rows[:, 1:] * units
+            size = np.maximum(least, abs(table).max(axis=1))
+            share = units * np.linalg.lstsq(table / size[:, None], -rows[:, 0] / size, rcond=FREE)[0]
         self.Z = at.Z
-        dx, dt = combine([at.s, *at.w, *at.V], np.array([1.0, *share])), share[1] if self._section else 0.0
-        return _Step(dx, dt, share, rows)
+        return _Step(combine(at.vectors, np.array([1.0, *share])), share, rows)
 
-    def _follow(self, at: _Linear) -> tuple[np.ndarray, np.ndarray]:
-        """Shares (2 + m, 2 + k) of both parameters and the null vectors, which modes near by follow, and the rest."""
-        k, moved = at.Z.shape[1], at.N @ self._relaxed(at, -np.column_stack([at.b.T, at.c]))
-        own = np.vstack([np.eye(2, 2 + k), np.hstack([moved[:, :2], at.Z])])
-        return own, np.array([0.0, 0.0, *moved[:, 2]])
+    def _own(self, at: _Linear) -> np.ndarray:
+        """Columns (3 + m, 3 + k) of ``s``, both parameters and the null vectors, which modes near by follow."""
+        moved = at.N @ self._rest(at, -at.border[:, :3])
+        return np.block([[np.eye(3, 3 + self.count)], [moved, at.Z]])
 
-    def _plane(self, at: _Linear, section: Section, moved: PETSc.Vec, t: float) -> tuple[np.ndarray, float]:
-        """Row and right-hand side of the equation of the section."""
-        along = [0.0 if section.row is None else section.row.dot(v) for v in (moved, at.s, *at.w, *at.V)]
-        along[0] += section.weight * t
-        along[3] += section.weight
-        return np.array(along[2:]), -(along[0] + along[1])
+    def _plane(self, at: _Linear, section: Section, moved: PETSc.Vec, t: float) -> np.ndarray:
+        """Row of the equation of the section."""
+        row = np.zeros(len(at.vectors)) if section.row is None else np.array([section.row.dot(v) for v in at.vectors])
+        row[0] += (0.0 if section.row is None else section.row.dot(moved)) + section.weight * t
+        row[2] += section.weight
+        return row
 
     def _state(self, x: PETSc.Vec, t: float, at: _Linear, step: _Step) -> SingularState:
         """The solution ``x``, ``t``, which the last step has led to."""
-        rows, share, curve, parameters, k = step.rows, step.share, None, len(at.w), at.Z.shape[1]
+        rows, share, curve, k = step.rows, step.share, None, self.count
         if self._section is not None:  # the derivatives so far are those of an iterate
             at = self._linear(x, t)
-            rows, share = self._equations(x, at)[0], np.zeros(len(share))
+            rows, share = self._equations(x, at), np.zeros(len(share))
         matrix = self._at(x, t).matrix
         self._factor(matrix)
         modes, _ = self._modes(self._bordered[0])  # of this very state
         null = [combine(modes, z) for z in at.Z.T]
-        noise = NOISE * max(rounding(matrix, v, x) for v in null) + LEAST * self.inertia.scale
+        # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times
+        noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale
         if self._section is not None:
             curve = self._curve(step.share[:2], rows, at, noise)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
-        response = combine([at.w[0], *at.V], np.array([1.0, *(at.N @ self._relaxed(at, -at.b[0]))]))
+        response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self._rest(at, -at.b[:, 0]))]))
         return SingularState(
             x,
             self.system.scalar(x),
             self._oriented(null),
             response,
-            at.Z.T @ (at.c + share[:parameters] @ at.b + at.G @ share[parameters:]),
+            at.Z.T @ (at.border @ [1.0, *share]),
             noise,
             self._directions(response, null, rows, at.Z) if curve is None else [],
-            rows[-1, 0] / k,
+            rows[-1, 1] / k,
             float(np.linalg.norm(soft - np.trace(soft) / k * np.eye(k), 2)),
             modes,
             np.linalg.eigvalsh(others + others.T) / 2,
@@ -453,11 +434,11 @@ class SingularSystem:
 
     def _curve(self, last: np.ndarray, rows: np.ndarray, at: _Linear, noise: float) -> Curve:
         """The curve through a solution, of which the equations are linearised in ``rows``."""
-        (m, k), (own, _) = at.Z.shape, self._follow(at)
-        table = rows[m - k :] @ own
+        (m, k), own = at.Z.shape, self._own(at)[1:, 1:]
+        table = rows[m - k :, 1:] @ own
         slope = np.linalg.svd(table / np.maximum(abs(table).max(axis=1), TINY)[:, None])[2][-1]
         square = np.vstack([table, slope]) if self.fold else np.vstack([table[-1:, :2], slope[:2]])
-        dx = combine([*at.w, *at.V], own @ slope)
+        dx = combine(at.vectors[1:], own @ slope)
         self.system.set_load(dx, 0.0)
         return Curve(
             last,
@@ -465,7 +446,7 @@ class SingularSystem:
             dx,
             int(np.copysign(1.0, np.linalg.det(square))),
             table[-1, :2] / k,
-            -at.b @ at.Z,
+            -at.b.T @ at.Z,
             0.0 if self.fold else self._part(at, slope[:2] / np.linalg.norm(slope[:2]), noise),
             float(table[-1, 2]),
             [combine(at.V, z) for z in np.hstack([at.Z, at.N]).T],
@@ -473,12 +454,12 @@ class SingularSystem:
             self._negative(at.N) if self.psi is self.phi else -1,
         )
 
-    def _relaxed(self, at: _Linear, forces: np.ndarray) -> np.ndarray:
-        """Amplitudes (m - k, ...) of modes near by under ``forces`` (m, ...); what nothing holds is left at rest."""
+    def _rest(self, at: _Linear, forces: np.ndarray) -> np.ndarray:
+        """Amplitudes (m - k, ...) of modes near by under ``forces`` (m, ...); zero where nothing holds a mode."""
         G = at.N.T @ at.G @ at.N
         values, vectors = np.linalg.eigh((G + G.T) / 2)
-        held = abs(values) > FREE * self.inertia.scale
-        return np.asarray((vectors[:, held] / values[held]) @ vectors[:, held].T @ at.N.T @ forces)
+        stiff = abs(values) > FREE * self.inertia.scale
+        return np.asarray((vectors[:, stiff] / values[stiff]) @ vectors[:, stiff].T @ at.N.T @ forces)
 
     def _part(self, at: _Linear, direction: np.ndarray, noise: float) -> float:
         """Part of the change of the equations along a direction of the parameters that does work on null vectors."""
@@ -506,7 +487,7 @@ class SingularSystem:
         """
         if self.fold or len(null) > 1:
             return []
-        c, b, a = rows[-2, 0], float(rows[-2, 1:] @ Z[:, 0]), float(rows[-1, 1:] @ Z[:, 0])
+        c, b, a = rows[-2, 1], float(rows[-2, 2:] @ Z[:, 0]), float(rows[-1, 2:] @ Z[:, 0])
         root = np.sqrt(max(b * b - a * c, 0.0))
         pivot = -(b + np.copysign(root, b))
         out = []

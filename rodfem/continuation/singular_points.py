@@ -12,19 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.arc import STRAYED
+from rodfem.continuation.arc import STRAYED, Piece
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Crossing, Node
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.piece import Piece
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize
 from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import Index
-from rodfem.stability.reduced_stiffness import SOFT, Condensation, ReducedStiffness
+from rodfem.stability.reduced_stiffness import SOFT, ReducedStiffness
 from rodfem.tolerances import SAME_LOAD, round_off
 
 COUPLED = 1e-5
@@ -60,56 +59,38 @@ def is_fold(solver: BranchSolver, x: PETSc.Vec, null: list[PETSc.Vec]) -> bool:
     return work > FELT * solver.inertia.scale and max(coupling_of(solver, x, v) for v in null) > CLEARLY
 
 
-@dataclass(frozen=True)
-class Change:
-    """Index ``before`` and ``after`` a singular state, ``negative`` at it; ``still`` eigenvalues are zero all along."""
-
-    before: int
-    after: int
-    negative: int
-    still: int = 0
-
-
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Where a singular state is expected: ``x``, ``slope`` of the branch, modes near zero, and those that vanish.
-
-    These are the combinations ``critical`` (m, k) of the ``modes``; ``length`` is that of the piece, ``width`` the
-    distance of several crossings, and ``change`` that of the index.  At a ``crossing`` eigenvalues pass zero; otherwise
-    they touch it.
-    """
+    """Where a singular state is expected."""
 
     x: PETSc.Vec
-    slope: PETSc.Vec
-    modes: list[PETSc.Vec]
-    critical: np.ndarray
-    change: Change
-    length: float
-    crossing: bool = True
-    width: float = 0.0
+    slope: PETSc.Vec  # of the branch
+    modes: list[PETSc.Vec]  # near zero: first those that vanish
+    count: int  # number of these
+    before: int  # the index before it, after it, and at it
+    after: int
+    negative: int
+    length: float  # of the piece
+    crossing: bool = True  # whether eigenvalues pass zero there; else they touch it
+    width: float = 0.0  # distance of several crossings
 
     @property
     def null(self) -> list[PETSc.Vec]:
         """The null vectors that are expected."""
-        return [combine(self.modes, z) for z in self.critical.T]
+        return self.modes[: self.count]
 
 
 def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     """Candidate of a crossing."""
     p, q = crossing.piece
     x, slope = piece.curve(p, q, crossing.s)
-    reduced = piece.condensation.at(x, _unit(piece.solver, slope), piece.phi)
+    reduced = _reduced(piece, x, slope, piece.phi)
     values, own = np.linalg.eigh(reduced.H)
-    order, count = (
-        np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0)),
-        crossing.vectors.shape[1],
-    )
+    order = np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0))
+    before, after, count = crossing.before, crossing.after, crossing.vectors.shape[1]
     near = [i for i in order[count:] if abs(values[i]) < NEARBY * piece.solver.inertia.scale]
-    modes = _modes(piece.condensation, reduced, own[:, [*order[:count], *near]])
-    critical = np.eye(len(modes))[:, :count]
-    negative = crossing.before - (count + crossing.before - crossing.after) // 2
-    change = Change(crossing.before, crossing.after, negative, piece.still)
-    return Candidate(x, slope, modes, critical, change, q.s - p.s, width=crossing.width)
+    modes, negative = _modes(piece, reduced, own[:, [*order[:count], *near]]), before - (count + before - after) // 2
+    return Candidate(x, slope, modes, count, before, after, negative, q.s - p.s, width=crossing.width)
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
@@ -118,44 +99,39 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     An eigenvalue may touch zero there.  The state may be one of more symmetry than its neighbours: its modes are its
     own.
     """
-    condensation, (x, slope) = piece.condensation, piece.curve(p, q, s)
-    reduced = condensation.at(x, _unit(piece.solver, slope), condensation.border(x))
+    x, slope = piece.curve(p, q, s)
+    reduced = _reduced(piece, x, slope, piece.condensation.border(x))
     values, own = np.linalg.eigh(reduced.H)
     zero = abs(values) < SOFT * piece.solver.inertia.scale
     zero[abs(values).argmin()] = True
-    negative = reduced.far + int((values[~zero] < 0).sum())
-    modes = _modes(condensation, reduced, own[:, zero])
-    change = Change(p.index, p.index, negative, piece.still)
-    return Candidate(x, slope, modes, np.eye(len(modes)), change, q.s - p.s, crossing=False)
+    negative, modes = reduced.far + int((values[~zero] < 0).sum()), _modes(piece, reduced, own[:, zero])
+    return Candidate(x, slope, modes, len(modes), p.index, p.index, negative, q.s - p.s, crossing=False)
 
 
 def of_miss(piece: Piece, node: Node) -> Candidate:
     """Candidate near a state at which an eigenvalue is least, and not zero."""
-    knot = node.kept
+    knot, index = node.kept, node.index
     values, own = np.linalg.eigh(knot.reduced.H)
-    modes = _modes(piece.condensation, knot.reduced, own[:, [abs(values).argmin()]])
-    change = Change(node.index, node.index, node.index, piece.still)
-    return Candidate(knot.x, knot.slope, modes, np.eye(1), change, piece.length, crossing=False)
+    modes = _modes(piece, knot.reduced, own[:, [abs(values).argmin()]])
+    return Candidate(knot.x, knot.slope, modes, 1, index, index, index, piece.length, crossing=False)
 
 
-def _unit(solver: BranchSolver, direction: PETSc.Vec) -> PETSc.Vec:
-    return direction * (1.0 / solver.system.norm(direction))
+def _reduced(piece: Piece, x: PETSc.Vec, slope: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
+    return piece.condensation.at(x, slope * (1.0 / piece.solver.system.norm(slope)), phi)
 
 
-def _modes(condensation: Condensation, reduced: ReducedStiffness, vectors: np.ndarray) -> list[PETSc.Vec]:
+def _modes(piece: Piece, reduced: ReducedStiffness, vectors: np.ndarray) -> list[PETSc.Vec]:
     """Modes of vectors of H, orthonormal in the metric."""
-    modes = [condensation.inertia.vector(reduced.W @ v) for v in vectors.T]
-    orthonormalize(modes, condensation.inertia.metric)
+    inertia = piece.solver.inertia
+    modes = [inertia.vector(reduced.W @ v) for v in vectors.T]
+    orthonormalize(modes, inertia.metric)
     return modes
 
 
 def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState | None:
     """The singular state of a candidate; None where there is none near by."""
-    opposite = (
-        at.crossing and abs(at.change.after - at.change.before) < at.critical.shape[1]
-    )  # they have no trace that vanishes
-    critical = at.critical[:, :1] if opposite else at.critical
-    found = SingularSystem(solver, at.modes, critical, fold=fold).solve(at.x)
+    opposite = at.crossing and abs(at.after - at.before) < at.count  # they have no trace that vanishes
+    found = SingularSystem(solver, at.modes, 1 if opposite else at.count, fold=fold).solve(at.x)
     if found is not None and solver.system.distance(found.x, at.x) > STRAYED * at.length:
         return None
     return found
@@ -166,19 +142,17 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
     solver, system, x, null = piece.solver, piece.solver.system, found.x, found.vectors
     tangent = _tangent(solver, at.slope, found, fold=fold)
     system.set_phase(x)
-    index = Index(at.change.negative, system.phase.count + len(null) + at.change.still)
+    index = Index(at.negative, system.phase.count + len(null) + piece.still)
     point = solver.point(x, piece.begin + piece.place(x), tangent, index=index)
     left = (0.0 if fold else load_uncertainty(solver, found)) + round_off(point.load, solver.units.load)
     coupling = max(coupling_of(solver, x, v) for v in null)
     nearby = across(solver.inertia.metric, found.modes, null)
-    kind, changes = FOLD if fold else BRANCH_POINT, (at.change.before, at.change.after)
-    special = SpecialPoint(kind, point, *changes, left, null, nearby, coupling)
+    special = SpecialPoint(FOLD if fold else BRANCH_POINT, point, at.before, at.after, left, null, nearby, coupling)
     special.unfolding = float("nan") if fold else found.size
     special.test_function = "slope" if fold else "mu"
-    more = at.critical.shape[1] - len(null)
+    more = at.count - len(null)
     if more:  # opposite crossings, of which one was solved for
-        special.null_vectors = null + nearby[:more]
-        special.nearby = nearby[more:]
+        special.null_vectors, special.nearby = null + nearby[:more], nearby[more:]
         point.zero += more
         apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
         special.located_to += 2 * max(apart, at.width * abs(system.scalar(at.slope)))

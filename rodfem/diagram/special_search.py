@@ -9,11 +9,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes
+from rodfem.continuation.arc import Piece
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.crossings import Node, Zeros, fourth
 from rodfem.continuation.kinds import IMPERFECT
 from rodfem.continuation.observer import Observer, Remark
-from rodfem.continuation.piece import Piece
 from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.continuation.singular_points import (
     Candidate,
@@ -302,7 +302,7 @@ class SpecialSearch:
         unless the bend is ``resolved`` by the rows, or the branch has ended.
         """
         at = of_miss(piece, node)
-        found = SingularSystem(piece.solver, at.modes, at.critical, fold=False).solve(at.x)
+        found = SingularSystem(piece.solver, at.modes, at.count, fold=False).solve(at.x)
         if found is not None and found.size > found.noise:
             gap = self._open_gap(piece, at, found, ended=resolved)
             if gap is not None and resolved:

@@ -32,34 +32,25 @@ from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.near_zero import quotient_error
 
-NEAR = 1e-3
-"""Eigenvalue of H, over the lowest bending one, below which S is too near singular to be solved with."""
-SOFT = 1e-6
-"""Eigenvalue of H, over the lowest bending one, below which it may be round-off."""
+NEAR, SOFT = 1e-3, 1e-6
+"""Eigenvalues of H, over the lowest bending one: below the first S is too near singular to be solved with, below the
+second it may be round-off."""
 DIFFERENCE, AHEAD = 1e-4, 1e-6
 """Distances of the states whose matrices are differenced, in the metric: on both sides, and ahead alone."""
 ROTATED = 1.0
 """Size of ``W^t M W - 1`` above which a border has become that of other modes."""
-ROUGH = 0.1
-"""Relative accuracy of the eigenvalues of a border: any space near that of their modes serves."""
-MODES = 6
-"""Columns of a border."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedStiffness:
-    """Matrix ``H`` of a state with a border, ``rate`` its derivative along the unit tangent, both (k, k), and W (n, k).
-
-    ``far`` is the index across the border, ``rotated`` how far the amplitudes are from those of the border's modes;
-    eigenvalues within the ``doubt`` are zero to working accuracy.
-    """
+    """Matrix ``H`` of a state with a border, and ``rate``, its derivative along the unit tangent, both (k, k)."""
 
     H: np.ndarray
     rate: np.ndarray
-    far: int
-    W: np.ndarray
-    rotated: float
-    doubt: float
+    far: int  # the index across the border
+    W: np.ndarray  # (n, k)
+    rotated: float  # how far the amplitudes are from those of the border's modes
+    doubt: float  # size of an eigenvalue that is zero to working accuracy
 
     @property
     def zero(self) -> int:
@@ -81,17 +72,15 @@ class Condensation:
     """Reduced stiffness matrices of states on one mesh."""
 
     def __init__(self, inertia: Inertia) -> None:
-        """Begin without a border; the ``inertia`` has the saddle matrix."""
         self.system, self.inertia = inertia.system, inertia
-        self._bordered: dict[int, Bordered] = {}
-        self._columns = np.zeros((0, 0)), np.zeros((0, 0))
+        self._bordered: Bordered | None = None
 
-    def border(self, x: PETSc.Vec, count: int = MODES) -> np.ndarray:
-        """Modes nearest zero at a state ``x``, (own rows, ``count``), fewer if there are no more."""
+    def border(self, x: PETSc.Vec) -> np.ndarray:
+        """The six modes nearest zero at a state ``x``, (own rows, 6), fewer if there are no more; any basis near."""
         found = self.inertia.at(x)
         found.count()
         with self.inertia.afresh():
-            return np.stack([v.array_r.real for v in found.nearest(count, ROUGH)[1]], axis=1)
+            return np.stack([v.array_r.real for v in found.nearest(6, 0.1)[1]], axis=1)
 
     def improved(self, reduced: ReducedStiffness) -> np.ndarray:
         """The border after a step of inverse iteration: ``W``, made orthonormal."""
@@ -101,9 +90,7 @@ class Condensation:
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
         """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
         inertia, found = self.inertia, self.inertia.at(x)
-        if self._columns[0] is not phi:
-            self._columns = phi, inertia.weighed(phi)
-        B = self._columns[1]
+        B = inertia.weighed(phi)
         try:
             below = found.below(0.0)
             Z = found.factors.solve_all(B)
@@ -113,7 +100,7 @@ class Condensation:
         except (ConvergenceError, np.linalg.LinAlgError):
             near = True
         if near:
-            far, H, W = self._by_the_bordered_matrix(x, B)
+            far, H, W = self._by_bordered_matrix(x, B)
             values, vectors = np.linalg.eigh(H)
         else:
             far, W = below - int((values < 0).sum()), Z @ H
@@ -124,15 +111,13 @@ class Condensation:
         rotated = float(abs(np.linalg.eigvalsh(inertia.sum(W.T @ inertia.weighed(W))) - 1.0).max())
         return ReducedStiffness(H, self._rate(x, tangent, H, W), far, W, rotated, doubt)
 
-    def _by_the_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
+    def _by_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
         """``far``, H and W where S is nearly singular, or is."""
-        k = B.shape[1]
-        matrix = self.inertia.at(x).matrix
-        if k not in self._bordered:
-            self._bordered[k] = Bordered(self.system, matrix, k, self.inertia.constraints)
-        bordered = self._bordered[k]
-        far = bordered.factor(matrix, [self.inertia.vector(B[:, j]) for j in range(k)])
-        solved = [bordered.solve(None, e) for e in np.eye(k)]
+        k, matrix = B.shape[1], self.inertia.at(x).matrix
+        if self._bordered is None or self._bordered.k != k:
+            self._bordered = Bordered(self.system, matrix, k, self.inertia.constraints)
+        far = self._bordered.factor(matrix, [self.inertia.vector(column) for column in B.T])
+        solved = [self._bordered.solve(None, e) for e in np.eye(k)]
         H = -np.array([g for _, g in solved])
         return far, _symmetric(H), np.stack([w.array_r for w, _ in solved], axis=1)
 

@@ -12,8 +12,8 @@ from golden_cases import cases, trace
 
 import rodfem
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, Solver, pinned
+from rodfem.continuation.arc import Piece
 from rodfem.continuation.crossings import Node, Zeros, fourth, roots
-from rodfem.continuation.piece import Piece
 from rodfem.forms.energy import bending_and_twist
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.reduced_stiffness import Condensation

@@ -119,9 +119,7 @@ def test_unfolding_is_the_work_of_the_imperfection() -> None:
         straight = diagram(cantilever(0.0), depth=0)
         special = straight.special()[0]
         solver = Solver(cantilever(lateral), Discretization("reduced", 8, 6)).equilibria
-        found = SingularSystem(solver, special.null_vectors, np.eye(special.multiplicity), fold=False).solve(
-            special.point.x
-        )
+        found = SingularSystem(solver, special.null_vectors, special.multiplicity, fold=False).solve(special.point.x)
         assert found is not None
         assert found.load == pytest.approx(EULER, abs=1e-11)
         values.append(found)
