@@ -456,7 +456,7 @@ FAULTS = {
     "stable-in-space-by-frequencies": Fault(
         "rodfem/output/summary.py",
         'if data.get("planar") and interval.in_space is None',
-        'if data.get("planar") and interval.in_space is None and not _is_sweep(data)',
+        'if data.get("planar") and interval.in_space is None and not is_sweep(data)',
         "tests/output/test_summary.py",
     ),
     "the-sign-of-round-off-along-a-locus": Fault(
@@ -1017,13 +1017,13 @@ FAULTS = {
         "rodfem/adaptivity/error_estimate.py", "RESOLVED_TO = 0.1", "RESOLVED_TO = 1e9", f"{ERRORS} {HARD}"
     ),
     "bars-are-rounded": Fault(
-        "rodfem/output/digits.py",
+        "rodfem/output/words.py",
         "ceil(error / 10.0**power * (1 - NEGLIGIBLE))",
         "round(error / 10.0**power)",
         ERRORS,
     ),
     "bar-without-digits-left-out": Fault(
-        "rodfem/output/digits.py",
+        "rodfem/output/words.py",
         "error + abs(value - float(text))",
         "error",
         ERRORS,

@@ -77,8 +77,8 @@ def convert(words: Sequence[str]) -> None:
     Raises :class:`~rodfem.errors.InputError` for files that are unfit.
     """
     from rodfem.file_format import refusal
-    from rodfem.output.convert import FORMATS
     from rodfem.output.files import load_json
+    from rodfem.output.states import FORMATS
     from rodfem.whole_files import writing
 
     parser = Parser(prog="rodfem convert", description=_summary(convert))
@@ -100,7 +100,7 @@ def convert(words: Sequence[str]) -> None:
 def explain(words: Sequence[str]) -> None:
     """A word of the tables, files and pictures, in a sentence or two."""
     from rodfem.app.terminal import WIDTH
-    from rodfem.output.glossary import ENTRIES, explanation, is_entry, title
+    from rodfem.output.table import ENTRIES, entries_of, explanation, title
 
     parser = Parser(prog="rodfem explain", description=_summary(explain))
     parser.add_argument("word", nargs="*", help="as index, BP LP, branch point; none lists all")
@@ -108,7 +108,7 @@ def explain(words: Sequence[str]) -> None:
     if not given:
         print("\n".join(sorted(map(title, ENTRIES), key=str.lower)))
     together = [" ".join(given)] if given else []
-    each = together if any(map(is_entry, together)) or not all(map(is_entry, given)) else given
+    each = together if any(map(entries_of, together)) or not all(map(entries_of, given)) else given
     for name, text in (entry for word in each for entry in explanation(word)):
         width = min(WIDTH, get_terminal_size().columns) if sys.stdout.isatty() else WIDTH
         print(fill(f"{name}: {text}", width, subsequent_indent="  "))

@@ -27,10 +27,9 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import in_decimals, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
 from rodfem.output.table import row_data, special_data
-from rodfem.output.words import COUNT, INDEX, index_in_words, is_estimated, table_of
+from rodfem.output.words import COUNT, INDEX, in_decimals, index_in_words, is_estimated, rounded_up, table_of, with_unit
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.ranks import RANK

@@ -14,8 +14,8 @@ from rodfem.codim2.plane import Interval
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json, refusal
-from rodfem.output.digits import number
 from rodfem.output.files import save_json
+from rodfem.output.words import number
 from rodfem.problem.arguments import finite
 from rodfem.problem.units import Units
 from rodfem.tolerances import NEGLIGIBLE, same_special

@@ -29,7 +29,7 @@ from rodfem.continuation.kinds import GAP
 from rodfem.continuation.prediction import lagrange
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine
-from rodfem.output.digits import number
+from rodfem.output.words import number
 from rodfem.roots import zero_between
 from rodfem.tolerances import TINY
 

@@ -325,9 +325,9 @@ class Diagram:
 
         Raises :class:`~rodfem.errors.SetupError` without xarray.  Collective.
         """
-        from rodfem.output import tables
+        from rodfem.output.states import dataset_of
 
-        return tables.of_branches(self.branches, self.data)
+        return dataset_of(self.branches, self.data)
 
     def view(self) -> Page:
         """Make the page that ``rodfem view`` opens: a notebook shows it, ``.open()`` a browser; collective."""

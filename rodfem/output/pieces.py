@@ -9,14 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, groupby, pairwise
+from itertools import groupby, pairwise
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.errors import InputError
-from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE, index_range, on_kink, stability
+from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE, index_range, stability
 from rodfem.tolerances import SAME_SPECIAL
 
 COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
@@ -31,11 +29,11 @@ Branch = Mapping[str, Any]
 
 
 class Piece(NamedTuple):
-    """Rows ``first`` to ``last`` of a branch, with one index between them.
+    """Rows ``first`` to ``last`` of a branch with one index between them.
 
-    ``negative`` is the index, of a planar rod in its plane, ``in_space`` that among all perturbations (None where it is
-    not known), ``undecided`` the number of eigenvalues that may be negative as well; ``kink`` names functions on a kink
-    of which the states are, where the index is that of one side.
+    ``negative`` is the index, of a planar rod in its plane, ``in_space`` that among all perturbations (None: unknown),
+    ``undecided`` the number of eigenvalues that may be negative as well.  On a ``kink``, of the functions of that name,
+    the index is that of one side.
     """
 
     first: int
@@ -63,13 +61,14 @@ def pieces_of(branch: Branch) -> list[Piece]:
     rows = len(columns["load"])
     known = {(row, side): index for row, *sides in _indices(branch) for side, index in enumerate(sides)}
     kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
-    off, steps = _from_neighbours(columns["negative"], kink), []
+    off, space, steps = _from_neighbours(columns["negative"], kink), _in_space(branch), []
     for a, b in pairwise(range(rows)):
         on = kink[a] if kink[b] else ""
         own = columns["negative"] if on else off
-        ends = [(known.get(end), own[end[0]], undecided[end[0]]) for end in ((a, 1), (b, 0))]
-        steps.append((*_index(ends), on))
-    return _grouped(steps, _in_space(branch))
+        least, more = _index([(known.get(end), own[end[0]], undecided[end[0]]) for end in ((a, 1), (b, 0))])
+        steps.append((least, max(space[a], space[b], least) if space else None, more, on))
+    cuts = [i for i in range(len(steps)) if i == 0 or steps[i] != steps[i - 1]]
+    return [Piece(a, b, *steps[a]) for a, b in pairwise([*cuts, len(steps)])]
 
 
 def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
@@ -77,20 +76,11 @@ def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
 
     Of either end it is known or not, then the index of the row, and the number of undecided eigenvalues there.
     """
-    sure, own, undecided = zip(*ends, strict=True)
-    least = [b if a is None else a for a, b in zip(sure, own, strict=True)]
-    if not any(undecided):
+    least = [own if known is None else known for known, own, _ in ends]
+    if not any(undecided for *_, undecided in ends):
         return max(least), 0
-    more = [0 if known is not None else count for known, count in zip(sure, undecided, strict=True)]
-    return min(least), max(a + b for a, b in zip(least, more, strict=True)) - min(least)
-
-
-def _grouped(steps: Sequence[tuple[int, int, str]], space: Sequence[int]) -> list[Piece]:
-    """Pieces of steps that are alike: their index, how many may be negative as well, and what is on a kink."""
-    most = [max(space[i], space[i + 1], step[0]) if space else None for i, step in enumerate(steps)]
-    each = [(least, inside, more, on) for (least, more, on), inside in zip(steps, most, strict=True)]
-    groups = [[step for step, _ in group] for _, group in groupby(enumerate(each), lambda step: step[1])]
-    return [Piece(group[0], group[-1] + 1, *each[group[0]]) for group in groups]
+    most = [a + (undecided if known is None else 0) for a, (known, _, undecided) in zip(least, ends, strict=True)]
+    return min(least), max(most) - min(least)
 
 
 def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
@@ -105,12 +95,9 @@ def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
         yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
         yield from _neighbours(columns, point) if point.get("negative_after") is not None else ()
     if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
-        near = _at_the_origin(columns["arclength"], columns["undecided"])
+        s, undecided = columns["arclength"], columns["undecided"]
+        near = [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
-
-
-def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
-    return [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
 
 
 def _neighbours(columns: Mapping[str, Any], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:
@@ -122,13 +109,11 @@ def _neighbours(columns: Mapping[str, Any], point: Mapping[str, Any]) -> Iterato
     loads, undecided, row = columns["load"], columns.get("undecided"), int(point["row"])
     located = point.get("located_to") or 0.0
     bar = max(point.get("error_estimate") or 0.0, located)
-    for step, side in ((-1, "before"), (1, "after")):
-        other = row + step
-        while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= (
-            bar if undecided and undecided[other] else located
-        ):
+    for side, rows in (("before", range(row - 1, -1, -1)), ("after", range(row + 1, len(loads)))):
+        for other in rows:
+            if abs(loads[other] - loads[row]) > (bar if undecided and undecided[other] else located):
+                break
             yield other, point[f"negative_{side}"], point[f"negative_{side}"]
-            other += step
 
 
 def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
@@ -140,7 +125,7 @@ def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
 
 
 def _in_space(branch: Branch) -> list[int]:
-    """Index among all perturbations in each row, none where it is not known.
+    """Index among all perturbations in each row, empty where it is not known.
 
     That of a singular row leaves out the eigenvalues that vanish there, so that the other rows decide.
     """
@@ -149,19 +134,16 @@ def _in_space(branch: Branch) -> list[int]:
     return [] if None in column else [0 if row in singular else index for row, index in enumerate(column)]
 
 
-# --- intervals of one kind of stability
-
-
 @dataclass(frozen=True)
 class Interval:
     """Consecutive rows of a ``branch`` of ``diagram.json`` with one ``kind`` of stability, from ``first`` to ``last``.
 
-    ``least`` and ``most`` bound the index, ``in_space`` the index among all perturbations of a planar rod (None where
-    it is not known).  Stability is undecided on a ``kink``, of the functions of that name, and where eigenvalues are
-    too near zero (``soft``).
+    ``least`` and ``most`` bound the index, ``in_space`` is the index among all perturbations of a planar rod (None:
+    unknown).  Stability is undecided on a ``kink``, of the functions of that name, and where eigenvalues are too near
+    zero (``soft``).
     """
 
-    branch: Mapping[str, Any]
+    branch: Branch
     kind: str
     first: int
     last: int
@@ -170,12 +152,6 @@ class Interval:
     in_space: int | None
     kink: str = ""
     soft: bool = False
-
-    @property
-    def why(self) -> str:
-        """Why stability is undecided, in clauses."""
-        soft = "an eigenvalue is too near zero for its sign to be known on this mesh"
-        return "; ".join([on_kink(self.kink)] * bool(self.kink) + [soft] * self.soft)
 
     @property
     def rank(self) -> int:
@@ -187,103 +163,29 @@ class Interval:
         return 4 if self.kind == UNDECIDED and self.soft else (STABLE, PLANAR, UNDECIDED, UNSTABLE).index(self.kind)
 
     @property
-    def resolved(self) -> bool:
-        """Whether the mesh resolves one of its states that were examined, if any was."""
-        found = [s.get("resolved") for s in self.branch["special"] if self.first <= s["row"] <= self.last]
-        return True in found or False not in found
-
-    @property
-    def loads(self) -> tuple[float, float]:
-        """Load at its first and at its last row."""
-        column = self.branch["columns"]["load"]
-        return column[self.first], column[self.last]
-
-    @property
-    def covers(self) -> tuple[float, float]:
-        """Least and greatest load of its rows."""
-        column = self.branch["columns"]["load"][self.first : self.last + 1]
-        return min(column), max(column)
-
-    def energy(self, load: float) -> float:
-        """Stored energy at a load, by linear interpolation between rows."""
-        rows = slice(self.first, self.last + 1)
-        loads, energies = (np.array(self.branch["columns"][name][rows]) for name in ("load", "energy"))
-        order = np.argsort(loads, kind="stable")
-        return float(np.interp(load, loads[order], energies[order]))
+    def loads(self) -> list[float]:
+        """Loads of its rows."""
+        return list(self.branch["columns"]["load"][self.first : self.last + 1])
 
 
-def intervals_of(branch: Mapping[str, Any]) -> list[Interval]:
+def intervals_of(branch: Branch) -> list[Interval]:
     """Intervals of a branch in the order of its rows; none for a branch of one row."""
-    groups = groupby(pieces_of(branch), lambda piece: piece.kind)
-    return [_joined(branch, kind, list(group)) for kind, group in groups]
-
-
-def _joined(branch: Mapping[str, Any], kind: str, pieces: Sequence[Piece]) -> Interval:
-    indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
-    known = None if None in space else max(i for i in space if i is not None)
-    kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
-    soft, ends = any(piece.undecided for piece in pieces), (pieces[0].first, pieces[-1].last)
-    return Interval(branch, kind, *ends, min(indices), max(indices), known, kink, soft)
-
-
-def changes_at(branch: Mapping[str, Any], row: int) -> list[Mapping[str, Any]]:
-    """Special points in a row at which the index changes."""
-    return [s for s in branch["special"] if s["row"] == row and s["negative_before"] != s["negative_after"]]
-
-
-def step_between(one: Interval, after: Interval) -> int:
-    """First row of the step in which two intervals of a branch meet, if no special point is there."""
-    return one.last if after.rank > one.rank else one.last - 1
-
-
-def unlocated(branches: Sequence[Mapping[str, Any]]) -> Iterator[tuple[float, float]]:
-    """Loads of the steps in which stability is lost or won without a special point."""
-    for one, after in (pair for branch in branches for pair in pairwise(intervals_of(branch))):
-        kinds = one.kind, after.kind
-        if STABLE in kinds and UNDECIDED not in kinds and not changes_at(one.branch, one.last):
-            step = one.branch["columns"]["load"][step_between(one, after) :][:2]
-            yield min(step), max(step)
-
-
-def without_stable(stable: Sequence[tuple[float, float]], low: float, high: float) -> Iterator[tuple[float, float]]:
-    """Parts of a range of loads that no ``stable`` range covers, from below."""
-    reached = low
-    for a, b in sorted((a, b) for a, b in stable if b > low and a < high):
-        if a - reached > SAME_SPECIAL * (high - low):
-            yield reached, min(a, high)
-        reached = max(reached, b)
-    if high - reached > SAME_SPECIAL * (high - low):
-        yield reached, high
-
-
-def coexisting(stable: Sequence[Interval]) -> Iterator[tuple[Interval, Interval, float, float]]:
-    """Pairs of stable intervals with a range of loads in common and other energies there: the pair and that range.
-
-    Those of one energy, to what linear interpolation leaves, are mirror images, or one branch twice.  Energies of
-    other states may be the same at one load, of symmetry, say, but not at two.
-    """
-    for one, other in combinations(stable, 2):
-        (a, b), (c, d) = one.covers, other.covers
-        low, high = max(a, c), min(b, d)
-        if high - low > SAME_SPECIAL * max(b - a, d - c):
-            energies = [(x.energy(low + share * (high - low)) for x in (one, other)) for share in (0.5, 0.31)]
-            if any(abs(p - q) > 1e-3 * max(abs(p), abs(q)) for p, q in energies):
-                yield one, other, low, high
-
-
-def intervals_in(branches: Sequence[Mapping[str, Any]], kind: str) -> list[Interval]:
-    """All intervals of one ``kind`` of a diagram."""
-    return [x for branch in branches for x in intervals_of(branch) if x.kind == kind]
-
-
-# --- ends, and the state that is shown
+    out = []
+    for kind, group in groupby(pieces_of(branch), lambda piece: piece.kind):
+        pieces = list(group)
+        indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
+        known = None if None in space else max(i for i in space if i is not None)
+        kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
+        soft, ends = any(piece.undecided for piece in pieces), (pieces[0].first, pieces[-1].last)
+        out.append(Interval(branch, kind, *ends, min(indices), max(indices), known, kink, soft))
+    return out
 
 
 def endings(branch: Branch) -> list[tuple[int, str]]:
     """First and last row of a branch of ``diagram.json``, each with the reason, where it is not the range that ends."""
     notes = "".join(str(special.get("note") or "") for special in branch.get("special", []) if special["row"] == 0)
-    begun = notes.partition(BEGINS)[2]
-    ends = (0, begun), (len(branch["columns"]["load"]) - 1, str(branch.get("ended") or ""))
+    last = len(branch["columns"]["load"]) - 1
+    ends = (0, notes.partition(BEGINS)[2]), (last, str(branch.get("ended") or ""))
     reasons = [(row, re.split(r" at |:| any more", sentence)[0]) for row, sentence in ends]
     return [(row, reason) for row, reason in reasons if not reason.startswith(MEETS) and reason not in COMPLETE]
 
@@ -297,7 +199,7 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
     """Branch, row and words of the state to draw: a stable one well inside a branch that leaves the first one.
 
     Where none is stable there, one of another branch but the first; else one of least index on a branch that leaves the
-    first, said to be unstable; on the first branch only where there is no other.  Raises :class:`InputError` for a
+    first, described as unstable; on the first branch only where there is no other.  Raises :class:`InputError` for a
     diagram without states.
     """
     branches = [branch for branch in data["branches"] if branch["columns"]["load"]]
@@ -313,12 +215,10 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
         return piece.kind == STABLE and aside, leaves, -piece.negative, -(piece.in_space or 0), length
 
     alone = [(branches[0], Piece(0, 0, branches[0]["columns"]["negative"][0], None))]
-    found = [(branch, piece) for branch in branches for piece in pieces_of(branch)] or alone
-    branch, piece = max(found, key=rank)
-    columns = branch["columns"]
-    s = columns["arclength"]
+    branch, piece = max([(branch, piece) for branch in branches for piece in pieces_of(branch)] or alone, key=rank)
+    s = branch["columns"]["arclength"]
     wanted = s[piece.first] + 0.6 * (s[piece.last] - s[piece.first])  # well inside
     row = min(range(piece.first, piece.last + 1), key=lambda row: abs(s[row] - wanted))
     index = index_range(piece.negative, piece.undecided, piece.kink)
     words = piece.kind + {STABLE: "", PLANAR: f", index {piece.in_space}"}.get(piece.kind, f", index {index}")
-    return branch["name"], row, f"{columns['load'][row]:.4g}, {words}"
+    return branch["name"], row, f"{branch['columns']['load'][row]:.4g}, {words}"

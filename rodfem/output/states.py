@@ -1,4 +1,4 @@
-"""States of a run as arrays, read from its ``states.h5``: shapes, and what varies along the rod.
+"""A run as arrays, read from its files: shapes, what varies along the rod, and the formats of other programs.
 
 Strains, contact forces and moments are polynomials of each element.  The file has them at equal places of each, ends
 included where there is more than one: see :mod:`rodfem.fem.resultants`.  Where nothing acts at the end of an element
@@ -7,7 +7,9 @@ strains and curvatures jump by the error of the mesh; forces and moments are con
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import csv
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,10 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from rodfem.continuation.branch import COLUMNS, Branch
 from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, STATES, read_json
+from rodfem.libraries import optional
+from rodfem.modes.modes import load_modes, rows_with_modes
+from rodfem.output.words import row_of
 from rodfem.problem.quaternions import directors
+from rodfem.stability.soft_mode import is_stable, stability
 from rodfem.tolerances import same_place
+from rodfem.whole_files import with_added, write_whole
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +37,18 @@ PROFILES = {"v": "strain", "k": "curvature", "n": "force", "m": "moment"}
 """Symbols of the profiles, components along the directors, and their names in the file."""
 DRIFT = "drift"
 """Beginning of the names of scalars that are zero at every equilibrium."""
+VECTORS = {
+    "r": "centreline, components in space",
+    "directors": "directors d1, d2, d3, components in space",
+    "strain": "strain v along the directors",
+    "curvature": "curvature and twist k along the directors",
+    "force": "contact force along the directors",
+    "moment": "contact moment along the directors",
+}
+"""Fields along the rod, attributes of a point, and what they are."""
+
+
+# --- arrays
 
 
 @dataclass(frozen=True)
@@ -54,17 +74,11 @@ def rows_of(folder: Path) -> Iterator[Rows]:
         for branch in data["branches"]:
             group = file["branches"][branch["name"]]
             stored = {name: np.asarray(x) for name, x in group.items() if isinstance(x, h5py.Dataset)}
-            yield Rows(branch["name"], _columns(branch["columns"], stored), _fields(stored))
-
-
-def _columns(columns: Mapping[str, list[Any]], stored: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Numbers of each row: those of the diagram, nan where there is none, and the scalar unknowns of the states."""
-    out = {}
-    for name, column in columns.items():
-        if all(x is None or isinstance(x, (int, float)) for x in column):
-            out[name] = np.array([np.nan if x is None else x for x in column])
-    scalars = {name: x for name, x in stored.items() if x.ndim == 1 and not name.startswith(DRIFT)}
-    return scalars | out
+            columns = {name: x for name, x in stored.items() if x.ndim == 1 and not name.startswith(DRIFT)}
+            for name, column in branch["columns"].items():
+                if all(x is None or isinstance(x, (int, float)) for x in column):
+                    columns[name] = np.array([np.nan if x is None else x for x in column])
+            yield Rows(branch["name"], columns, _fields(stored))
 
 
 def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
@@ -75,9 +89,8 @@ def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
     nodal |= {name: stored[name] for name in ("r", "q")}
     for row, there in enumerate(np.isfinite(s)):
         here = {name: x[row, there] for name, x in nodal.items()}
-        frames = directors(here["q"])
+        frames, profiles = directors(here["q"]), profiles_of(stored, row)
         here |= {f"d{i + 1}": frames[:, :, i] for i in range(3)}
-        profiles = profiles_of(stored, row)
         here |= {symbol: profiles.at_nodes(symbol, here["s"]) for symbol in PROFILES}
         for name, values in here.items():
             out.setdefault(name, []).append(values)
@@ -112,8 +125,7 @@ class Profiles:
         there = np.zeros(len(inside), dtype=bool)
         for s in loaded:
             there |= same_place(inside, s, float(np.ptp(self.points)))
-        jumps = abs(values[1:, 0] - values[:-1, -1])[~there]
-        return float(jumps.max(initial=0.0))
+        return float(abs(values[1:, 0] - values[:-1, -1])[~there].max(initial=0.0))
 
 
 def profiles_of(group: Mapping[str, Any], row: int) -> Profiles:
@@ -152,3 +164,165 @@ def curve_at(group: Mapping[str, Any], row: int, count: int) -> tuple[Floats, Fl
     known = np.isfinite(s)  # the rows of a mesh with fewer nodes end in nan
     at = np.linspace(s[0], s[known][-1], count)
     return at, *curve_of(s[known], r[known], q[known], at)
+
+
+# --- ParaView
+
+
+def to_vtkhdf(folder: Path, target: Path) -> list[Path]:
+    """Write a file for each branch: a row is a step, the centreline a polyline with all fields; returns the files.
+
+    Modes, where there are any, have a file for each state: vectors at its nodes, real parts of complex ones.  Raises
+    :class:`InputError` for a folder without a run.
+    """
+    written = []
+    for rows in rows_of(folder):
+        path = target / f"{file_name(rows.name)}.vtkhdf"
+        written.append(path)
+        _write_curves(path, rows.fields["r"], {n: x for n, x in rows.fields.items() if n != "r"}, rows.columns)
+    for branch, row in rows_with_modes(folder / "modes.h5"):
+        modes = load_modes(folder / "modes.h5", branch, row)
+        fields, numbers = {"s": [modes.s]}, {"load": np.array([modes.load])}
+        for i, (mu, u, w) in enumerate(zip(modes.value, modes.displacement, modes.rotation, strict=True), start=1):
+            fields |= {f"displacement {i}": [u.real], f"rotation {i}": [w.real]}
+            numbers[f"mu {i}"] = np.array([mu.real])
+        written.append(target / f"modes-{file_name(branch)}-{row}.vtkhdf")
+        _write_curves(written[-1], [modes.r], fields, numbers)
+    return written
+
+
+def file_name(branch: str) -> str:
+    """Name of a branch in that of a file."""
+    return branch.replace(" ", "-").replace("/", "-")
+
+
+def _write_curves(
+    path: Path, curves: list[Floats], fields: Mapping[str, list[Floats]], numbers: Mapping[str, Floats]
+) -> None:
+    """Write curves that change in time: points (m, 3) of each step, fields (m,) or (m, k) by name, numbers of steps.
+
+    The format is VTK's own, https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html, version 2.0,
+    ``PolyData`` with steps.
+    """
+    sizes, steps = np.array([len(curve) for curve in curves]), len(curves)
+    starts, each, none = np.cumsum(sizes) - sizes, np.arange(steps), np.zeros(steps, int)
+
+    def add(file: Any) -> None:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = (2, 0)
+        root.attrs.create("Type", np.bytes_("PolyData"))
+        root["NumberOfPoints"], root["Points"] = sizes, np.concatenate(curves)
+        offsets = np.column_stack([none, sizes]).ravel()  # each step's are one more than it has cells
+        lines = np.ones(steps, int), sizes, offsets, np.concatenate([np.arange(m) for m in sizes])
+        for kind in ("Vertices", "Lines", "Strips", "Polygons"):
+            parts = lines if kind == "Lines" else (none, none, none, none[:0])
+            names = ("NumberOfCells", "NumberOfConnectivityIds", "Offsets", "Connectivity")
+            for name, part in zip(names, parts, strict=True):
+                root[f"{kind}/{name}"] = part
+        time, here = root.create_group("Steps"), np.array([0, 1, 0, 0])  # lines alone
+        time.attrs["NSteps"] = steps
+        time["Values"] = np.arange(steps, dtype=float)
+        time["PartOffsets"], time["NumberOfParts"], time["PointOffsets"] = each, np.ones(steps, int), starts
+        time["CellOffsets"], time["ConnectivityIdOffsets"] = np.outer(each, here), np.outer(starts, here)
+        for name, values in fields.items():
+            root[f"PointData/{name}"], time[f"PointDataOffsets/{name}"] = np.concatenate(values), starts
+        for name, column in numbers.items():
+            root[f"FieldData/{name}"], time[f"FieldDataOffsets/{name}"] = column, each
+            time[f"FieldDataSizes/{name}"] = np.ones((steps, 2), int)
+
+    write_whole({path: with_added(path, add, first=True)})
+
+
+# --- tables
+
+
+def to_csv(folder: Path, target: Path) -> list[Path]:
+    """Write ``rows.csv``, a line for each row of each branch, and ``special.csv``; returns the files.
+
+    Raises :class:`InputError` for a folder without a run.
+    """
+    data = read_json(folder / "diagram.json", DIAGRAM, ("branches",))
+    rows, special = list[dict[str, Any]](), list[dict[str, Any]]()
+    for branch in data["branches"]:
+        about = {"branch": branch["name"]}
+        rows += [about | {"row": row} | row_of(branch, row) for row in range(len(branch["columns"]["load"]))]
+        special += [about | one for one in branch["special"]]
+    contents = {target / "rows.csv": _table(rows), target / "special.csv": _table(special)}
+    write_whole(contents)
+    return list(contents)
+
+
+def _table(rows: list[dict[str, Any]]) -> bytes:
+    """Rows as text, numbers with all their digits, nothing where there is none."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, dict.fromkeys(name for row in rows for name in row), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue().encode()
+
+
+def to_netcdf(folder: Path, target: Path) -> list[Path]:
+    """Write ``diagram.nc``, the content of :meth:`rodfem.Diagram.to_xarray`; returns the file.
+
+    Raises :class:`InputError` for a folder without a run, and :class:`SetupError` without xarray.
+    """
+    data, every = read_json(folder / "diagram.json", DIAGRAM, ("branches", "constants")), list(rows_of(folder))
+    fields = []
+    for rows in every:
+        for row in range(len(rows.columns["load"])):
+            here = {name: values[row] for name, values in rows.fields.items()}
+            frames = np.stack([here[f"d{i + 1}"] for i in range(3)], axis=1)
+            fields.append(here | {name: here[symbol] for symbol, name in PROFILES.items()} | {"directors": frames})
+    columns = {rows.name: _columns(rows, b["columns"]) for rows, b in zip(every, data["branches"], strict=True)}
+    path = target / "diagram.nc"
+    write_whole({path: bytes(_dataset(data, columns, fields).to_netcdf())})
+    return [path]
+
+
+def _columns(rows: Rows, columns: Mapping[str, Any]) -> dict[str, Floats]:
+    """Columns of a branch in files, nan where there is none; files leave out what is decided all along."""
+    none = [None] * len(rows.columns["load"])
+    parts = [columns.get(name) or none for name in ("negative", "undecided", "kink", "uncompared", "negative_in_space")]
+    stable = [
+        is_stable(stability(negative, undecided or 0, kink or uncompared or "", in_space))
+        for negative, undecided, kink, uncompared, in_space in zip(*parts, strict=True)
+    ]
+    known = {"undecided": np.zeros(len(none))} | rows.columns
+    known["stable"] = np.array([np.nan if x is None else x for x in stable])
+    return {name: known.get(name, np.full(len(none), np.nan)) for name in COLUMNS}
+
+
+def dataset_of(branches: Sequence[Branch], data: Mapping[str, Any]) -> Any:
+    """A Dataset of xarray, of branches and of the ``data`` that their ``diagram.json`` has."""
+    fields = [{name: getattr(p, name) for name in ("s", *VECTORS)} for b in branches for p in b.points]
+    return _dataset(data, {b.name: {name: b[name] for name in COLUMNS} for b in branches}, fields)
+
+
+def _dataset(
+    data: Mapping[str, Any], branches: Mapping[str, Mapping[str, Floats]], fields: Sequence[Mapping[str, Floats]]
+) -> Any:
+    """Columns of branches by name, and fields of each row at the nodes; those of a coarser mesh end in nan."""
+    nodes = max(len(here["s"]) for here in fields)
+
+    def stacked(name: str) -> Floats:
+        rows = [here[name] for here in fields]
+        sizes = [[(0, nodes - len(row)), *[(0, 0)] * (row.ndim - 1)] for row in rows]
+        return np.stack([np.pad(row, size, constant_values=np.nan) for row, size in zip(rows, sizes, strict=True)])
+
+    columns: dict[str, Any] = {n: ("point", np.concatenate([b[n] for b in branches.values()])) for n in COLUMNS}
+    columns["s"] = ("point", "node"), stacked("s")
+    for name, words in VECTORS.items():
+        values = stacked(name)
+        columns[name] = ("point", "node", *("director", "component")[4 - values.ndim :]), values, {"long_name": words}
+    sizes = [len(b["load"]) for b in branches.values()]
+    coordinates = {name: columns.pop(name) for name in ("load", "arclength", "s")}
+    coordinates["branch"] = "point", np.repeat([*branches], sizes)
+    coordinates["row"] = "point", np.concatenate([np.arange(size) for size in sizes])
+    out = optional("xarray", "tables").Dataset(columns, coordinates, {"scene": data["scene"]} | data["constants"])
+    out["load"].attrs |= {"long_name": data["parameter_words"] or data["parameter"], "units": data["parameter_unit"]}
+    out["ordinate"].attrs |= {"long_name": data["ordinate"], "units": data["ordinate_unit"]}
+    return out
+
+
+FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv, "netcdf": to_netcdf}
+"""Formats by name, and what writes them."""

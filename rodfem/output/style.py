@@ -20,8 +20,8 @@ from matplotlib.transforms import offset_copy
 
 from rodfem.errors import InputError, printable
 from rodfem.file_format import UNREADABLE
-from rodfem.output.digits import with_unit
-from rodfem.output.pieces import PLANAR, STABLE, UNDECIDED, UNSTABLE
+from rodfem.output.words import with_unit
+from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE
 from rodfem.tolerances import NEGLIGIBLE
 from rodfem.whole_files import draft_of
 

@@ -1,8 +1,8 @@
-"""The table of a diagram: each column of a branch, and each entry of a special point, declared once, in ``table.md``.
+"""The table of a diagram, declared once in ``table.md``, and the glossary, ``glossary.md``.
 
-A row there has the name, type and unit of an entry, what it means, and when it is there.  Files are written
-by it, ``docs/files.md`` has it, and so have the glossary, the page, and the tables of other programs.  A new column is
-one row there, and the line that computes it in :class:`~rodfem.continuation.branch.Point`.
+A row of the table has name, type and unit of a column of a branch, or of an entry of a special point, what it means,
+and when it is there.  Files, ``docs/files.md``, the glossary, the page and other programs' tables follow it.  A new
+column is one row there, and the line that computes it in :class:`~rodfem.continuation.branch.Point`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from difflib import get_close_matches
+from functools import partial
 from importlib.resources import files
 from math import inf, nan
 from operator import attrgetter
@@ -18,17 +20,26 @@ from typing import Any
 import numpy as np
 
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
+from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.observer import Remark
+from rodfem.errors import InputError
 from rodfem.stability.soft_mode import SoftMode
 
 Data = Mapping[str, Any]
 Source = Callable[[Any], Any]
 ROW = re.compile(r"^\| `(\w+)` \| ([^|]+?) \| ([^|]*?) ?\| (.+?) \| ([^|]*?) ?\|$", re.MULTILINE)
-PAGE = (files("rodfem.output") / "table.md").read_text(encoding="utf-8")
+PAGE, GLOSSARY = ((files("rodfem.output") / name).read_text(encoding="utf-8") for name in ("table.md", "glossary.md"))
 
 
-def _soft(attribute: str) -> Source:
-    return lambda point: [plain(getattr(mode, attribute)) for mode in point.soft]
+def plain(value: Any) -> Any:
+    """What JSON can hold: numbers that are not finite become null."""
+    if value is None or isinstance(value, (int, str, list, dict)):
+        return value
+    return float(value) if np.isfinite(value) else None
+
+
+def _soft(attribute: str, point: Point) -> list[Any]:
+    return [plain(getattr(mode, attribute)) for mode in point.soft]
 
 
 ATTRIBUTES = {
@@ -38,7 +49,9 @@ ATTRIBUTES = {
 }
 """Attributes of a special point that have another name than its entries."""
 OF_POINT: dict[str, Source] = {
-    **{("soft" if name == "name" else f"soft_{name}"): _soft(name) for name in ("name", "value", "uncertainty")},
+    "soft": partial(_soft, "name"),
+    "soft_value": partial(_soft, "value"),
+    "soft_uncertainty": partial(_soft, "uncertainty"),
     "unstable": lambda point: point.negative if point.omega2 else None,
 }
 OF_SPECIAL: dict[str, Source] = {
@@ -47,16 +60,12 @@ OF_SPECIAL: dict[str, Source] = {
     "meets": lambda special: list(special.connects_to) if special.connects_to else None,
     "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
 }
-OF_REMARK: dict[str, Source] = {"sentence": str}
 """Where values come from that are no attributes of their name."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One column of a branch, or one entry of a special point: ``name``, ``type``, ``unit``, ``words`` and ``where``.
-
-    ``of`` gives its value, None the attribute of its name.
-    """
+    """One column of a branch, or one entry of a special point; ``of`` is None where it is the attribute of its name."""
 
     name: str
     type: str
@@ -86,19 +95,12 @@ def _entries(section: str, sources: Mapping[str, Source]) -> tuple[Entry, ...]:
     return tuple(Entry(a, b, c, d, e, sources.get(a)) for a, b, c, d, e in ROW.findall(text))
 
 
-COLUMNS, SPECIAL, REMARK = (
-    _entries("columns", OF_POINT),
-    _entries("special", OF_SPECIAL),
-    _entries("remarks", {"sentence": str}),
-)
+COLUMNS, SPECIAL = _entries("columns", OF_POINT), _entries("special", OF_SPECIAL)
+REMARK = _entries("remarks", {"sentence": str})
 """Columns of a branch, one entry a row; entries of a special point, and of a warning or a note."""
 
 
-def plain(value: Any) -> Any:
-    """What JSON can hold: numbers that are not finite become null."""
-    if value is None or isinstance(value, (int, str, list, dict)):
-        return value
-    return float(value) if np.isfinite(value) else None
+# --- files
 
 
 def branch_data(branch: Branch) -> dict[str, Any]:
@@ -146,14 +148,46 @@ def special_values(entry: Data) -> dict[str, Any]:
     read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")]
     values = {ATTRIBUTES.get(name, name): _number(entry.get(name)) for name in read}
     values |= {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
-    values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
-    return values | {"law": _law(entry["law"]) if entry["law"] else None}
-
-
-def _law(law: Data) -> NormalForm:
-    return NormalForm(**{name: _number(law[name]) for name in NormalForm.__annotations__ if name in law})
+    values["connects_to"], law = tuple(entry["meets"]) if entry["meets"] else None, entry["law"]
+    known = {name: _number(law[name]) for name in NormalForm.__annotations__ if name in law} if law else None
+    return values | {"law": known and NormalForm(**known)}
 
 
 def _number(value: Any) -> Any:
     """Value of a file, in which null stands for what is not finite."""
     return nan if value is None else value
+
+
+# --- glossary
+
+
+ENTRIES = dict(line.split(": ", 1) for line in GLOSSARY.split("\n## ", 1)[1].splitlines() if ": " in line)
+"""Text of each entry by its names, which are between bars."""
+KNOWN = {"kind", *(name for key in ENTRIES for name in key.split(" | "))}
+ENTRIES |= {x.name: f"{x.words[:1].upper()}{x.words[1:]}." for x in (*COLUMNS, *SPECIAL) if x.name not in KNOWN}
+NAMES = {name: key for key in ENTRIES for name in key.split(" | ")}
+"""Entry of each name."""
+
+
+def title(entry: str) -> str:
+    """Names of an entry in words, the codes of the terminal among them: ``branch point, BP``."""
+    codes = dict.fromkeys(kind.code for name, kind in KINDS.items() if name in entry.split(" | "))
+    return ", ".join([*entry.split(" | "), *codes])
+
+
+def explanation(word: str) -> list[tuple[str, str]]:
+    """Titles and texts of a word, several for a code of several kinds; raises :class:`InputError` for other words."""
+    found = entries_of(word)
+    if not found:
+        inside = [name for name in NAMES if word.lower() in name.lower().replace(",", "").split()]
+        near = inside[:3] or get_close_matches(word.lower(), NAMES)
+        best = f"{' or '.join(near)}, or rodfem explain" if near else "rodfem explain"
+        raise InputError(f"There is no entry {word!r}: try {best}, which lists all.")
+    return [(title(NAMES[name]), ENTRIES[NAMES[name]]) for name in dict.fromkeys(found)]
+
+
+def entries_of(word: str) -> list[str]:
+    """Names of the entries of a word: those of a code, or its own."""
+    found = [name for name, kind in KINDS.items() if kind.code == word.upper()]
+    wanted = " ".join(word.lower().split())
+    return found or [name for name in NAMES if name.lower() in (wanted, wanted.replace(" ", "_"))]

@@ -1,44 +1,94 @@
-"""Special points and rows of a diagram in words: each is made here, for the terminal, the page, notebooks and commands.
+"""Numbers, special points and rows in words: for the terminal, the page, notebooks and commands.
 
-They are those of the contents of ``diagram.json``; a run that is not saved yet has the same from
+Special points and rows are those of the contents of ``diagram.json``; a run that is not saved yet has the same from
 :mod:`rodfem.output.table`.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, nan
+from math import ceil, floor, inf, isfinite, log10, nan
 from typing import Any
 
 from rodfem.continuation.branch import ORDINATE, PITCHFORK, VERTICAL_BRANCH
 from rodfem.continuation.kinds import FLUTTER, KINDS
 from rodfem.errors import many
-from rodfem.output.digits import NO_ESTIMATE, number
 from rodfem.output.pieces import is_solved
 from rodfem.output.table import soft_modes
 from rodfem.stability import soft_mode
 from rodfem.stability.soft_mode import ONE_SIDE, index_range, on_kink, stability
-from rodfem.tolerances import unit
+from rodfem.tolerances import NEGLIGIBLE, unit
 
 Data = Mapping[str, Any]
 STABLE, PLANAR, UNSTABLE, CRITICAL, UNDECIDED = "stable", "planar", "unstable", "critical", "undecided"
 VERDICTS = {soft_mode.STABLE: STABLE, soft_mode.PLANAR: PLANAR, soft_mode.UNDECIDED: UNDECIDED}
 INDEX, COUNT = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
-READ = ("load", "ordinate")
-"""Numbers of a row whose errors files have; those of energies and of left-most eigenvalues are not estimated."""
-GIVEN = "(given)"
-"""What stands in place of a bound at a load that was asked for."""
+READ = {"load": "error_estimate", "ordinate": "ordinate_error_estimate"}
+"""Numbers of a row whose errors files have, and where special points have them."""
+FINEST, LARGEST = 9e-15, 1e12
+"""Least error, and greatest number, that are written without an exponent."""
+NO_ESTIMATE, GIVEN = " (no estimate)", " (given)"
+"""Behind a number without an error bar, and behind a load that was asked for."""
+WHOLE = 1e-9
+"""Round-off of the logarithm of a power of ten."""
 
 
-@dataclass(frozen=True)
-class Words:
-    """``verdict`` is one of the five above; ``index`` short, as ``0`` or ``0→1``; ``sentence`` says both in full."""
+# --- numbers
 
-    verdict: str
-    index: str
-    sentence: str
+
+def rounded_up(error: float) -> float:
+    """An error with one digit, never smaller than it is (but for round-off)."""
+    if not (isfinite(error) and error > 0):
+        return error
+    power = floor(log10(error))
+    return float(f"{ceil(error / 10.0**power * (1 - NEGLIGIBLE))}e{power}")
+
+
+def number(value: float, error: float, resolved: bool | None = True, scale: float = 0.0) -> str:
+    """A ``value`` with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
+
+    The bar is rounded up; to the error it adds what the digits left out amount to.  ``(at least 3e-02)`` where the mesh
+    has not ``resolved`` what the number is of.  Without an ``error`` that is finite it says so, and is zero where it is
+    round-off of numbers of the ``scale``.
+    """
+    if not isfinite(error):
+        return f"{0.0 if abs(value) <= NEGLIGIBLE * scale else value:.8g}{NO_ESTIMATE}"
+    digits = min(max(-floor(log10(rounded_up(error)) + WHOLE), 0), 13) if error > 0 else 13
+    least = "at least " if resolved is False else ""
+    if (error > 0 and error < FINEST) or abs(value) >= LARGEST:  # of a rod whose units are far from its own size
+        significant = floor(log10(abs(value))) - floor(log10(error)) if abs(value) > error > 0 else 0
+        text = f"{value:.{min(max(significant, 0), 13)}e}" if abs(value) > error else "0"
+    else:
+        text = f"{round(value, digits) + 0.0:.{digits}f}"
+    return f"{text} ({least}{rounded_up(error + abs(value - float(text))):.0e})"
+
+
+def in_decimals(value: float, decimals: int, one: float) -> str:
+    """A number with some decimals, or, where its natural size ``one`` is far from one, as many digits."""
+    if one == 1.0:
+        return f"{round(value, decimals) + 0.0:.{decimals}f}"
+    return "0" if abs(value) < 10.0**-decimals * one else f"{value:.{max(decimals - 4, 3)}e}"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number in words, with the name of its unit if it has one."""
+    return f"{text} [{unit.replace('$', '')}]" if unit else text
+
+
+def eigenvalue_in_words(mu: complex, error: float) -> str:
+    """An eigenvalue with the bound of its error, once; empty where that is not known."""
+    if not isfinite(error):
+        return ""
+    (real, bar), (imaginary, other) = (number(x, error).split(" ", 1) for x in (mu.real, abs(mu.imag)))
+    if not mu.imag:
+        return f"{real} {bar}"
+    return f"{real} {'+' if mu.imag > 0 else '-'} {imaginary} i {max(bar, other, key=lambda x: float(x.strip('()')))}"
+
+
+# --- special points
 
 
 def is_sweep(data: Data) -> bool:
@@ -51,9 +101,6 @@ def row_of(branch: Data, row: int) -> dict[str, Any]:
     return {name: column[row] for name, column in branch["columns"].items()}
 
 
-# --- special points ---------------------------------------------------------------------------------------------------
-
-
 def index_in_words(special: Data, row: Data) -> str:
     """Index at a special point, whose columns are ``row``: before and after if it changes."""
     before, after = special["negative_before"], special["negative_after"]
@@ -63,56 +110,46 @@ def index_in_words(special: Data, row: Data) -> str:
     return index if space is None else f"{index} (in space {space})"
 
 
-def scale_of(data: Data) -> float:
-    """Size of the ordinates of a diagram."""
-    values = [abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"] if x is not None]
-    return max([*values, (data.get("natural") or {}).get("ordinate", 0.0)])
-
-
-def special_in_words(branch: Data, special: Data, scale: float = 0.0) -> tuple[str, str, str]:
-    """Load, ordinate and index of a special point; a load that is given is exact.  ``scale`` is that of ordinates."""
-    resolved = special.get("resolved")
-    load = number(special["load"], _bar(special, "error_estimate"), resolved)
-    ordinate = number(special["ordinate"], _bar(special, "ordinate_error_estimate"), resolved, scale)
-    if KINDS[special["kind"]].given and not is_solved(branch, special):
-        load = f"{special['load']:.10g}"
-    return load, ordinate, index_in_words(special, row_of(branch, special["row"]))
-
-
 def is_estimated(data: Data) -> bool:
     """Whether the error of the load of any special point is estimated."""
-    return any(
-        special.get("error_estimate") is not None for branch in data["branches"] for special in branch["special"]
-    )
+    return any(x.get("error_estimate") is not None for branch in data["branches"] for x in branch["special"])
 
 
 def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
     """Branch, kind, load, ordinate and index of each special point, and remarks; without bars where none is known."""
-    scale, every = scale_of(data), [(branch, special) for branch in data["branches"] for special in branch["special"]]
+    ordinates = [abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"] if x is not None]
+    scale = max([*ordinates, (data.get("natural") or {}).get("ordinate", 0.0)])
     known = is_estimated(data)
-    for branch, special in every:
-        load, ordinate, index = special_in_words(branch, special, scale)
-        load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
-        index += f", {special['zero']} zero" if special["zero"] else ""
-        remarks = _remarks(special, row_of(branch, special["row"]))
-        yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, remarks
+    for branch, special in ((b, special) for b in data["branches"] for special in b["special"]):
+        row = row_of(branch, special["row"])
+        found = {name: _read(special, name, inf, scale * (name == "ordinate")) for name in READ}
+        found |= _given(branch, special)
+        load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in found.values())
+        index = index_in_words(special, row) + (f", {special['zero']} zero" if special["zero"] else "")
+        yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, _remarks(special, row)
+
+
+def _read(special: Data, name: str, unknown: float | None, scale: float = 0.0) -> str:
+    """Load or ordinate of a special point with its bar; ``unknown`` stands for one that it has not."""
+    found = special.get(READ[name])
+    bar = unknown if found is None else found
+    return "" if bar is None else number(special[name], bar, special.get("resolved"), scale)
+
+
+def _given(branch: Data, special: Data) -> dict[str, str]:
+    """Load of a special point by its name where it is given, and exact."""
+    given = KINDS[special["kind"]].given and not is_solved(branch, special)
+    return {"load": f"{special['load']:.10g}"} if given else {}
 
 
 def _remarks(special: Data, row: Data) -> list[str]:
     """What else there is to say of a special point, whose columns are ``row``."""
     remarks = [str(mode) for mode in soft_modes(row)]
     if special["kind"] == FLUTTER and special.get("omega2") is not None:
-        remarks.append(
-            f"double eigenvalue omega^2 = {number(special['omega2'], _bar(special, 'omega2_error_estimate'))}"
-        )
+        bar = special.get("omega2_error_estimate")
+        remarks.append(f"double eigenvalue omega^2 = {number(special['omega2'], inf if bar is None else bar)}")
     remarks += [law_in_words(special)] if special.get("law") else []
     return remarks + ([special["note"]] if special.get("note") else [])
-
-
-def _bar(special: Data, name: str) -> float:
-    """A bound of an error; not finite where there is none."""
-    found = special.get(name)
-    return inf if found is None else found
 
 
 def law_in_words(special: Data) -> str:
@@ -139,45 +176,59 @@ def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, st
     number.
     """
     columns = branch["columns"]
-    relative = columns.get("estimate") or [None] * len(columns["load"])
-    rows = ({name: columns[name][row] for name in READ} for row in range(len(relative)))
-    found = [_reading(values, error, natural) for values, error in zip(rows, relative, strict=True)]
+    found: list[dict[str, str]] = [{} for _ in columns["load"]]
+    for row, error in enumerate(columns.get("estimate") or ()):
+        values = {name: columns[name][row] for name in READ if error is not None and columns[name][row] is not None}
+        found[row] = {name: number(x, error * unit(x, one=natural[name])) for name, x in values.items()}
     for special in branch["special"]:
-        bars = zip(READ, (special.get("error_estimate"), special.get("ordinate_error_estimate")), strict=True)
-        here = {name: number(special[name], x, special.get("resolved")) for name, x in bars if x is not None}
-        given = KINDS[special["kind"]].given and not is_solved(branch, special)
-        found[special["row"]] = here | ({"load": f"{special['load']:.10g} {GIVEN}"} if given else {})
+        here = {name: text for name in READ if (text := _read(special, name, None))}
+        given = {name: text + GIVEN for name, text in _given(branch, special).items()}
+        found[special["row"]] = here | given
     return found
 
 
-def _reading(values: Data, error: float | None, natural: Mapping[str, float]) -> dict[str, str]:
-    """Numbers of a row by name, with bounds of a relative error."""
-    known = {} if error is None else {name: value for name, value in values.items() if value is not None}
-    return {name: number(x, error * unit(x, one=natural[name])) for name, x in known.items()}  # type: ignore[operator]
+# --- rows
 
 
-# --- rows -------------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Words:
+    """``verdict`` is one of the five above; ``index`` short, as ``0`` or ``0→1``; ``sentence`` says both in full."""
+
+    verdict: str
+    index: str
+    sentence: str
 
 
 def words_of(branch: Data, *, planar: bool = False) -> list[Words]:
     """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it.
 
-    Of a ``planar`` rod it is that in its plane, where nothing tells it in space.
+    Of a ``planar`` rod it is that in its plane, where the index in space is unknown.
     """
-    specials: dict[int, list[Data]] = {}
+    specials, warnings, out = defaultdict(list), _warnings(branch), list[Words]()
     for special in branch["special"]:
-        specials.setdefault(special["row"], []).append(special)
-    doubts: dict[int, list[str]] = {}
-    for place, sentence in _warnings(branch):
-        doubts.setdefault(place, []).append(f"Warning: {sentence}.")
-    out = []
+        specials[special["row"]].append(special)
     for place in range(len(branch["columns"]["load"])):
         row = row_of(branch, place)
-        plain = _at_special(row, specials.get(place, [])) or _stability(row)
+        plain = _at_special(row, specials[place]) or _stability(row)
         sentence = plain.sentence
         if planar and plain.verdict == STABLE and row.get("negative_in_space") is None:
             sentence = sentence.replace("Stable", "Stable in its plane (not examined in space)", 1)
-        out.append(Words(plain.verdict, plain.index, " ".join([sentence, *doubts.get(place, [])])))
+        doubts = [f"Warning: {words}." for words in warnings[place]]
+        out.append(Words(plain.verdict, plain.index, " ".join([sentence, *doubts])))
+    return out
+
+
+def _warnings(branch: Data) -> dict[int, list[str]]:
+    """Doubts by rows."""
+    out = defaultdict(list)
+    for change in branch.get("unexplained") or ():
+        for row in (change["row"], change["row"] + 1):
+            out[row].append("the index changes next to this row without a special point")
+    if branch.get("singular_start"):
+        out[0].append("the first state is singular, and not located")
+    for special in branch["special"]:
+        if special.get("resolved") is False:
+            out[special["row"]].append("the mesh does not resolve this state")
     return out
 
 
@@ -196,15 +247,18 @@ def _at_special(row: Data, specials: Sequence[Data]) -> Words | None:
 def _stability(row: Data) -> Words:
     negative, undecided, space = row["negative"], row.get("undecided") or 0, row.get("negative_in_space")
     if row.get("kink"):
-        more = f", and {_too_near_zero(undecided)}" if undecided else ""
-        side = f"{many(negative, 'negative eigenvalue')} on one side{more}"
+        side = f"{many(negative, 'negative eigenvalue')} on one side" + (
+            f", and {_too_near_zero(undecided)}" * bool(undecided)
+        )
         sentence = f"Stability undecided: {on_kink(row['kink'])}; {side}."
         return Words(UNDECIDED, index_range(negative, undecided, row["kink"]), sentence)
     if "omega2" in row:
         return _of_frequencies(negative, row["omega2"])
     verdict = VERDICTS.get(stability(negative, undecided, in_space=space), UNSTABLE)
     index = index_range(negative, undecided) + ("" if space is None or undecided else f" ({space})")
-    return Words(verdict, index, f"{_verdict(negative, undecided, space)}.{_neutral(row['zero'])}")
+    zero = row["zero"]
+    neutral = f" {many(zero, 'eigenvalue')} {'is' if zero == 1 else 'are'} zero." if zero else ""
+    return Words(verdict, index, f"{_verdict(negative, undecided, space)}.{neutral}")
 
 
 def _verdict(negative: int, undecided: int, space: int | None) -> str:
@@ -217,10 +271,6 @@ def _verdict(negative: int, undecided: int, space: int | None) -> str:
     if space:
         return f"Stable in the plane, unstable in space: {many(space, 'negative eigenvalue')} there"
     return "Stable: no negative eigenvalue of the second variation"
-
-
-def _neutral(zero: int) -> str:
-    return f" {many(zero, 'eigenvalue')} {'is' if zero == 1 else 'are'} zero." if zero else ""
 
 
 def _too_near_zero(undecided: int) -> str:
@@ -237,14 +287,3 @@ def _of_frequencies(negative: int, omega2: Sequence[Sequence[float]]) -> Words:
     kinds = [f"{growing} complex (flutter)"] if growing else []
     kinds += [f"{negative - growing} negative (divergence)"] if negative > growing else []
     return Words(UNSTABLE, str(negative), f"Unstable: {found}, {' and '.join(kinds)}.")
-
-
-def _warnings(branch: Data) -> Iterator[tuple[int, str]]:
-    for change in branch.get("unexplained") or ():
-        for row in (change["row"], change["row"] + 1):
-            yield row, "the index changes next to this row without a special point"
-    if branch.get("singular_start"):
-        yield 0, "the first state is singular, and not located"
-    for special in branch["special"]:
-        if special.get("resolved") is False:
-            yield special["row"], "the mesh does not resolve this state"

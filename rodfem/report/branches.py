@@ -16,12 +16,11 @@ from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json
 from rodfem.modes.modes import RIGID
-from rodfem.output.digits import number, with_unit
 from rodfem.output.pieces import endings, pieces_of
 from rodfem.output.plot_diagram import between
 from rodfem.output.plot_frequencies import SPECIAL, curves, ranges_of, top
 from rodfem.output.plot_locus import LINES, in_words, plane_of, stable_region
-from rodfem.output.words import readings_of, words_of
+from rodfem.output.words import number, readings_of, with_unit, words_of
 from rodfem.report.markup import html_of, plain
 from rodfem.tolerances import NEGLIGIBLE, same_special
 from rodfem.writhe import writhe

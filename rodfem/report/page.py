@@ -22,9 +22,9 @@ from typing import Any
 import h5py
 
 from rodfem.file_format import DIAGRAM, STATES, read_json
-from rodfem.output.digits import with_unit
 from rodfem.output.states import check_run
 from rodfem.output.style import mesh_in_words, ordinate_in_words
+from rodfem.output.words import with_unit
 from rodfem.report.branches import DERIVED, loci_of, ordinates_of
 from rodfem.report.markup import html_of, plain_of, script_json
 from rodfem.report.rods import rods_of

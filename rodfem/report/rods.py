@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID, SYMMETRY, Few, load_modes, rows_with_modes, typical_of
-from rodfem.output.digits import eigenvalue_in_words
 from rodfem.output.glyphs import Look, glyphs_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
@@ -24,6 +23,7 @@ from rodfem.output.solids import body_of, profile_of
 from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
 from rodfem.output.view import axes_of, thickness
+from rodfem.output.words import eigenvalue_in_words
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting
 from rodfem.problem.setting import read as read_setting

@@ -29,7 +29,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
 from rodfem.errors import InputError
 from rodfem.fem.newton import correct
-from rodfem.output.digits import number
+from rodfem.output.words import number
 
 LARGE = 3.0
 """A bar is not larger than this times the error, but for round-off."""

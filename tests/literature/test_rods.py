@@ -18,7 +18,7 @@ import rodfem
 from rodfem import Discretization, Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist, logarithmic_stretch
-from rodfem.output.digits import number, rounded_up
+from rodfem.output.words import number, rounded_up
 
 pytestmark = pytest.mark.alone
 

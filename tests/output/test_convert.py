@@ -16,7 +16,7 @@ import rodfem
 from rodfem import Discretization, InputError, Plan
 from rodfem.app import console
 from rodfem.app.run import run
-from rodfem.output.convert import to_csv, to_vtkhdf
+from rodfem.output.states import to_csv, to_vtkhdf
 
 pytestmark = pytest.mark.alone
 

@@ -10,12 +10,11 @@ import pytest
 from rodfem.app import console
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
-from rodfem.output.glossary import ENTRIES, NAMES, explanation
 from rodfem.output.plot_diagram import MARKERS
 from rodfem.output.plot_frequencies import COLORS, PARTS
 from rodfem.output.plot_locus import POINTS
 from rodfem.output.style import LINES as STYLES
-from rodfem.output.table import COLUMNS, PAGE, REMARK, SPECIAL
+from rodfem.output.table import COLUMNS, ENTRIES, NAMES, PAGE, REMARK, SPECIAL, explanation
 
 HOME = Path(__file__).parents[2]
 pytestmark = pytest.mark.alone

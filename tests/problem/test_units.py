@@ -16,7 +16,7 @@ import rodfem
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, sliding
 from rodfem.continuation.singular_points import coupling_of
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output import digits
+from rodfem.output.words import in_decimals, number
 from rodfem.problem.local_state import Constants
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -209,10 +209,10 @@ def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> Non
 @pytest.mark.alone
 def test_numbers_in_words() -> None:
     """A load of 1e-11 is written with its digits, by the terminal and in tables."""
-    assert digits.number(7.89568359e-11, 8e-19) == "7.89568359e-11 (8e-19)"
-    assert digits.number(0.3216500866, 3e-7) == "0.3216501 (4e-07)"
-    assert digits.in_decimals(1.026438867e-10, 10, 1e-10) == "1.026439e-10"
-    assert digits.in_decimals(1.0, 3, 1.0) == "1.000"
+    assert number(7.89568359e-11, 8e-19) == "7.89568359e-11 (8e-19)"
+    assert number(0.3216500866, 3e-7) == "0.3216501 (4e-07)"
+    assert in_decimals(1.026438867e-10, 10, 1e-10) == "1.026439e-10"
+    assert in_decimals(1.0, 3, 1.0) == "1.000"
 
 
 @pytest.mark.few(1)
