@@ -1,7 +1,7 @@
 // All states at one load, side by side: between two rows a state is interpolated for its picture.
 
 import { counted, data, digits, unit } from "report/data";
-import { select, state, subscribe } from "report/store";
+import { select, state, subscribe, visible } from "report/store";
 import { between, pointsOf } from "report/curve";
 import { listeners, makeRod, makeStripe, ROD, shapeOf, stage as main } from "report/rod";
 import { framed, Stage } from "report/stage";
@@ -17,7 +17,7 @@ let stage = null, rod = null, stripe = null, waiting = 0;
 function statesAt(load) {
   const found = [];
   data.branches.forEach((b, number) => {
-    for (const piece of b.pieces)
+    for (const piece of visible(number) ? b.pieces : [])
       for (let row = piece.rows[0]; row < piece.rows[1]; row++) {
         const [x, y] = [b.load[row], b.load[row + 1]];
         const inside = x < y ? x <= load && (load < y || y === high) : y < load && load <= x;
@@ -45,7 +45,7 @@ function card(found) {
   name.append(swatch, index, title);
   const canvas = document.createElement("canvas");
   button.append(canvas, name);
-  button.addEventListener("click", () => select(found.number, nearest(found), state.load));
+  button.addEventListener("click", () => select(found.number, nearest(found)));
   return { button, canvas, found };
 }
 
@@ -93,11 +93,12 @@ function later() {
   else redraw();
 }
 
-// Keep to the branch that is shown, as far as it has the load.
+// The nearest row of the branch that is shown, as far as it has the load; else of the first that has it.
 function slide() {
-  const load = low + ((high - low) * slider.value) / STEPS;
-  const here = statesAt(load).filter((x) => x.number === state.branch).sort((a, b) => Math.abs(a.row - state.row) - Math.abs(b.row - state.row))[0];
-  select(state.branch, here ? nearest(here) : state.row, load);
+  const load = low + ((high - low) * slider.value) / STEPS, found = statesAt(load);
+  const near = (x) => (x.number === state.branch ? Math.abs(x.row - state.row) : Infinity);
+  const here = found.sort((a, b) => near(a) - near(b) || 0)[0];
+  if (here) select(here.number, nearest(here));
 }
 
 export function start() {

@@ -2,7 +2,8 @@
 // without a potential the frequencies come first.
 
 import { data, escaped, reading, unit } from "report/data";
-import { select, state, subscribe } from "report/store";
+import { select, state, subscribe, visible } from "report/store";
+import * as address from "report/address";
 import { cursorOf } from "report/cursor";
 import * as frequencies from "report/frequencies";
 import { draw, layout } from "report/plotting";
@@ -19,8 +20,8 @@ const LINE = 0.03; // half the height that a label keeps clear of others
 const SHORTEST = 0.07, LEAST = 0.7; // pieces without a label; room for a name, of what it takes
 const SHARES = [0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2]; // of a piece at which a label may stand
 const SIDES = [[0, 1], [0, -1], [1, 0], [-1, 0]]; // of a row at which it may
-let ordinate = ordinates[0];
-let cursor = null;
+let ordinate = ordinates[address.chosen("ordinate", ordinates.map((each) => each.key), 0)];
+let cursor = null, hidden = "";
 
 const heights = (branch) => branch.ordinates[ordinate.key];
 
@@ -102,17 +103,18 @@ function labels() {
     return [{ x: b.load[row], y: heights(b)[row], text, showarrow: false, yshift: CLEAR[1] * up, xshift: CLEAR[0] * right, xanchor, font: { color: b.colour, ...style }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false }];
   };
   const rowsOf = (first, last) => SHARES.map((share) => Math.round(first + share * (last - first)));
-  const indices = data.branches.flatMap((b) => b.pieces.flatMap(({ rows: [first, last], index }) => {
+  const shown = data.branches.filter((_, number) => visible(number));
+  const indices = shown.flatMap((b) => b.pieces.flatMap(({ rows: [first, last], index }) => {
     let length = 0;
     for (let i = first; i < last; i++) length += Math.hypot(...at(b, i + 1).map((x, k) => x - at(b, i)[k]));
     return length > SHORTEST ? place(b, rowsOf(first, last), `<b>${escaped(index)}</b>`, LETTER * Math.max(index.length, 2), 0, { size: 14 }) : [];
   }));
-  const named = data.branches.length > NAMED ? [] : data.branches;
+  const named = shown.length > NAMED ? [] : shown;
   return [...indices, ...named.flatMap((b) => place(b, rowsOf(0, b.load.length - 1), escaped(b.name), LETTER * b.name.length, LEAST, { size: 12 }))];
 }
 
 function traces() {
-  const each = data.branches.map((branch, number) => [branch, number]);
+  const each = data.branches.map((branch, number) => [branch, number]).filter(([, number]) => visible(number));
   const thick = (trace) => -trace.line.width;
   const lines = each.flatMap(([b, i]) => b.pieces.map((piece) => line(b, i, piece))).sort((a, b) => thick(a) - thick(b));
   const images = ordinate.key === "ordinate" ? each.filter(([b]) => b.image).flatMap(([b, i]) => b.pieces.map((piece) => image(b, i, piece))) : [];
@@ -130,12 +132,16 @@ function redraw() {
 }
 
 function moveCursor() {
+  if (hidden !== [...state.hidden].join()) redraw();
+  hidden = [...state.hidden].join();
+  address.write({ branch: data.branches[state.branch].name, row: state.row, ordinate: ordinate.key });
   const b = data.branches[state.branch];
   cursor(b.load[state.row], ordinate === FREQUENCIES ? null : (heights(b)[state.row] ?? undefined));
 }
 
 export async function start() {
   for (const [i, each] of ordinates.entries()) choice.add(new Option(each.name, i));
+  choice.value = ordinates.indexOf(ordinate);
   choice.addEventListener("change", async () => {
     ordinate = ordinates[choice.value];
     await redraw();

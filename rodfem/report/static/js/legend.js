@@ -1,7 +1,7 @@
 // The legend: branches, which it selects, kinds of lines, and kinds of special points.
 
 import { data } from "report/data";
-import { select, state, subscribe } from "report/store";
+import { select, state, subscribe, toggle, visible } from "report/store";
 import * as frequencies from "report/frequencies";
 import { area, item, lineIcon, symbol } from "report/icons";
 import { DASHES, ENDS, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
@@ -11,6 +11,16 @@ function swatch(colour) {
   drawn.className = "swatch";
   drawn.style.background = colour;
   return drawn;
+}
+
+// The swatch of a branch hides it, or shows it again.
+function hides(button, number) {
+  const drawn = button.querySelector(".swatch");
+  drawn.title = "hide or show this branch";
+  drawn.addEventListener("click", (event) => {
+    event.stopPropagation();
+    toggle(number);
+  });
 }
 
 // Entries that belong to one kind of picture: they stand where it does.
@@ -29,6 +39,7 @@ export function start() {
     button.type = "button";
     button.title = branch.ended ? `${branch.load.length} states; ended: ${branch.ended}` : "";
     button.addEventListener("click", () => select(i, Math.floor(branch.load.length / 2)));
+    if (data.branches.length > 1) hides(button, i);
     return button;
   });
   const kinds = new Set(data.branches.flatMap((b) => b.pieces.map((piece) => piece.kind)));
@@ -44,5 +55,8 @@ export function start() {
     ...[...new Set(data.branches.flatMap((b) => b.endings.map(([, reason]) => reason)))].map((reason) => item(symbol(ENDS), `ends: ${reason}`)),
     ...(data.branches.some((b) => b.unexplained.length) ? [item(symbol(UNEXPLAINED), "index change unexplained")] : []),
   );
-  subscribe(() => buttons.forEach((button, i) => button.setAttribute("aria-pressed", i === state.branch)));
+  subscribe(() => buttons.forEach((button, i) => {
+    button.setAttribute("aria-pressed", i === state.branch);
+    button.classList.toggle("hidden-branch", !visible(i));
+  }));
 }

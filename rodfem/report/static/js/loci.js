@@ -5,7 +5,7 @@ import { select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import { area, item, lineIcon, symbol } from "report/icons";
 import { bounds, drawPlane, MARK, REGION, STRIPE } from "report/plane";
-import { BLUE, STABLE } from "report/styles";
+import { INK, STABLE } from "report/styles";
 
 const plot = document.getElementById("loci"), diagram = document.getElementById("diagram");
 const legend = document.getElementById("loci-legend"), STILL = 4; // pixels that a click may move
@@ -21,7 +21,7 @@ function atLoad(load) {
   }));
   const before = (p, q) => p.cost.map((x, i) => x - q.cost[i]).find((x) => x) < 0;
   const best = found.reduce((one, other) => (before(other, one) ? other : one));
-  select(best.number, best.row, load);
+  select(best.number, best.row);
 }
 
 // A click on a curve or on the line shows that state, one elsewhere the state of the diagram at that load.
@@ -45,7 +45,7 @@ function explain() {
   const has = (test) => data.loci.some((locus) => locus.index.some(test));
   legend.append(
     ...(data.loci.some((locus) => locus.region) ? [item(area(REGION), data.loci[0].words)] : []),
-    item(lineIcon(BLUE, STRIPE), "stable states of this diagram"),
+    item(lineIcon(INK, STRIPE), "stable states of this diagram"),
     ...(has(bounds) ? [item(lineIcon("#555", 4), "index 0 on one side")] : []),
     ...(has(([low]) => low > 0) ? [item(lineIcon("#555", 2), "greater index on both sides")] : []),
     ...(data.loci.some((locus) => locus.marks.length) ? [item(symbol(MARK), "turning point, cusp, end")] : []),

@@ -1,7 +1,7 @@
 // Starts all parts, and listens to keys.
 
 import { data } from "report/data";
-import { branch, select, showMode, state, tell } from "report/store";
+import { branch, select, showMode, state, tell, visible } from "report/store";
 import * as coexisting from "report/coexisting";
 import * as diagram from "report/diagram";
 import * as legend from "report/legend";
@@ -29,7 +29,10 @@ function toggle() {
 }
 
 const otherBranch = (step) => {
-  const next = (state.branch + step + data.branches.length) % data.branches.length, { load } = data.branches[next];
+  const count = data.branches.length;
+  let next = (state.branch + step + count) % count;
+  while (!visible(next)) next = (next + step + count) % count;
+  const { load } = data.branches[next];
   const row = load.reduce((best, x, i) => (Math.abs(x - state.load) < Math.abs(load[best] - state.load) ? i : best), 0);
   select(next, row);
 };

@@ -9,13 +9,11 @@ import { amplitude, PERIOD } from "report/motion";
 import { drawOverlay } from "report/overlay";
 import { Solids } from "report/solids";
 import { framed, Stage } from "report/stage";
-import { BLUE, GREEN, VERMILION } from "report/styles";
 import { Tube } from "report/tube";
 import { svgOf } from "report/vector";
 import { VIEWS } from "report/views";
 
 export const ROD = "#9cc4e6", STRIPE = "#1f3a5f", FIRST = "#b9bec5";
-const COLOURS = { swings: BLUE, grows: VERMILION, zero: GREEN };
 const stations = data.s.shape[0];
 const box = document.getElementById("stage"), overlay = document.getElementById("overlay");
 const show = { first: document.getElementById("show-first"), bodies: document.getElementById("show-bodies") };
@@ -58,7 +56,6 @@ function update(time = 0) {
     a = amplitude(mode, (time % PERIOD) / PERIOD).slice(0, mode.parts.length);
     shape = moved(shape, mode.parts.map(values), a);
   }
-  rod.material.color.set(mode ? COLOURS[mode.kind] : ROD);
   rod.update(shape);
   stripe.update(shape);
   solids.update(numbers, maps, mode ? mode.maps.map(values) : [], a);

@@ -5,17 +5,17 @@ import { data, digits, escaped, rough } from "report/data";
 import { branch, select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import { draw, layout } from "report/plotting";
-import { BLUE, DARK, DASHES, PLANAR, VERMILION } from "report/styles";
+import { DASHES, INK, PLANAR, UNSTABLE } from "report/styles";
 
 const plot = document.getElementById("spectrum");
 const TALL = 150; // pixels that an axis takes with its name in words
 let shown = null, cursor = null;
 
 const KINDS = [
-  { name: "positive", test: ([x, y]) => !y && x > 0, marker: { symbol: "circle", size: 5, color: BLUE } },
+  { name: "positive", test: ([x, y]) => !y && x > 0, marker: { symbol: "circle", size: 6, color: INK } },
   { name: "zero", test: ([x, y]) => !y && x === 0, marker: { symbol: "circle-open", size: 5, color: "#555" } },
-  { name: "negative", test: ([x, y]) => !y && x < 0, marker: { symbol: "triangle-down", size: 7, color: VERMILION } },
-  { name: "complex", test: ([, y]) => y !== 0, marker: { symbol: "x-thin", size: 6, line: { color: VERMILION, width: 1.8 } } },
+  { name: "negative", test: ([x, y]) => !y && x < 0, marker: { symbol: "triangle-down-open", size: 8, color: INK } },
+  { name: "complex", test: ([, y]) => y !== 0, marker: { symbol: "x-thin", size: 6, line: { color: INK, width: 1.8 } } },
 ];
 
 // Eigenvalues of the rows that have modes, without those of symmetries.
@@ -59,7 +59,7 @@ function counts(b) {
       text: rows.map((row) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>negative eigenvalues: ${escaped(index)}`),
       hovertemplate: "%{text}<extra></extra>",
       mode: "lines",
-      line: { color: count ? VERMILION : kind === PLANAR ? DARK : BLUE, width: 5, dash: kind === PLANAR ? DASHES[PLANAR] : "solid" },
+      line: { color: INK, width: 4, dash: DASHES[count ? UNSTABLE : kind] },
     };
   });
   const how = layout(data.label, "index", { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });

@@ -1,8 +1,12 @@
-// What is shown: a branch, a row of it, a load, and a mode that moves. Listeners hear of changes once a frame.
+// What is shown: a branch, a row of it, its load, hidden branches, and a mode that moves. Listeners hear of changes once
+// a frame.
 
+import * as address from "report/address";
 import { data } from "report/data";
 
-export const state = { branch: data.start[0], row: data.start[1], load: 0, mode: null };
+const first = address.chosen("branch", address.names(), data.start[0]);
+const asked = address.row(data.branches[first].load.length);
+export const state = { branch: first, row: asked ?? (first === data.start[0] ? data.start[1] : 0), load: 0, mode: null, hidden: new Set() };
 state.load = data.branches[state.branch].load[state.row];
 
 const listeners = [];
@@ -10,6 +14,7 @@ let waiting = false;
 
 export const branch = () => data.branches[state.branch];
 export const words = (b, row) => b.told[b.words[row]];
+export const visible = (number) => !state.hidden.has(number);
 
 export function subscribe(listener) {
   listeners.push(listener);
@@ -29,14 +34,25 @@ function changed() {
   requestAnimationFrame(tell);
 }
 
-// Show a row of a branch; the load follows unless it is the load that has chosen the row.
-export function select(number, row, load = null) {
+// Show a row of a branch; all that is on the screen is at its load.
+export function select(number, row) {
   const chosen = data.branches[number];
   if (!chosen) return;
+  state.hidden.delete(number);
   state.branch = number;
   state.row = Math.min(Math.max(row, 0), chosen.load.length - 1);
-  state.load = load ?? chosen.load[state.row];
+  state.load = chosen.load[state.row];
   state.mode = null;
+  changed();
+}
+
+// Hide a branch, or show it again; of the one that is shown another takes the place, and one always stays.
+export function toggle(number) {
+  if (state.hidden.delete(number)) return changed();
+  const others = data.branches.map((_, i) => i).filter((i) => i !== number && visible(i));
+  if (!others.length) return;
+  if (number === state.branch) select(others[0], Math.floor(data.branches[others[0]].load.length / 2));
+  state.hidden.add(number);
   changed();
 }
 

@@ -3,7 +3,7 @@
 export const STABLE = "stable", PLANAR = "stable in the plane, unstable in space", UNSTABLE = "unstable", UNDECIDED = "stability undecided";
 export const DASHES = { [STABLE]: "solid", [PLANAR]: "8px,3px", [UNDECIDED]: "9px,3px,2.5px,3px", [UNSTABLE]: "2.2px,2.8px" };
 export const WIDTHS = { [STABLE]: 3.6, [PLANAR]: 2.8, [UNDECIDED]: 2.8, [UNSTABLE]: 2.2 };
-export const BLUE = "#0072b2", VERMILION = "#d55e00", GREEN = "#009e73", DARK = "#00573f";
+export const INK = "#22272e"; // stability shows by marks and lines: hues are those of branches
 
 const edge = (width) => ({ color: "black", width });
 export const SYMBOLS = {
