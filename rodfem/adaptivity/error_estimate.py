@@ -34,8 +34,7 @@ from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordin
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
-from rodfem.fem.shape import Shape
-from rodfem.fem.transfer import Transfer, halved, richer_system
+from rodfem.fem.shape import Shape, Transfer, halved, richer_system
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event
 from rodfem.tolerances import ROUND_OFF, round_off, same_place

@@ -19,8 +19,7 @@ from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch_solver import BranchSolver
-    from rodfem.fem.reactions import Reactions
-    from rodfem.fem.resultants import Profile
+    from rodfem.fem.resultants import Profile, Reactions
     from rodfem.problem.events import Event
     from rodfem.stability.cluster import Cluster
 

@@ -18,8 +18,7 @@ from rodfem.continuation.regular_point import RegularPoints
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
-from rodfem.fem.reactions import Reactions, reactions
-from rodfem.fem.resultants import Resultants
+from rodfem.fem.resultants import Reactions, Resultants, reactions
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import LOAD, Energies, NodalValues
 from rodfem.fem.system import System

@@ -11,7 +11,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.diagram.collisions import Mean, Measuring, located_flutter, zero_near
 from rodfem.diagram.equilibria import at_load
-from rodfem.fem.transfer import Transfer, halved, richer_system
+from rodfem.fem.shape import Transfer, halved, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off

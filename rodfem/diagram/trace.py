@@ -28,8 +28,8 @@ from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint
+from rodfem.fem.shape import compile_richer
 from rodfem.fem.system import System
-from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains, statement

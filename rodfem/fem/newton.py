@@ -1,4 +1,4 @@
-"""Newton's method: the one loop, and when it has converged or failed.
+"""Newton's method: the one loop, when it has converged or failed, and one iteration in compiled code (``newton.c``).
 
 Whatever is solved for hands the loop an *iteration*: what moves the unknowns by one correction.  That of a state on a
 plane is here, by LU factors of the bordered matrix; states held by forces, singular states and states away from known
@@ -10,29 +10,33 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.compiled_newton import BROKEN, MOVED
-from rodfem.fem.system import System
+from rodfem.linalg.chain import Chain, Elimination
+from rodfem.linalg.compiled import Memory, buffer, module
+from rodfem.linalg.matrices import shared
+
+if TYPE_CHECKING:
+    from rodfem.fem.system import System
+    from rodfem.linalg.factorization import Factors
 
 TOLERANCE = 1e-10
 """Size of the last correction of a converged state: rotations in radian, load over its span, all else relative, in
 natural sizes: reactions that vanish relative to the stiffness of the rod are round-off of that."""
 STALLED = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
-KEPT, SHRUNK = 0.02, 0.1
-"""The Jacobian serves once more where a correction is below the former, and below the latter part of the one before."""
 ITERATIONS, STEPS = 12, 8
 """Iterations, at most, and in a step along a branch: a shorter step is cheaper than more of them."""
 FAR = 1e3
 """Distance, in the metric, beyond which no equilibrium is meant."""
 LARGEST = 0.4
 """Bound of a damped step, in the metric."""
-CLOSE = 1e-3
-"""Step of a damped motion, in the metric, below which Newton's method takes over."""
+MOVED, UNDEFINED, SINGULAR, BROKEN = range(4)
+"""What a compiled iteration did: it moved the state; the equations have no value there; the Jacobian is singular,
+exactly; there were no factors at all."""
 
 
 class Correction(NamedTuple):
@@ -83,9 +87,8 @@ def newton(iteration: Iteration, limits: Limits) -> NewtonResult:
     """Newton's method with chord steps.
 
     A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next: near a
-    solution the old factors cost one solve where new ones cost five.  It has converged if a correction is small enough.
-    It has failed, and leaves the unknowns where they got to, after too many iterations, where there is no correction,
-    or no number, and too far away.
+    solution the old factors cost one solve where new ones cost five.  It has converged if a correction is small enough,
+    and failed after too many iterations, where there is no correction, or no number, and too far away.
     """
     previous, size, fresh, number = inf, inf, True, 0
     for number in range(1, limits.most + 1):
@@ -101,7 +104,7 @@ def newton(iteration: Iteration, limits: Limits) -> NewtonResult:
         if size < limits.small or stalled:
             return NewtonResult(True, number, left, distance)
         # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
-        fresh = size > KEPT or size > SHRUNK * previous
+        fresh = size > 0.02 or size > 0.1 * previous
         previous = size
     return NewtonResult(False, number, size, inf)
 
@@ -113,17 +116,6 @@ def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, mo
 
     With damping ``d`` a correction of size c along a family of equilibria is that by a force ``d c``, which no mesh
     makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
-
-    Parameters
-    ----------
-    system
-        The equations.
-    row
-        Last row of the bordered matrix, (n,).
-    reach
-        Largest distance, in the metric.
-    most
-        Iterations, at most.
     """
     system.set_phase(x)
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
@@ -137,7 +129,6 @@ class OnPlane:
     """
 
     def __init__(self, system: System, x: PETSc.Vec, row: PETSc.Vec) -> None:
-        """Use the parameters and phase conditions that the ``system`` has now; ``x`` is moved."""
         self.system, self.x, self.row, self.origin = system, x, row, x.copy()
         self.compiled = None if system.damping else system.compiled
         if self.compiled is not None:
@@ -165,7 +156,7 @@ def linear_step(
     """What one step of Newton's method subtracts from ``x`` on the plane across ``row``, with the phase as it is.
 
     ``damping`` times the metric is added to the second variation; without ``fresh`` factors the last ones serve.  None
-    where the equations have no value, or the matrix is singular.  ``system`` has the equations.
+    where the equations have no value, or the matrix is singular.
     """
     equations, step, state = system.new_vector(), system.new_vector(), system.at(x)
     state.residual(equations)
@@ -199,12 +190,9 @@ def relax(
     Implicit steps longer than ``1/|mu|`` go uphill along a mode of a negative eigenvalue ``mu``, to a saddle.  Steps at
     most as long as ``longest`` lead away from one, and the way goes on while ``accepts`` denies what Newton's method
     finds.  As ``mu`` grows on the way a step that is uphill, ``dx.(K + M/tau) dx < 0``, is made again, half as long.
-
-    ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
-    taken.
     """
     system.set_phase(x)
-    tau, trial = 1e-2 / system.stiffness_scale, x.copy()
+    tau, trial = 0.01 / system.stiffness_scale, x.copy()
     for iteration in range(most):
         step = linear_step(system, x, row, 1.0 / tau)
         size = inf if step is None else system.norm(step)
@@ -216,7 +204,7 @@ def relax(
         x.axpy(-(1.0 if size < LARGEST else LARGEST / size), step)  # constraints are mended in one step, however long
         # switched evolution: longer time steps while the motion is slow, shorter where it is fast
         tau = min(tau * (2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0), longest)
-        if (iteration % 5 == 4 and size < 0.1) or size < CLOSE:  # not earlier: it might jump to a state uphill
+        if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
             x.copy(trial)
             outcome = correct(system, trial, row, reach=0.3)
             if outcome.converged and accepts(trial):
@@ -239,3 +227,115 @@ def along(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:
     numbers, (first, last) = np.concatenate(dual), step.getOwnershipRange()
     sign[numbers[(first <= numbers) & (numbers < last)] - first] = -1.0
     return float(system.comm.allreduce(float(equations.array_r @ (sign * step.array_r))))
+
+
+class CompiledNewton:
+    """Compiled assembly, and iteration, for one ``matrix`` of a ``system``, which it fills, and its ``factors``.
+
+    Of a point of seventy unknowns the arithmetic takes a tenth of a millisecond, and the way through Python and PETSc's
+    vectors several times as long.
+
+    ``border`` is the derivative of the equations in the load at the state last assembled, ``origin`` the state that an
+    iteration began with, (n,).  Of each drift scalar ``active`` says whether it has a phase condition, ``conditions``
+    and ``forces`` (drifts, n) have that, and what a drift of one adds to the equations.
+    """
+
+    def __init__(self, system: System, matrix: PETSc.Mat, factors: Chain) -> None:
+        self.system, self.matrix, self.factors, n = system, matrix, factors, system.fields.unknowns
+        compiled = module("fem/newton")
+        self.lib, self.ffi = compiled.lib, compiled.ffi
+        self.memory = Memory(self.ffi)
+        self._given: tuple[Any, ...] = (None, None, None)
+        own, metric = shared(matrix), shared(system.metric)
+        assert own is not None and metric is not None
+        self._pattern = own.pattern
+        drifts = np.array(system.drifts, dtype=np.int32)
+        self.conditions, self.offsets = np.zeros((len(drifts), n)), np.zeros(len(drifts))
+        self.active, self.border = np.zeros(len(drifts), dtype=np.int32), np.zeros(n)
+        self.forces = np.zeros_like(self.conditions) if system.rigid else self.conditions
+        starts, load, every = own.pattern.indptr, system.load_index, np.arange(n)
+        # scalars are the last columns of each row, and their own rows are dense
+        column = {i: starts[1:] - (n - i) for i in (load, *system.drifts)}
+        self.rod, self.newton = self.ffi.new("Rod *"), self.ffi.new("Newton *")
+        rod = self.rod
+        rod.n, rod.locals, rod.entries = n, len(system.fields.clamps), len(own.values)
+        rod.load, rod.load_diagonal, rod.drifts = load, int(column[load][load]), len(drifts)
+        integers = {
+            "number": system.maps(load=True)[1],
+            "load_column": np.where(every == load, -1, column[load]),
+            "load_row": starts[load] + every,
+            "drift": drifts,
+            "active": self.active,
+            "drift_row": np.array([starts[d] + every for d in drifts]),
+            "drift_column": np.array([column[d] for d in drifts]),
+            "starts": metric.pattern.indptr,
+            "indices": metric.pattern.indices,
+        }
+        self.memory.point(rod, **{name: np.ascontiguousarray(x, dtype=np.int32) for name, x in integers.items()})
+        self.memory.point(rod, u=system.fields.clamps.copy(), values=own.values, metric=metric.values)
+        self.memory.point(rod, conditions=self.conditions, offsets=self.offsets, forces=self.forces, border=self.border)
+        self.memory.point(rod, sizes=system.sizes.array.copy())
+        self.origin = np.zeros(n)
+        room = {name: np.zeros(n) for name in ("step", "equations", "away")}
+        self.memory.point(self.newton, origin=self.origin, **room)
+
+    def take(self) -> None:
+        """Use the parameters, the phase conditions and the factors that the system has now."""
+        system, equations = self.system, self.system.equations
+        equations.take(system.line)
+        self.factors.prepare(self.matrix)
+        given = (self.factors.elimination, equations.residual.constants, equations.jacobian.constants)
+        if any(mine is not new for mine, new in zip(self._given, given, strict=True)):
+            self._use(given[0])
+            self._given = given
+        self.active[:], self.offsets[:] = 0, system.phase.offsets
+        for i, row in system.phase.rows.items():
+            self.active[i], self.conditions[i, : len(row)] = 1, row
+            self.forces[i, : len(row)] = system.phase.forces[i]
+
+    def _use(self, elimination: Elimination) -> None:
+        """Let the rod point to the forms with their constants, and to the factors."""
+        system, rod, keep = self.system, self.rod, self.memory.keep
+        residual, jacobian = system.equations.residual, system.equations.jacobian
+        self.memory.point(rod, residual_constants=residual.constants, jacobian_constants=jacobian.constants)
+        owners = {
+            "residual": residual,
+            "jacobian": jacobian,
+            "equation_places": system.equation_places,
+            "entry_places": system.matrix_places(self._pattern, True),
+            "factors": elimination,
+        }
+        for name, owner in owners.items():
+            setattr(rod, name, keep((rod, name), owner).pointer)
+        rod.assemble = residual.function
+        rod.factor, rod.solve = elimination.functions
+
+    def assemble(self, x: PETSc.Vec) -> None:
+        """Fill the matrix with ``S`` at ``x`` and a one for the load, and :attr:`border`; phase conditions stay."""
+        self.take()
+        failed = self.lib.assemble_at(self.rod, buffer(self.ffi, x.array_r))
+        assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."
+        self.matrix.stateIncrease()
+
+    def iterate(self, x: PETSc.Vec, row: PETSc.Vec, fresh: bool) -> tuple[int, float, float]:
+        """Move ``x`` by one correction on the plane across ``row``, with factors of the Jacobian there if ``fresh``.
+
+        Returns what it did, the distance of ``x`` from :attr:`origin` in the metric, and the size of the correction in
+        it, or relative to ``x``, the larger.
+        """
+        newton = self.newton
+        with self.system.clock("solve"):
+            along = buffer(self.ffi, row.array_r)
+            with x as state:
+                status = self.lib.iterate(self.rod, newton, buffer(self.ffi, state), along, fresh)
+        if newton.factored:
+            self.factors.adopt(regular=status == MOVED)
+            self.matrix.stateIncrease()
+        return status, newton.distance, newton.size
+
+
+def compiled_newton(system: System, matrix: PETSc.Mat, factors: Factors) -> CompiledNewton | None:
+    """Compiled iteration where a ``matrix`` of the ``system`` and its ``factors`` are those of compiled code."""
+    if shared(matrix) is None or not isinstance(factors, Chain):
+        return None
+    return CompiledNewton(system, matrix, factors)

@@ -1,4 +1,4 @@
-r"""Strains, contact force and moment along a state, components along the directors.
+r"""Strains, contact force and moment along a state, components along the directors, and reactions.
 
 Inside an element they follow from the strains.  A derivative of the rotation is most accurate at the Gauss points of as
 many places as the degree, two orders more than at the ends of the element.  At these the equations themselves give the
@@ -9,12 +9,17 @@ force ``n`` and the moment ``m`` that the element hands on: for any variation ``
 so that the element's own part of the residual, at the rotation of its end, is ``m`` there, and at its position ``n``:
 as accurate as the loads that the equations balance (Wheeler, Numer. Math. 21 (1973) 104-122).  They are equal in
 neighbours, where nothing acts between them.  Force and moment are the polynomials through both.
+
+With ``V`` the potential energy of rod and loads the support of an end does the work ``dV`` in a motion of that end: a
+force ``dV/dr``, a moment ``dV/dtheta``.  Multipliers of hinges and guides act for the support, and are left out of
+``V``.  These are rows of the discrete equations that are not solved, because the end is held: they are as accurate as
+those that are.  Loads at the end, springs there too, are part of ``V``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -23,9 +28,12 @@ from petsc4py import PETSc
 
 from rodfem.fem.quadrature_check import Pieces
 from rodfem.fem.shape import Shape
+from rodfem.fem.state import Evaluation
 from rodfem.problem.constraint import Constraint
+from rodfem.problem.end import LETTERS
 from rodfem.problem.quaternions import directors, product
 from rodfem.problem.roles import derived
+from rodfem.tolerances import SAME_PLACE
 
 NAMES = ("strain", "curvature", "force", "moment")
 """Of the fields, as files have them."""
@@ -33,20 +41,11 @@ NAMES = ("strain", "curvature", "force", "moment")
 
 @dataclass(frozen=True)
 class Profile:
-    """An equilibrium along the rod, at m arclengths.
+    """An equilibrium along the rod, at m arclengths ``s`` (m,).
 
-    Attributes
-    ----------
-    s
-        Arclengths (m,).
-    r
-        Centreline, components in space (m, 3).
-    directors
-        Directors d1, d2, d3 as rows, components in space (m, 3, 3).
-    strain, curvature
-        Components along the directors (m, 3): ``v``, nondimensional, and ``k``, one over length.
-    force, moment
-        Contact force ``n`` and moment ``m`` by which what is beyond s acts, components along the directors (m, 3).
+    ``r`` is the centreline, components in space (m, 3), ``directors`` d1, d2, d3 as rows (m, 3, 3).  All others are
+    components along the directors (m, 3): ``strain`` ``v``, nondimensional, ``curvature`` ``k``, one over length, and
+    the contact ``force`` ``n`` and ``moment`` ``m`` by which what is beyond s acts.
     """
 
     s: np.ndarray
@@ -72,7 +71,6 @@ class Profile:
         return np.asarray(np.einsum("sij,si->sj", self.directors, components))
 
     def __repr__(self) -> str:
-        """Places and ends."""
         return f"<Profile at {len(self.s)} arclengths from {self.s[0]:.6g} to {self.s[-1]:.6g}>"
 
 
@@ -91,7 +89,6 @@ class Resultants:
     """
 
     def __init__(self, shape: Shape) -> None:
-        """Derive and compile them for the system of a ``shape``."""
         self.shape, count = shape, shape.system.fields.discretization.degree
         gauss = (legendre.leggauss(count)[0] + 1) / 2
         self.nodes = np.array([0.0, *gauss, 1.0])
@@ -101,15 +98,19 @@ class Resultants:
         self._pieces = derived(e, Pieces, lambda: Pieces(e))
 
     def at(self, x: PETSc.Vec) -> dict[str, np.ndarray]:
-        """Components along the directors by their :data:`NAMES` at the state ``x``, (elements, points, 3) each.
+        """Fields by their :data:`NAMES` at the state ``x``, (elements, points, 3) each, as a :class:`Profile` has them.
 
-        ``strain`` has ``v``, nondimensional, ``curvature`` ``k``, one over length, ``force`` ``n`` and ``moment``
-        ``m``.  ``points`` (elements, points) has the arclengths: as many in each element as the degree of the rotation,
-        at equal distances, ends included where there is more than one.  Strain and curvature jump from element to
-        element, by as much as they are accurate.
+        ``points`` (elements, points) has the arclengths: as many in each element as the degree of the rotation, at
+        equal distances, ends included where there is more than one.  Strain and curvature jump from element to element,
+        by as much as they are accurate.
         """
         points = self.shape.from_left(self.shape.start[:, None] + self.shape.size[:, None] * self.places)
-        return {"points": points} | self._values(x, self.places)
+        whole = self._table(x)
+        inside, every = _basis(self.nodes[1:-1], self.places), _basis(self.nodes, self.places)
+        strains = np.einsum("pn,enij->epij", inside, whole[:, 1:-1, :2])
+        forces = np.einsum("pn,enij->epij", every, whole[:, :, 2:])
+        values = np.moveaxis(np.concatenate([strains, forces], axis=2), 2, 0)
+        return {"points": points} | dict(zip(NAMES, values, strict=True))
 
     def profile(self, x: PETSc.Vec, s: np.ndarray | None = None) -> Profile:
         """Shape, strains, force and moment at the state ``x``, at the nodes or at arclengths ``s`` (m,).
@@ -135,14 +136,6 @@ class Resultants:
             strains += np.einsum("mn,mnij->mij", _basis(self.nodes[1:-1], t), whole[e, 1:-1, :2]) / len(elements)
             forces += np.einsum("mn,mnij->mij", _basis(self.nodes, t), whole[e, :, 2:]) / len(elements)
         return Profile(s, r, np.swapaxes(directors(q), -1, -2), *strains.swapaxes(0, 1), *forces.swapaxes(0, 1))
-
-    def _values(self, x: PETSc.Vec, places: np.ndarray) -> dict[str, np.ndarray]:
-        """All fields at ``places`` (p,) in [0, 1] of each element from left to right, (elements, p, 3)."""
-        whole = self._table(x)
-        inside, every = _basis(self.nodes[1:-1], places), _basis(self.nodes, places)
-        strains = np.einsum("pn,enij->epij", inside, whole[:, 1:-1, :2])
-        forces = np.einsum("pn,enij->epij", every, whole[:, :, 2:])
-        return dict(zip(NAMES, np.moveaxis(np.concatenate([strains, forces], axis=2), 2, 0), strict=True))
 
     def _table(self, x: PETSc.Vec) -> np.ndarray:
         """All fields at the nodes of the polynomials of each element from left to right, (elements, nodes, 4, 3)."""
@@ -189,6 +182,70 @@ class Resultants:
             force += ufl.diff(density, along.dr)
         force, moment = ufl.dot(ufl.transpose(along.R), force), ufl.diff(density, along.k)
         return [vector[i] for vector in (along.v, along.k, force, moment) for i in range(3)]
+
+
+class Reaction(NamedTuple):
+    """Force and moment on the rod, components in space, both (3,)."""
+
+    force: np.ndarray
+    moment: np.ndarray
+
+
+class Reactions(NamedTuple):
+    """Reactions of the supports of the ``left`` and ``right`` end, and of what is attached inside, from left to right.
+
+    A closed rod has no supports: zero.
+    """
+
+    left: Reaction
+    right: Reaction
+    attached: tuple[Reaction, ...]
+
+
+def reactions(resultants: Resultants, x: PETSc.Vec) -> Reactions:
+    """All reactions at the equilibrium ``x``; collective."""
+    scene, starts = resultants.shape.system.scene, resultants.shape.from_left(resultants.shape.start)
+    s = np.array(scene.interval)
+    ends = resultants.on_elements(x, s, np.array([[0, len(starts) - 1]]))
+    contact = np.array([[-1.0], [1.0]]) * np.stack([ends.force_in_space, ends.moment_in_space])  # (2, side, 3)
+    left, right = (_of_support(resultants, x, i, contact[:, i]) for i in range(2))
+    places = np.array(sorted({a.s for a in scene.attachments if scene.is_inside(a.s)}))
+    after = np.searchsorted(starts, places - SAME_PLACE * scene.length)
+    below, above = (resultants.on_elements(x, places, after[None] - back) for back in (1, 0))
+    jumps = (below.force_in_space - above.force_in_space, below.moment_in_space - above.moment_in_space)
+    return Reactions(left, right, tuple(map(Reaction, *jumps)))
+
+
+def _of_support(resultants: Resultants, x: PETSc.Vec, side: int, contact: np.ndarray) -> Reaction:
+    """Force and moment of the support of an end; what no row of the equations tells is that of the ``contact`` (2, 3).
+
+    Without a centreline the position of an end is a scalar unknown where it moves under more than dead forces.
+    """
+    shape = resultants.shape
+    system, fields, scene = shape.system, shape.system.fields, shape.system.scene
+    if scene.closed:
+        return Reaction(np.zeros(3), np.zeros(3))
+
+    def summed(mine: Any) -> Any:
+        return shape.gather(np.asarray(mine)[None]).sum(axis=0)
+
+    state, local, (force, moment) = system.at(x), system.at(x).local.copy(), contact.copy()
+    for unknown, copies in zip(fields.unknown_scalars, fields.copies.T, strict=False):
+        if unknown.group.name in {"m" + LETTERS[side], "f" + LETTERS[side]}:  # moments of a hinge, forces of a guide
+            local[copies] = 0.0
+    work = Evaluation(state.equations, local, state.line).covector()
+    cell, node = int((shape.start if side == 0 else -shape.start).argmin()), shape.order[-side]
+    mine = np.isclose(shape.start[cell] + side * shape.size[cell], scene.interval[side])
+    turned = fields.dofs[fields.turning.name][cell, node]
+    q, weights = fields.turning.quaternion(local[turned]), fields.turning.functional(local[turned], work[turned])
+    known = slice(None) if scene.normal is None else scene.normal
+    moment[known] = summed(mine * product(turns(), q) @ weights / 2)[known]
+    if "r" in fields.dofs:
+        return Reaction(summed(mine * work[fields.dofs["r"][cell, node]]), moment)
+    rows = dict(zip(fields.scalars, fields.copies.T, strict=False))
+    for i in (i for i, held in enumerate(scene.sides[side].held(state.constants())) if held is None):
+        force[i] = summed(work[rows.get(f"{LETTERS[side]}{i + 1}", [])].sum())
+    return Reaction(force, moment)
 
 
 def turns() -> np.ndarray:

@@ -1,7 +1,8 @@
-"""The shape of a state: centreline, rotations, all fields in natural order along the rod; resultants; link."""
+"""The shape of a state: centreline, rotations, all fields in natural order along the rod; link; other meshes."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -12,16 +13,14 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.errors import InputError
+from rodfem.fem.equations import Equations
+from rodfem.fem.fields import HIGHEST, Discretization, Fields
 from rodfem.fem.state import LOAD, NodalValues
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import UNDEFORMED
+from rodfem.problem.contribution import Block
 from rodfem.problem.quaternions import CONJUGATE, directors, product
 from rodfem.writhe import writhe
-
-WRITHE_TO = 1e-5
-"""Change with which a writhe is accepted."""
-INWARDS = 1e-9
-"""Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
 
 
 def minimum(powers: list[float], t: float, spacing: float) -> float:
@@ -49,17 +48,15 @@ def horner(powers: list[float], t: float) -> float:
 
 
 class Gauss:
-    """Gauss rule on [0, 1] with the integrals of its Lagrange basis from 0 to any point."""
+    """Gauss rule on [0, 1], exact to degree ``2 points - 1``, and integrals of its Lagrange basis from 0."""
 
     def __init__(self, points: int) -> None:
-        """Make the rule; it is exact for polynomials of degree ``2 points - 1``."""
-        x, self.weights = legendre.leggauss(points)
-        self.points = (x + 1) / 2
-        self.weights = self.weights / 2
+        x, weights = legendre.leggauss(points)
+        self.points, self.weights = (x + 1) / 2, weights / 2
         self._coefficients = np.linalg.inv(legendre.legvander(x, points - 1))
 
     def integrals(self, x: np.ndarray) -> np.ndarray:
-        """Integrals of the Lagrange basis on the points from 0 to ``x`` of shape (m,): (m, points)."""
+        """Integrals of the Lagrange basis from 0 to ``x`` of shape (m,): (m, points)."""
         antiderivative = legendre.legint(self._coefficients, lbnd=-1, axis=0) / 2
         return legendre.legval(2 * np.asarray(x, dtype=float) - 1, antiderivative).T
 
@@ -72,26 +69,24 @@ class Shape:
     """
 
     def __init__(self, system: System) -> None:
-        """Tabulate bases and quadrature."""
         self.system, f = system, system.fields
         k = f.discretization.degree
-        cells = slice(0, f.owned_cells)
+        cells = self.cells = slice(0, f.owned_cells)
         self.start = f.vertices[cells, 0]
         self.size = f.vertices[cells, 1] - f.vertices[cells, 0]
+        self.order = np.argsort(compat.nodes(k))
         self.nodes = np.sort(compat.nodes(k))
+        self.s = self.start[:, None] + self.size[:, None] * self.nodes
         self.gauss = Gauss(system.equations.quadrature_degree(k) // 2 + 1)
         self._to_nodes = self.gauss.integrals(self.nodes)
-        self.order = np.argsort(compat.nodes(k))
         self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
         self._v_at_samples = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
+        self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         free = system.scene.free_strains
         self._held_strains = np.array([0.0 if i in free else x for i, x in enumerate(UNDEFORMED)])
         self._strains = np.eye(len(UNDEFORMED))[list(free)]
-        self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         self._probe_weights = [self.weights(s) for s in system.scene.ordinate.places]
-        self.cells = cells
-        self.s = self.start[:, None] + self.size[:, None] * self.nodes
         starts = self.gather(self.start)
         self._sequence = np.argsort(starts)
         self._first = np.searchsorted(starts[self._sequence], self.start)
@@ -142,13 +137,26 @@ class Shape:
     def restore(self, sample: dict[str, Any]) -> PETSc.Vec:
         """State vector of a :meth:`sample`, taken with the same formulation but any number of elements and degree."""
         f = self.system.fields
-        ends = np.append(sample["s"][:: self._degree_of(sample)], sample["s"][-1])[: self._elements_of(sample) + 1]
         named = {name: sample[name] for name in self.system.scalars if not name.startswith("drift")}
-        for block in f.blocks:
-            x = f.coordinates(block.degree)
-            inwards = x + INWARDS * (x.mean(axis=1, keepdims=True) - x)
-            named[block.name] = self._evaluate(sample, block, ends, x, inwards)
+        named |= {block.name: self._evaluate(sample, block) for block in f.blocks}
         return self.system.vector(f.filled(named))
+
+    def _evaluate(self, sample: dict[str, Any], block: Block) -> np.ndarray:
+        """Values of a field of a :meth:`sample` at the nodes of the cells."""
+        f, elements, s = self.system.fields, int(sample["elements"]), sample["s"]
+        degree = (len(s) - 1) // elements
+        ends, x = s[::degree], f.coordinates(block.degree)
+        inwards = x + 1e-9 * (x.mean(axis=1, keepdims=True) - x)  # the end of a cell belongs to that cell
+        cell = np.clip(np.searchsorted(ends, inwards) - 1, 0, elements - 1)
+        own = degree if block.continuous else degree - 1
+        table = np.asarray(sample[block.name])
+        if block.name == "r":
+            table = table - f.lift(s, self.system.line.constants(sample[LOAD]))
+        if block.continuous:
+            table = table[np.arange(elements)[:, None] * degree + np.arange(degree + 1)]
+        local = (x - ends[cell]) / (ends[cell + 1] - ends[cell])
+        basis = compat.lagrange_basis(own, local.ravel())[:, np.argsort(compat.nodes(own))]
+        return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
 
     def with_centreline(self, given: NodalValues) -> PETSc.Vec:
         """State with the centreline, or the scalar positions of the ends, that rotations and strains integrate to.
@@ -189,40 +197,14 @@ class Shape:
         """
         system, f = self.system, self.system.fields
         integral, value = weights or self._probe_weights[0]
-        size = f.turning.size
-        turned, sums = (
-            value @ state.turned[self.cells].reshape(-1, size),
-            f.formulation.sums(self, state, integral, value),
-        )
-        if system.comm.size > 1:
-            turned, sums = (system.comm.allreduce(part) for part in (turned, sums))
+        turned = value @ state.turned[self.cells].reshape(-1, f.turning.size)
+        turned, sums = system.sum(turned), system.sum(f.formulation.sums(self, state, integral, value))
         place, chord = sums if sums.ndim > 1 else (sums, sums)
         r = place + f.formulation.offset(f, state, np.array(s), chord)
         q = f.turning.quaternion(turned)
         return r, q / sqrt(q @ q)
 
-    # --- inside ------------------------------------------------------------------------------------------------
-
-    @staticmethod
-    def _elements_of(sample: dict[str, Any]) -> int:
-        return int(sample["elements"]) if "elements" in sample else 0
-
-    def _degree_of(self, sample: dict[str, Any]) -> int:
-        return (len(sample["s"]) - 1) // self._elements_of(sample)
-
-    def _evaluate(
-        self, sample: dict[str, Any], block: Any, ends: np.ndarray, x: np.ndarray, inwards: np.ndarray
-    ) -> np.ndarray:
-        degree, cell = self._degree_of(sample), np.clip(np.searchsorted(ends, inwards) - 1, 0, len(ends) - 2)
-        own = degree if block.continuous else degree - 1
-        table = np.asarray(sample[block.name])
-        if block.name == "r":
-            table = table - self.system.fields.lift(sample["s"], self.system.line.constants(sample[LOAD]))
-        if block.continuous:
-            table = table[np.arange(len(ends) - 1)[:, None] * degree + np.arange(degree + 1)]
-        local = (x - ends[cell]) / (ends[cell + 1] - ends[cell])
-        basis = compat.lagrange_basis(own, local.ravel())[:, np.argsort(compat.nodes(own))]
-        return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
+    # --- along the rod -----------------------------------------------------------------------------------------
 
     def gather(self, values: np.ndarray) -> np.ndarray:
         """Rows of all ranks, one for each element, in the order of the ranks."""
@@ -291,9 +273,66 @@ def link(sample: dict[str, Any]) -> tuple[int, float, float]:
 
     s, closed = np.asarray(sample["s"]), np.array(sample["r"])
     closed[-1] = closed[0]
-    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=WRITHE_TO)
+    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=1e-5)  # the change that is accepted
     Tw = twist(s, np.asarray(sample["q"]))
     Lk = round(Tw + Wr)
     if abs(Tw + Wr - Lk) > 0.05:
         raise InputError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")
     return Lk, Tw, Wr
+
+
+# --- other meshes -----------------------------------------------------------------------------------------------------
+
+
+def halved(degree: int) -> float:
+    """Largest part of the error of a smooth state on elements of ``degree`` that remains on halved elements."""
+    return float(0.5 ** (degree + 1))
+
+
+def richer(system: System) -> Discretization:
+    """Halves of the elements of a system, of one degree more (but of the highest one)."""
+    d = system.fields.discretization
+    halves = replace(d, vertices=tuple(map(float, system.fields.all_vertices())))
+    return halves.finer(2, richer=int(d.degree < HIGHEST))
+
+
+def richer_system(system: System) -> System:
+    """Return the system of the same rod that is :func:`richer`."""
+    return System(system.scene, richer(system), system.comm, system.clock, symmetries=system.symmetries)
+
+
+def compile_richer(system: System) -> None:
+    """Begin to compile the forms of that in the background."""
+    Equations.compile_ahead(Fields(system.scene, richer(system), system.comm))
+
+
+class Transfer:
+    """Interpolates vectors of one system to another whose elements are those of the first, or parts of them."""
+
+    def __init__(self, source: System, target: System) -> None:
+        self.source, self.target = source, target
+        old, new = source.fields, target.fields
+        vertices = old.all_vertices()
+        self._owned = slice(0, old.owned_cells)
+        self._order = np.argsort(np.concatenate(source.comm.allgather(old.vertices[self._owned, 0])))
+        self._parents = np.searchsorted(vertices, new.vertices.mean(axis=1)) - 1
+        first, size = vertices[self._parents, None], np.diff(vertices)[self._parents, None]
+        places, which = np.unique(np.round((new.vertices - first) / size, 9), axis=0, return_inverse=True)
+        self._members = [np.flatnonzero(which.ravel() == i) for i in range(len(places))]
+        degrees = {b.name: b.degree for b in old.blocks}
+        self._bases = {
+            b.name: [compat.lagrange_basis(degrees[b.name], a + (z - a) * compat.nodes(b.degree)) for a, z in places]
+            for b in new.blocks
+        }
+
+    def __call__(self, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
+        """Interpolate a state, or (``state=False``) a direction, which is zero where a state is clamped."""
+        old, new = self.source.fields, self.target.fields
+        values = (self.source.at(vector) if state else self.source.change(vector)).local
+        out = np.zeros(len(new.number))
+        for name, bases in self._bases.items():
+            every = np.concatenate(self.source.comm.allgather(values[old.dofs[name][self._owned]]))[self._order]
+            for members, basis in zip(self._members, bases, strict=True):
+                out[new.dofs[name][members]] = np.einsum("pn,cni->cpi", basis, every[self._parents[members]])
+        out[new.copies] = values[old.copies[0]]
+        return self.target.vector(out)

@@ -23,10 +23,10 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_pattern, new_matrix, vector_places
-from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import FEW, Discretization
 from rodfem.fem.invariance import Verification, find_motion_along, find_symmetries
+from rodfem.fem.newton import compiled_newton
 from rodfem.fem.state import LOAD, Line, NodalValues, State
 from rodfem.fem.symmetries import (
     Generators,
@@ -37,7 +37,7 @@ from rodfem.fem.symmetries import (
     phase_at,
     rigid_motions,
 )
-from rodfem.linalg.chain import Chain, factors_of
+from rodfem.linalg.chain import factors_of
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
 from rodfem.problem.local_state import floats
@@ -104,9 +104,7 @@ class System:
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, self.natural_sizes)
-        self.compiled = None
-        if isinstance(self.lu, Chain) and CompiledNewton.serves(self.matrix, self.lu):
-            self.compiled = CompiledNewton(self, self.matrix, self.lu)
+        self.compiled = compiled_newton(self, self.matrix, self.lu)
 
     def _symmetries(self) -> list[Symmetry]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""

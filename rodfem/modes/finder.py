@@ -18,7 +18,7 @@ from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.quadrature_check import QuadratureCheck
-from rodfem.fem.transfer import halved
+from rodfem.fem.shape import halved
 from rodfem.linalg.matrices import local_rows, rounding, rounding_of
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Few, Modes, Typical

@@ -21,11 +21,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.fem.compiled_newton import CompiledNewton
+from rodfem.fem.newton import compiled_newton
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
-from rodfem.linalg.chain import Chain, factors_of
+from rodfem.linalg.chain import factors_of
 from rodfem.linalg.factorization import Factors, Sizes
 from rodfem.linalg.matrices import local_rows, places_in, rounding, shared
 from rodfem.linalg.orthogonal import generic
@@ -107,9 +107,7 @@ class Inertia:
         self.vectors: list[PETSc.Vec] = []
         self.shift, self.filled, self.factored = 0.0, 0, 0
         self._held: tuple[State, Phase, int] | None = None
-        self.compiled: CompiledNewton | None = None
-        if isinstance(self.factors, Chain) and CompiledNewton.serves(self.matrix, self.factors):
-            self.compiled = CompiledNewton(system, self.matrix, self.factors)
+        self.compiled = compiled_newton(system, self.matrix, self.factors)
 
     def at(self, x: PETSc.Vec) -> Factored:
         """Assemble ``S`` at an equilibrium ``x``, with its phase conditions, and verify the symmetries there."""

@@ -11,9 +11,8 @@ from rodfem import Discretization, Plan, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
-from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.fields import PETSC
-from rodfem.fem.newton import OnPlane
+from rodfem.fem.newton import CompiledNewton, OnPlane
 from rodfem.linalg.chain import Chain
 
 pytestmark = pytest.mark.alone
