@@ -430,13 +430,13 @@ FAULTS = {
         "tests/continuation/test_convexity.py",
     ),
     "energies-prefer-a-side": Fault(
-        "rodfem/problem/plane.py",
+        "rodfem/problem/trials.py",
         "abs(one - other) > NEGLIGIBLE * ",
         "abs(one - other) > 1e12 * ",
         "tests/problem/test_scene_errors.py",
     ),
     "energies-are-tried-at-one-load": Fault(
-        "rodfem/problem/plane.py",
+        "rodfem/problem/trials.py",
         "*map(scene.constants, scene.loads()), ",
         "",
         "tests/problem/test_scene_errors.py",
@@ -646,7 +646,7 @@ FAULTS = {
         "tests/continuation/test_convexity.py",
     ),
     "planes-are-tried-at-the-ends": Fault(
-        "rodfem/problem/plane.py",
+        "rodfem/problem/trials.py",
         "for load in scene.loads() if scene.load in asked",
         "for load in scene.span if scene.load in asked",
         "tests/problem/test_scene_errors.py",

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import golden_cases
 
 import rodfem
-from rodfem.problem.roles import Role, changes
+from rodfem.problem.functions import Role, changes
 from rodfem.problem.scene import Scene
 
 DNA = 1e-8, 1e-12, 1.0

@@ -40,7 +40,7 @@ from rodfem.deflation.group_orbit import Orbits
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import LARGEST, Correction, Limits, NewtonResult, correct, linear_step, newton, relative_size
 from rodfem.fem.system import System
-from rodfem.problem.end import TURNS
+from rodfem.problem.ends import TURNS
 from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD, TINY
 
 NEAR = 1e-4

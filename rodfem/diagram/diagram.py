@@ -28,7 +28,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, origin, save_run
 from rodfem.output.table import REMARK
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
-from rodfem.problem.roles import derived
+from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
 from rodfem.stability.assessment import Verdict

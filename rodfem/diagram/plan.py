@@ -10,7 +10,7 @@ from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.arguments import a, real, reals, whole, yes_or_no
 from rodfem.problem.events import Event
-from rodfem.problem.local_state import asked_for
+from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
 from rodfem.stability import registry

@@ -19,7 +19,7 @@ from rodfem.expressions import Variable, differentiated, extract_coefficients, e
 from rodfem.fem.equations import Equations
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature, strain
-from rodfem.problem.roles import derived
+from rodfem.problem.functions import derived
 
 GRID = 25
 """Places of an element, at equal distances, at which a material that varies along it is looked at as well."""

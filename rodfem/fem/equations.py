@@ -36,8 +36,7 @@ from rodfem.forms import inertia, lagrangian
 from rodfem.forms.kinematics import curvature, strain
 from rodfem.forms.rotation import rotation
 from rodfem.problem.contribution import Site
-from rodfem.problem.local_state import Constants, Place, place
-from rodfem.problem.roles import derived
+from rodfem.problem.functions import Constants, Place, derived, place
 from rodfem.problem.scene import Part, Scene
 from rodfem.tolerances import same_place
 

@@ -26,7 +26,7 @@ from rodfem.fem.formulations import CONTACT_FORCE, Formulation, turning_of
 from rodfem.fem.state import LOAD
 from rodfem.problem.arguments import reals, whole
 from rodfem.problem.contribution import Block, Group, Unknown
-from rodfem.problem.local_state import Constants
+from rodfem.problem.functions import Constants
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import SAME_PLACE, same_place
 

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import LOAD
 from rodfem.fem.system import System
-from rodfem.problem.local_state import inside
+from rodfem.problem.functions import inside
 
 SAME = 1e-9
 """Relative difference of fingerprints that is round-off."""

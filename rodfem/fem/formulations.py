@@ -14,8 +14,7 @@ from rodfem.errors import Argument, InputError, Remedy
 from rodfem.forms import lagrangian
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
-from rodfem.problem.end import LETTERS, SIDES
-from rodfem.problem.local_state import needs_centreline
+from rodfem.problem.functions import LETTERS, SIDES, needs_centreline
 from rodfem.problem.quaternions import of_vector, product
 from rodfem.problem.validation import PLACES
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from rodfem.fem.shape import Shape
     from rodfem.fem.state import NodalValues
     from rodfem.modes.perturbation import Motions
-    from rodfem.problem.local_state import Constants, Place
+    from rodfem.problem.functions import Constants, Place
     from rodfem.problem.scene import Scene
 
 CONTACT_FORCE = "n"

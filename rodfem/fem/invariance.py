@@ -37,7 +37,7 @@ from rodfem.fem.state import LOAD, Evaluation, State
 from rodfem.fem.symmetries import SYMMETRIC_STATE, Symmetry, derivative, elementary_generators
 from rodfem.linalg.matrices import rounding
 from rodfem.problem.contribution import Block, Motion
-from rodfem.problem.roles import derived
+from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:

@@ -28,7 +28,7 @@ from rodfem.fem.assembly import Assembler, Cells, Places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.state import Evaluation
 from rodfem.fem.system import System
-from rodfem.problem.roles import derived
+from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
 
 POINTS, LEAST = 4096, 4

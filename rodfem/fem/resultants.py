@@ -29,10 +29,9 @@ from petsc4py import PETSc
 from rodfem.fem.quadrature_check import Pieces
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import Evaluation
-from rodfem.problem.constraint import Constraint
-from rodfem.problem.end import LETTERS
+from rodfem.problem.contribution import Constraint
+from rodfem.problem.functions import LETTERS, derived
 from rodfem.problem.quaternions import directors, product
-from rodfem.problem.roles import derived
 from rodfem.tolerances import SAME_PLACE
 
 NAMES = ("strain", "curvature", "force", "moment")

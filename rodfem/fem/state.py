@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.fem.assembly import Assembler, Places
 from rodfem.linalg.matrices import shared
-from rodfem.problem.local_state import Constants
+from rodfem.problem.functions import Constants
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations

@@ -40,8 +40,7 @@ from rodfem.fem.symmetries import (
 from rodfem.linalg.chain import factors_of
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
-from rodfem.problem.local_state import floats
-from rodfem.problem.roles import derived
+from rodfem.problem.functions import derived, floats
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
 

@@ -44,7 +44,7 @@ from rodfem.errors import POINTWISE, InputError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix
-from rodfem.problem.end import CLOSING_MOMENT
+from rodfem.problem.ends import CLOSING_MOMENT
 from rodfem.stability.pencil import Blocks, Pencil, symmetry_modes, weighed_modes
 
 COORDINATES = ("full", "tangent", "compatible")

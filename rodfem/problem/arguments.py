@@ -1,10 +1,6 @@
-"""Checks of arguments: each returns the value to go on with, or raises one sentence with an example.
+"""Checks of arguments: each takes a name and a value, and returns the value to go on with, or raises one sentence.
 
-A check takes the argument's name and its value.  :func:`checked` declares those of a public function at its head; a
-dataclass calls them for its fields.  The sentences are :class:`InputError`; those on the functions of a scene, whose
-names are words (``force on the left end``), are :class:`SceneError`.
-
-Public functions work in one thread at a time, as neither PETSc nor FFCx can be used by two: others wait.
+:func:`checked` declares those of a public function at its head, :func:`convert` applies them to a dataclass's fields.
 """
 
 from __future__ import annotations
@@ -30,55 +26,53 @@ P = ParamSpec("P")
 T = TypeVar("T")
 Check = Callable[[str, Any], Any]
 ONE_THREAD = RLock()
-"""Held while a public function works."""
+"""Held while a public function works: neither PETSc nor FFCx can be used by two threads."""
 SHORT = Repr()
 SHORT.maxother = SHORT.maxstring = 60
 UNORDERED = str, bytes, Set, Mapping
 """Kinds that can be iterated over and are no lists of numbers."""
 
 
-def whole(name: str, value: Any, example: int) -> int:
-    """Return ``value`` as an int; raises :class:`InputError` unless it is a whole number (no bool, no float)."""
+def refused(name: str, value: Any, wanted: str) -> InputError:
+    """Error of an argument that has a ``value`` in the place of what is ``wanted``, in which ``@`` is its name."""
+    return InputError(f"{name} is {SHORT.repr(value)}: give {wanted.replace('@', name)}.")
+
+
+def whole(name: str, value: Any, example: int, least: int | None = None) -> int:
+    """Whole number, no bool and no float, ``least`` or more unless that is None."""
     if not isinstance(value, Integral) or isinstance(value, bool):
-        raise InputError(f"{name} is {value!r}: give a whole number, as in {name}={example}.")
+        raise refused(name, value, f"a whole number, as in @={example}")
+    if least is not None and value < least:
+        raise refused(name, value, f"{least} or more, as in @={example}")
     return int(value)
 
 
 def real(name: str, value: Any, example: float) -> float:
-    """Return ``value`` as a float; raises :class:`InputError` unless it is a number (no bool, no string)."""
-    if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name} is {value!r}: give a number, as in {name}={example:g}.")
+    """Number, no bool and no string."""
     try:
-        return float(value)
-    except OverflowError:
-        raise InputError(f"{name} is an integer too large for a float: give a smaller one.") from None
+        if isinstance(value, Real) and not isinstance(value, (bool, np.bool_)):
+            return float(value)
+    except OverflowError:  # of an integer
+        pass
+    raise refused(name, value, f"a number, as in @={example:g}")
 
 
 def finite(name: str, value: Any, example: float) -> float:
-    """Return ``value`` as a float; raises :class:`InputError` unless it is a finite number."""
-    value = real(name, value, example)
-    if not isfinite(value):
-        raise InputError(f"{name} is {value:g}: give a finite number, as in {name}={example:g}.")
-    return float(value)
+    """Finite number."""
+    number = real(name, value, example)
+    if not isfinite(number):
+        raise refused(name, number, f"a finite number, as in @={example:g}")
+    return number
 
 
-def reals(name: str, values: Any, example: tuple[float, ...], size: int | None = None) -> tuple[float, ...]:
-    """Return ``values`` as a tuple of floats; raises :class:`InputError` unless they are ``size`` (any) numbers.
-
-    ``name`` and ``example`` are for the sentence of the error.
-    """
-    listed = isinstance(values, Iterable) and not isinstance(values, UNORDERED)
-    given = tuple(values) if listed else None
+def reals(
+    name: str, values: Any, example: tuple[float, ...], size: int | None = None, one: Callable[..., float] = real
+) -> tuple[float, ...]:
+    """Tuple of numbers, ``size`` of them unless that is None, each of which passes the check ``one``."""
+    given = tuple(values) if isinstance(values, Iterable) and not isinstance(values, UNORDERED) else None
     if given is None or (size is not None and len(given) != size):
-        raise InputError(f"{name} is {values!r}: give {size or 'a tuple of'} numbers, as in {name}={example}.")
-    return tuple(real(f"{name}[{i}]", value, example[0]) for i, value in enumerate(given))
-
-
-def yes_or_no(name: str, value: Any) -> bool:
-    """Return ``value``; raises :class:`InputError` unless it is True or False."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name} is {value!r}: give True or False.")
-    return bool(value)
+        raise refused(name, values, f"{size or 'a tuple of'} numbers, as in @={example}")
+    return tuple(one(f"{name}[{i}]", value, example[0]) for i, value in enumerate(given))
 
 
 def takes(function: Any, arguments: int) -> bool:
@@ -96,15 +90,13 @@ def encodes(name: str) -> bool:
 
 
 def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Decorator of a function whose arguments are checked, and converted, before anything else is done.
+    """Decorator of a function whose arguments are checked, and converted; a default is not.
 
-    A default is not checked.  The function raises :class:`TypeError`, with the names of its arguments, if one is
-    missing or unknown.
+    The function raises :class:`TypeError`, with the names of its arguments, if one is missing or unknown.
     """
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(function)
-        defaults = {name: parameter.default for name, parameter in signature.parameters.items()}
 
         @wraps(function)
         def call(*arguments: P.args, **named: P.kwargs) -> T:
@@ -115,7 +107,7 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
                 words = f"{function.__name__}() {trouble}: its arguments are {', '.join(names)}"
                 raise TypeError(words) from None
             for name, check in checks.items():
-                if name in given.arguments and given.arguments[name] is not defaults[name]:
+                if name in given.arguments and given.arguments[name] is not signature.parameters[name].default:
                     given.arguments[name] = check(name, given.arguments[name])
             with ONE_THREAD:
                 return function(*given.args, **given.kwargs)
@@ -125,15 +117,24 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
     return decorate
 
 
+def convert(owner: Any, **checks: Check) -> None:
+    """Check and convert fields of a frozen dataclass, in its ``__post_init__``."""
+    for name, check in checks.items():
+        object.__setattr__(owner, name, check(name, getattr(owner, name)))
+
+
 def a(kind: type | tuple[type, ...], example: str) -> Check:
-    """Check for an object of a class, or of one of some; raises :class:`InputError` for anything else."""
+    """Check for an object of a class, or of one of some."""
 
     def check(name: str, value: Any) -> Any:
         if not isinstance(value, kind):
-            raise InputError(f"{name} is {SHORT.repr(value)}: give {example}.")
+            raise refused(name, value, example)
         return value
 
     return check
+
+
+yes_or_no = a(bool, "True or False")
 
 
 def text(example: str) -> Check:
@@ -142,64 +143,53 @@ def text(example: str) -> Check:
 
 
 def count(example: int, least: int = 0) -> Check:
-    """Check for a whole number, ``least`` or more; raises :class:`InputError` for anything else."""
-
-    def check(name: str, value: Any) -> int:
-        value = whole(name, value, example)
-        if value < least:
-            raise InputError(f"{name} is {value}: give {least} or more, as in {name}={example}.")
-        return int(value)
-
-    return check
+    """Check for a whole number, ``least`` or more."""
+    return lambda name, value: whole(name, value, example, least)
 
 
 def number(example: float) -> Check:
-    """Check for a finite real number."""
+    """Check for a finite number."""
     return lambda name, value: finite(name, value, example)
 
 
-def interval(low: float, high: float) -> Check:
-    """Check for two finite numbers, as in ``(low, high)``; raises :class:`InputError` for anything else."""
+def interval(low: float, high: float, one: Callable[..., float] = finite) -> Check:
+    """Check for two finite numbers, as in ``(low, high)``, or two that pass the check ``one``."""
+    return lambda name, value: reals(name, value, (low, high), 2, one)
 
-    def check(name: str, value: Any) -> tuple[float, ...]:
-        found = reals(name, value, (low, high), 2)
-        if not all(map(isfinite, found)):
-            raise InputError(f"{name} is {found}: give two finite numbers, as in {name}={(low, high)}.")
-        return found
 
-    return check
+def optional(check: Check) -> Check:
+    """Check that lets None pass."""
+    return lambda name, value: None if value is None else check(name, value)
 
 
 def each(one: Check) -> Check:
-    """Check for a sequence each of whose items passes a check; raises :class:`InputError` for anything else."""
+    """Check for a sequence each of whose items passes a check."""
 
     def check(name: str, values: Any) -> list[Any]:
         if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
-            raise InputError(f"{name} is {SHORT.repr(values)}: give a list.")
+            raise refused(name, values, "a list")
         return [one(f"{name}[{i}]", value) for i, value in enumerate(values)]
 
     return check
 
 
 def path(example: str) -> Check:
-    """Check for a path, or the name of one; raises :class:`InputError` for anything else."""
+    """Check for a path, or the name of one."""
 
     def check(name: str, value: Any) -> Path:
         if not isinstance(value, (str, os.PathLike)) or not str(value) or not encodes(str(value)):
-            raise InputError(f"{name} is {SHORT.repr(value)}: give a path, as in {name}={example!r}.")
+            raise refused(name, value, f"a path, as in @={example!r}")
         return Path(value)
 
     return check
 
 
 def function(example: str, arguments: int = 1) -> Check:
-    """Check for a function of so many arguments; raises :class:`InputError` for anything else."""
+    """Check for a function of so many arguments."""
 
     def check(name: str, value: Any) -> Any:
         if not takes(value, arguments):
-            raise InputError(
-                f"{name} is {value!r}: give a function of {many(arguments, 'argument')}, as in {name}={example}."
-            )
+            raise refused(name, value, f"a function of {many(arguments, 'argument')}, as in @={example}")
         return value
 
     return check
@@ -207,14 +197,12 @@ def function(example: str, arguments: int = 1) -> Check:
 
 def check_vector(what: str, values: Any, size: int) -> None:
     """Raise :class:`SceneError` unless ``values`` has ``size`` components."""
-    if isinstance(values, UNORDERED):
-        raise SceneError(f"The {what} is {values!r}: give {size} components in a tuple.")
     try:
-        given = len(values)
+        given = None if isinstance(values, UNORDERED) else len(values)
     except TypeError:
-        raise SceneError(f"The {what} is a single value: give {size} components.") from None
+        given = None
     if given != size:
-        raise SceneError(f"The {what} has {given} components: give {size}.")
+        raise SceneError(f"The {what} {f'is {values!r}' if given is None else f'has {given} components'}: give {size}.")
 
 
 def check_scalar(what: str, value: Any) -> None:
@@ -230,7 +218,7 @@ def check_scalar(what: str, value: Any) -> None:
 
 
 def plain(value: Any) -> float:
-    """Return a number, or a constant expression, as a float; raises :class:`TypeError` for anything else."""
+    """Float of a number, or of a constant expression; raises :class:`TypeError` for anything else."""
     if isinstance(value, (str, bytes, bool, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim):
         raise TypeError(f"{value!r} is no number")
     return float(value)

@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 from rodfem.errors import InputError
 from rodfem.forms import inertia, loads
-from rodfem.problem.arguments import finite
-from rodfem.problem.roles import Role, functions_of, role_field
-
-if TYPE_CHECKING:
-    from rodfem.problem.local_state import Constants, Given, OfPlace, Place
+from rodfem.problem.arguments import convert, number, optional, yes_or_no
+from rodfem.problem.functions import Constants, Given, OfPlace, Place, Role, functions_of, role_field
 
 Direction = tuple[float, ...]
 UNIT: tuple[Direction, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -26,23 +23,18 @@ UNIT: tuple[Direction, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 class Motion(Enum):
     """Action of a rigid motion of space on the unknowns of a group."""
 
-    VECTOR = auto()
-    """Vectors: they rotate with space."""
-    POSITION = auto()
-    """Points: they rotate and translate with space."""
-    MIXED = auto()
-    """A symmetry may combine any of them."""
-    CLOSING = auto()
-    """They follow from the others: they close a ring."""
+    VECTOR = auto()  # they rotate with space
+    POSITION = auto()  # they rotate and translate with space
+    MIXED = auto()  # a symmetry may combine any of them
+    CLOSING = auto()  # they close a ring, and follow from the others
 
 
 @dataclass(frozen=True)
 class Group:
     """Scalar unknowns that belong together, multipliers unless they are positions; that of component 0 is ``name1``.
 
-    ``name`` begins their names, and ``words`` are for the terminal.  ``equation`` is what that of a multiplier states,
-    with ``{}`` for its number; positions have none. ``motion`` is what rigid motions do to them.  ``known(c)`` (3,) has
-    the components of a vector that are no unknowns, ``moment`` says whether a multiplier is a moment.
+    ``equation`` is what that of a multiplier states, with ``{}`` for its number; positions have none.  ``known(c)``
+    (3,) are the components of a vector that are no unknowns, ``moment`` says whether a multiplier is a moment.
     """
 
     name: str
@@ -74,10 +66,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Block:
-    """One field: ``name``, number of components ``size``, ``degree``, whether ``continuous``, whether a ``multiplier``.
-
-    ``along`` says whether it is that of a constraint all along the rod.
-    """
+    """One field; ``along`` says whether it is the multiplier of a constraint all along the rod."""
 
     name: str
     size: int
@@ -153,8 +142,7 @@ FOLLOWER_MOMENT = Load(
 class Contribution:
     """Part of a scene; one without unknowns contributes its loads, and nothing else."""
 
-    nodal = False
-    """Whether its terms along the rod are collocated at nodes."""
+    nodal = False  # whether its terms along the rod are collocated at nodes
 
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """Scalar unknowns of contribution ``number`` of its kind; ``centreline``: whether that is a field."""
@@ -204,7 +192,7 @@ class Attachment(Contribution):
 
     def __post_init__(self) -> None:
         """Check the place, and that there is something; raises :class:`InputError`."""
-        object.__setattr__(self, "s", finite("s", self.s, 0.5))
+        convert(self, s=number(0.5))
         if all(value is None for name, value in vars(self).items() if name != "s"):
             raise InputError(
                 f"Nothing is attached at s = {self.s:g}: give the attachment a force, a follower force, an energy, a "
@@ -217,3 +205,80 @@ class Attachment(Contribution):
             yield inertia.translational(at.first.r, at.second.r, self.mass(at.c))
         if self.rotary_inertia is not None:
             yield inertia.rotary(at.x.q, at.first.q, at.second.q, tuple(self.rotary_inertia(at.c)))
+
+
+MULTIPLIERS = Group("g", "multipliers of constraints", "constraint {} of the scene", Motion.MIXED)
+
+
+@dataclass(frozen=True)
+class Constraint(Contribution):
+    """An equation ``of(x, c) = 0`` with a multiplier of its own, at arclength ``s`` or, where that is None, of the rod.
+
+    Made by :func:`integral`, :func:`at` and :func:`everywhere`.
+    """
+
+    of: OfPlace = field(metadata={"role": lambda x: Role("constraint", "f(x, c)", 0, along=x.s is None)})
+    s: float | None = None
+    letter: ClassVar[str] = "g"  # begins the name of its multiplier: those of one letter are numbered together
+    words: ClassVar[str] = ""  # for a picture in which it has no place
+    whole: ClassVar[bool] = False  # whether it is an integral
+
+    def __post_init__(self) -> None:
+        """Check the place; raises :class:`InputError`."""
+        convert(self, s=optional(number(0.5)))
+
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """One scalar multiplier."""
+        return [Unknown(MULTIPLIERS, number)]
+
+    def lagrangian(self, at: Site) -> Iterator[Any]:
+        """Multiplier times equation."""
+        yield at.y[0] * self.value(at.x, at.c)
+
+    def value(self, x: Place, c: Constants) -> Any:
+        """Expression that is zero; of an integral the integrand."""
+        return self.of(x, c)
+
+
+@dataclass(frozen=True)
+class Integral(Constraint):
+    """An integral over the rod that ``equals(c)``, which is spread over the rod."""
+
+    equals: Given = role_field(Role("value of an integral constraint", "f(c)", 0, placed=False), lambda c: 0.0)
+    words = "integral constraint"
+    whole = True
+
+    def value(self, x: Place, c: Constants) -> Any:
+        """Integrand of the integral that is zero."""
+        return self.of(x, c) - self.equals(c) / x.length
+
+
+@dataclass(frozen=True)
+class Everywhere(Constraint):
+    """A constraint all along the rod, whose multiplier is a field."""
+
+    nodal: bool = False  # of positions or rotations: its multiplier is continuous, the equation collocated at nodes
+    letter, words = "p", "constraint all along the rod"
+
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """No scalar."""
+        return []
+
+    def blocks(self, number: int, degree: int) -> list[Block]:
+        """Multiplier, of the degree of the field that is constrained."""
+        return [Block(f"{self.letter}{number}", 1, degree if self.nodal else degree - 1, self.nodal, True, True)]
+
+
+def integral(of: OfPlace, equals: Given = 0.0) -> Constraint:
+    """Constrain ``int of(x, c) ds = equals(c)``: a total twist, say.  The multiplier is one scalar."""
+    return Integral(of, equals=equals)
+
+
+def at(s: float, of: OfPlace) -> Constraint:
+    """Constrain ``of(x, c) = 0`` at arclength ``s``: a point kept on a plane, say.  The multiplier is one scalar."""
+    return Constraint(of, s)
+
+
+def everywhere(of: OfPlace, *, strain: bool) -> Constraint:
+    """Constrain ``of(x, c) = 0`` all along the rod; ``strain`` says whether it is one of strains or of positions."""
+    return Everywhere(of, nodal=not yes_or_no("strain", strain))

@@ -1,4 +1,4 @@
-"""Supports and loads of a rod: its ends, attachments along it, and constraints.
+"""Supports and loads of the ends of a rod, and what else acts on it: all that a scene is made of, in one place.
 
 Everything here is plain immutable data.  Functions of the named constants ``c`` return expressions that work on UFL and
 on numbers alike, and a constant may stand in the place of one.  Functions ``f(x, c)`` of a *place* receive the state of
@@ -13,19 +13,44 @@ They return UFL scalars (see :mod:`rodfem.forms.loads` for a stock of them).
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+import ufl
 
 from rodfem.errors import InputError, SceneError
 from rodfem.forms import loads
 from rodfem.forms.rotation import IDENTITY
-from rodfem.problem.arguments import reals
-from rodfem.problem.constraint import Constraint, Integral, at, everywhere, integral
-from rodfem.problem.contribution import Attachment
-from rodfem.problem.end import End, Ring, SlidingHinge
-from rodfem.problem.local_state import Constants, Given, OfPlace, Place, Quaternion
+from rodfem.problem.arguments import check_vector, convert, number_of, plain, reals, yes_or_no
+from rodfem.problem.contribution import (
+    DEAD_AT_END,
+    FOLLOWER,
+    FOLLOWER_MOMENT,
+    MOMENT,
+    POTENTIAL,
+    UNIT,
+    Attachment,
+    Block,
+    Constraint,
+    Contribution,
+    Direction,
+    Group,
+    Integral,
+    Motion,
+    Site,
+    Unknown,
+    at,
+    everywhere,
+    integral,
+)
+from rodfem.problem.functions import LETTERS, SIDES, Constants, Given, OfPlace, Place, Quaternion, Role, role_field
+from rodfem.problem.setting import AXIS, HELD, TURNS
 from rodfem.tolerances import NEGLIGIBLE
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
 
 __all__ = [
     "Attachment",
@@ -48,16 +73,305 @@ __all__ = [
 ]
 
 
+@dataclass(frozen=True)
+class End(Contribution):
+    """Support and loads of one end of the rod.
+
+    Parameters
+    ----------
+    position
+        ``position(c)``, or a constant, gives three components, each an expression (held there) or None (free to move
+        in that direction); None leaves all three free.
+    rotation
+        Quaternion (scalar first) at which the directors are held; ``rotation(c)`` gives one that changes with the
+        constants; None leaves them free.
+    hinge
+        Axis, in components along the directors of the held end, about which the end turns freely nevertheless.
+    force
+        ``force(c)``, dead force on the end, felt in the free directions.  Conservative.
+    follower
+        ``follower(c)``, force on a free end by its components along the directors, with which it turns.  Not
+        conservative.
+    moment
+        ``moment(c)``, moment about axes fixed in space.  Not conservative, but for a planar rod.
+    follower_moment
+        ``follower_moment(c)``, moment by its components along the directors.  Not conservative, but for a planar rod.
+    energy
+        ``energy(x, c)``, potential energy of what else acts on the end: springs, a semi-tangential moment.
+        Conservative.
+    """
+
+    position: Given = role_field(Role("position of the {} end", "f(c)", 3, gaps=True, placed=False))
+    rotation: Given = role_field(Role("rotation of the {} end", "f(c)", 4, or_value=True, placed=False))
+    force: Given = role_field(Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END, placed=False))
+    follower: Given = role_field(Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER, placed=False))
+    hinge: tuple[float, float, float] | None = None
+    moment: Given = role_field(Role("moment on the {} end", "f(c)", 3, load=MOMENT, placed=False))
+    follower_moment: Given = role_field(
+        Role("follower moment on the {} end", "f(c)", 3, load=FOLLOWER_MOMENT, placed=False)
+    )
+    energy: OfPlace | None = role_field(Role("energy of the {} end", "f(x, c)", 0, load=POTENTIAL))
+
+    closed = False  # whether it is joined to the other end
+    sign = 1.0  # of the right end's quaternion over the left one's, where they are joined
+    guide: ClassVar[Direction] = (0.0, 0.0, 0.0)
+    """Direction in which it slides where that need not be e1, e2 or e3; zero without one."""
+
+    def held(self, c: Constants) -> list[Any]:
+        """Position of the end: three expressions, None where the end is free."""
+        return [None] * 3 if self.position is None else list(self.position(c))
+
+    def fixed(self, c: Constants) -> np.ndarray:
+        """Directions in which the position is held, as rows of (m, 3)."""
+        return np.array([e for e, x in zip(UNIT, self.held(c), strict=True) if x is not None]).reshape(-1, 3)
+
+    def frame(self, c: Constants) -> Any:
+        """Quaternion at which the directors are held, None where they are free."""
+        return self.rotation(c) if callable(self.rotation) else self.rotation
+
+    @property
+    def turning(self) -> str:
+        """Freedom of the directors: held, rotating about the axis of the hinge, or rotating freely."""
+        return TURNS if self.rotation is None else HELD if self.hinge is None else AXIS
+
+    @property
+    def fixed_rotation(self) -> Quaternion | None:
+        """Quaternion at which the directors are clamped once and for all, None where they are not."""
+        if self.rotation is None or callable(self.rotation) or self.hinge is not None:
+            return None
+        size = sum(x * x for x in self.rotation) ** 0.5
+        a, b, c, d = (x / size for x in self.rotation)
+        return (a, b, c, d)
+
+    def clamps(self, block: Block, c: Constants) -> list[bool]:
+        """Components of a continuous field that are given at the end; one for all of a rotation or a multiplier."""
+        held = [x is not None for x in self.held(c)]
+        if block.name == "r":
+            return held
+        if block.along:  # what holds the end fulfils the constraint there
+            return [self.rotation is not None or any(held)]
+        return [self.fixed_rotation is not None]
+
+    def contact_force(self, c: Constants) -> list[Any]:
+        """Components of the contact force that dead forces prescribe, pulling outwards; None elsewhere."""
+        force = [0.0] * 3 if self.force is None else self.force(c)
+        return [f if x is None else None for f, x in zip(force, self.held(c), strict=True)]
+
+    @property
+    def dead(self) -> bool:
+        """Whether dead forces are all that acts on the position where it is free."""
+        return self.energy is None
+
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """Moments of a moving clamp or a hinge."""
+        directions = self._stiff(normal)
+        motion = Motion.MIXED if len(directions) == 2 else Motion.VECTOR
+        words = f"moment at the {SIDES[number]} end"
+        group = Group(f"m{LETTERS[number]}", words, "rotation of an end, direction {}", motion, moment=True)
+        return [Unknown(group, i, direction) for i, direction in enumerate(directions)]
+
+    def lagrangian(self, at: Site) -> Iterator[Any]:
+        """Loads, and the misalignment of a moving clamp or a hinge with its moments."""
+        yield from super().lagrangian(at)
+        for moment, direction in zip(at.y, self._stiff(at.normal), strict=False):
+            yield moment * ufl.dot(loads.misalignment(at.x.q, self.frame(at.c)), ufl.as_vector(direction))
+
+    def _stiff(self, normal: int | None) -> list[Direction]:
+        """Directions about which moments, as unknowns, keep the end from turning; in a plane the normal or none."""
+        if self.rotation is None or self.fixed_rotation is not None:
+            return []
+        if normal is None:
+            return list(UNIT) if self.hinge is None else across(self.hinge)
+        along = self.hinge is not None and abs(self.hinge[normal]) > 0.999 * float(np.linalg.norm(self.hinge))
+        return [] if along else [UNIT[normal]]
+
+    def check(self, side: str, scene: Scene) -> None:
+        """Check shapes, and that nothing acts on what is held; raises :class:`SceneError`."""
+        where = f"{side} end"
+        for c in map(scene.constants, scene.loads() if callable(self.rotation) else scene.span[:1]):
+            rotation = self.frame(c)
+            size = 1.0 if rotation is None else _size(f"rotation of the {where}", rotation, 4)
+            if not 0 < size:
+                words = "the zero quaternion" if size == 0 else f"{rotation}"
+                raise SceneError(f"The rotation of the {where} is {words}: give one of unit norm.")
+        if self.hinge is not None:
+            if self.rotation is None:
+                raise SceneError(f"The {where} has a hinge but no rotation: say which directors the hinge holds.")
+            if not 0 < _size(f"hinge of the {where}", self.hinge, 3):
+                raise SceneError(f"The hinge of the {where} has no axis: give three components, not all zero.")
+        for c in map(scene.constants, scene.loads()):
+            self._check_force(where, c)
+        if self.fixed_rotation is not None and (self.moment or self.follower_moment):
+            raise SceneError(
+                f"A moment acts on the {where}, whose directors are held: leave its rotation free, or use a hinge."
+            )
+
+    def _check_force(self, where: str, c: Constants) -> None:
+        fixed = self.fixed(c)
+        if len(fixed) == 3 and (self.force or self.follower):
+            raise SceneError(
+                f"A force acts on the {where}, whose position is held: leave it out, or leave the position free in one "
+                "direction."
+            )
+        force = np.array([0.0] * 3 if self.force is None else [number_of(x) for x in self.force(c)])
+        if (abs(fixed @ force) > NEGLIGIBLE * np.linalg.norm(force)).any():
+            raise SceneError(
+                f"A force acts on the {where} in a direction in which its position is held: leave that component out, "
+                "or leave the position free there."
+            )
+
+
+def _size(what: str, values: Any, size: int) -> float:
+    """Norm of a quaternion or an axis; raises :class:`SceneError` for what is none, nan for what is not finite."""
+    check_vector(what, values, size)
+    try:
+        norm = float(np.linalg.norm([plain(x) for x in values]))
+    except (TypeError, ValueError):
+        raise SceneError(f"The {what} is {values!r}: give finite numbers.") from None
+    return norm if norm < np.inf else np.nan
+
+
+def across(axis: Direction) -> list[Direction]:
+    """Two unit vectors across an axis."""
+    return [tuple(map(float, row)) for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
+
+
+CLOSING_MOMENT = Group(
+    "t", "closing moment", "closing of the ring's rotation, component {}", Motion.CLOSING, moment=True
+)
+CLOSING_FORCE = Group("f", "closing force", "closing of the ring along e{}", Motion.CLOSING)
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Both ends joined to each other, with equal directors: a closed rod.
+
+    Where the directors turn about the closed rod an odd number of times in all (a circle without twist: once), its
+    quaternion changes sign, ``q(l) = -q(0)``; with ``odd = False`` it does not.  The number itself, and with it the
+    link, is that of the scene's ``start``.
+    """
+
+    odd: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the kind; raises :class:`InputError`."""
+        convert(self, odd=yes_or_no)
+
+    def __iter__(self) -> Iterator[End]:
+        """Yield the left and the right end."""
+        for last in (False, True):
+            yield JoinedEnd(sign=-1.0 if self.odd else 1.0, last=last)
+
+
+@dataclass(frozen=True)
+class JoinedEnd(End):
+    """One end of a closed rod: nothing but the other end holds it.
+
+    Multipliers close ``q(l) = +-q(0)`` and, with a centreline, ``r(l) = r(0)``.  In a plane the angle grows by the
+    whole number of turns that the scene's start makes.
+    """
+
+    sign: float = 1.0
+    last: bool = False
+    closed = True
+
+    def clamps(self, block: Block, c: Constants) -> list[bool]:
+        """Nothing but one multiplier of the unit norm: that of ``q(l) = +-q(0)`` is that of ``q(0)``."""
+        return [self.last and block.name == "eta"]
+
+    def contact_force(self, c: Constants) -> list[Any]:
+        """No component is known."""
+        return [None] * 3
+
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """Moments and forces that close the rod, the same of both ends."""
+        moments = [Unknown(CLOSING_MOMENT, i) for i in range(4 if normal is None else 1)]
+        return moments + [Unknown(CLOSING_FORCE, i, UNIT[i]) for i in range(3) if centreline and i != normal]
+
+    def lagrangian(self, at: Site) -> Iterator[Any]:
+        """Share of this end in the equations of closure, with their multipliers."""
+        planar, sign = at.whole is not None, 1.0 if self.last else -1.0
+        turned = [at.turned] if planar else [at.turned[i] for i in range(4)]
+        if self.last and planar:
+            yield -at.y[0] * at.whole
+        yield (sign if self.last or planar else -self.sign) * sum(y * q for y, q in zip(at.y, turned, strict=False))
+        forces = at.y[len(turned) :]
+        if len(forces):
+            yield sign * sum(f * at.x.r[i] for f, i in zip(forces, at.free, strict=True))
+
+    def check(self, side: str, scene: Scene) -> None:
+        """Check that the start of the ring closes; raises :class:`SceneError`."""
+        if scene.start is None:
+            raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
+        first, last = scene.start(np.array(scene.interval))
+        if self.sign * (first @ last) <= 0:
+            raise SceneError(
+                f"The start of the ring does not end as it begins: make q(l) = {self.sign:+g} q(0), or choose "
+                f"Ring(odd={self.sign > 0})."
+            )
+
+
+@dataclass(frozen=True)
+class SlidingHinge(End):
+    """End that turns about the axis ``hinge``, and whose ``position`` slides along a unit vector ``guide`` of space.
+
+    Components of the position across which the direction is are held.  Forces of the guide, scalar unknowns, keep the
+    others on it: as many as there are, less one.
+    """
+
+    guide: Direction = (0.0, 0.0, 1.0)  # type: ignore[misc]
+
+    def held(self, c: Constants) -> list[Any]:
+        """Position of the end: None in the components that move."""
+        return [None if t else p for t, p in zip(self.guide, super().held(c), strict=True)]
+
+    def fixed(self, c: Constants) -> np.ndarray:
+        """Directions across the guide, (2, 3)."""
+        return np.array(across(self.guide))
+
+    @property
+    def dead(self) -> bool:
+        """Whether there is no force of the guide, nor an energy."""
+        return super().dead and not self._guiding()
+
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """Moments of the hinge, and forces of the guide."""
+        words = f"force of the guide at the {SIDES[number]} end"
+        group = Group(f"f{LETTERS[number]}", words, "guide of an end, direction {}", Motion.MIXED)
+        forces = [Unknown(group, i, direction) for i, direction in enumerate(self._guiding())]
+        return super().unknowns(number, normal, centreline) + forces
+
+    def lagrangian(self, at: Site) -> Iterator[Any]:
+        """Terms of the hinge, and the distance from the guide with its forces."""
+        yield from super().lagrangian(at)
+        guiding, point = self._guiding(), super().held(at.c)
+        for force, direction in zip(at.y[len(at.y) - len(guiding) :], guiding, strict=True):
+            yield force * sum(d * (at.x.r[i] - point[i]) for i, d in enumerate(direction) if d)
+
+    def _guiding(self) -> list[Direction]:
+        """Unit vectors across the direction, among the components that move."""
+        moving = np.flatnonzero(self.guide)
+        vectors = np.array(across(tuple(self.guide[i] for i in moving))).reshape(-1, len(moving))
+        return [tuple(map(float, row)) for row in vectors @ np.eye(3)[moving]]
+
+    def check(self, side: str, scene: Scene) -> None:
+        """Check the direction and the point, and what is checked of every end; raises :class:`SceneError`."""
+        if scene.normal is not None and self.guide[scene.normal]:
+            raise SceneError(
+                f"The guide of the {side} end leaves the plane across {scene.planar}: choose a direction in the plane."
+            )
+        super().check(side, scene)
+        if None in super().held(scene.constants()):
+            raise SceneError(f"The guide of the {side} end has no place: give three components of a point on it.")
+
+
 def clamped(position: Given = (0.0, 0.0, 0.0), rotation: Given = IDENTITY) -> End:
     """Return an end whose position (3,) and directors are given, both as functions of the constants if wanted."""
     return End(position=position, rotation=rotation)
 
 
 def pinned(
-    position: Given = (0.0, 0.0, 0.0),
-    force: Given = None,
-    moment: Given = None,
-    follower_moment: Given = None,
+    position: Given = (0.0, 0.0, 0.0), force: Given = None, moment: Given = None, follower_moment: Given = None
 ) -> End:
     """Return an end whose position is given and whose directors turn freely.
 
@@ -81,8 +395,7 @@ def hinged(
 ) -> End:
     """Return an end that turns freely about one ``axis`` only, given along the directors of ``rotation``.
 
-    ``position(c)`` (3,) is that of the end; components that are None are free, and ``force(c)`` (3,) is a dead force
-    there.
+    ``position(c)`` and ``force(c)`` are as for :func:`pinned`.
     """
     return End(position=position, rotation=rotation, hinge=axis, force=force)
 
@@ -106,9 +419,10 @@ def sliding_hinge(
         raise SceneError(f"The direction in which a hinge slides is {what}: give one, as in along=(0.6, 0.0, 0.8).")
     direction = direction / largest
     direction /= np.linalg.norm(direction)
-    unit = tuple(np.where(abs(direction) > NEGLIGIBLE, direction, 0.0).tolist())
+    direction = np.where(abs(direction) > NEGLIGIBLE, direction, 0.0)
+    unit = tuple((direction / np.linalg.norm(direction)).tolist())
     push = force if force is None else lambda c: tuple(t * value_of(force, c) for t in unit)
-    return SlidingHinge(position, rotation, push, hinge=axis, along=unit)
+    return SlidingHinge(position, rotation, push, hinge=axis, guide=unit)
 
 
 def free(
@@ -121,7 +435,7 @@ def free(
     """Return an end without support, loaded by forces, a potential energy, moments, or nothing.
 
     ``force(c)`` (3,) is a dead force, ``follower(c)`` (3,) one along the directors, ``energy(x, c)`` a potential;
-    ``moment(c)`` and ``follower_moment(c)`` (3,) are as for :func:`pinned`.
+    ``moment(c)`` and ``follower_moment(c)`` are as for :func:`pinned`.
     """
     return End(force=force, follower=follower, energy=energy, moment=moment, follower_moment=follower_moment)
 
@@ -148,22 +462,21 @@ def elastic(
         raise InputError("The directors of an elastic end are the zero quaternion: give one of unit norm.")
 
     def energy(x: Place, c: Constants) -> Any:
-        out = 0 if translation is None else loads.spring(x.r, _held_by(value_of(translation, c)), anchor)
-        return out + (
-            0 if rotation is None else loads.rotational_spring(x.q, _held_by(value_of(rotation, c)), directors)
-        )
+        out = 0 if translation is None else loads.spring(x.r, _stiffness(translation, c), anchor)
+        return out + (0 if rotation is None else loads.rotational_spring(x.q, _stiffness(rotation, c), directors))
 
     return End(energy=energy, force=force)
 
 
-def _held_by(stiffness: Any) -> Any:
-    """Stiffness of a spring that holds; raises :class:`ValueError` for a number below zero."""
-    for k in stiffness if isinstance(stiffness, list | tuple) else [stiffness]:
+def _stiffness(given: Given, c: Constants) -> Any:
+    """Stiffness of a spring; raises :class:`ValueError` for a number below zero."""
+    value = value_of(given, c)
+    for k in value if isinstance(value, list | tuple) else [value]:
         if isinstance(k, int | float) and k < 0:
             raise ValueError(f"a stiffness of {k:g} pushes away: give zero or more, or End(energy=...)")
-    return stiffness
+    return value
 
 
-def value_of(given: Any, c: Constants) -> Any:
+def value_of(given: Given, c: Constants) -> Any:
     """Value of a function of the constants, or of a constant in the place of one."""
     return given(c) if callable(given) else given

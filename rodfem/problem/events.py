@@ -12,7 +12,7 @@ import numpy as np
 
 from rodfem.errors import InputError, SceneError
 from rodfem.problem.arguments import function, plain, text
-from rodfem.problem.roles import Role, guarded
+from rodfem.problem.functions import Role, guarded
 
 ROLE = Role(
     "event {}",

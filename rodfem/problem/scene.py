@@ -22,14 +22,21 @@ from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import RODS, UNDEFORMED
 from rodfem.problem.arguments import a, encodes, finite, plain, real, reals, text
-from rodfem.problem.constraint import Constraint
-from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Contribution
-from rodfem.problem.end import End, Ring
-from rodfem.problem.local_state import Constants, inside, watched
-from rodfem.problem.plane import check_plane
-from rodfem.problem.roles import Role, changes, derived, functions_of, guarded, role_field
+from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution
+from rodfem.problem.ends import End, Ring
+from rodfem.problem.functions import (
+    Constants,
+    Role,
+    changes,
+    derived,
+    functions_of,
+    guarded,
+    inside,
+    role_field,
+    watched,
+)
 from rodfem.problem.table import Table, tables_of
-from rodfem.problem.trials import check_function, symbols
+from rodfem.problem.trials import check_function, check_plane, symbols
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
@@ -43,7 +50,7 @@ SHORTEST, FARTHEST = 1e-15, 1e9
 """Length above which dolfinx makes a mesh, and arclength over the length beyond which its round-off is seen."""
 
 if TYPE_CHECKING:
-    from rodfem.problem.local_state import Given, OfPlace, Vector
+    from rodfem.problem.functions import Given, OfPlace, Vector
 
 
 @dataclass(frozen=True)

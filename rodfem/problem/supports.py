@@ -26,9 +26,9 @@ from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY, product, rotation
 from rodfem.problem import quaternions
-from rodfem.problem.constraint import Constraint
-from rodfem.problem.end import SIDES, End
-from rodfem.problem.local_state import Constants, OfPlace, Place, place
+from rodfem.problem.contribution import Constraint
+from rodfem.problem.ends import End
+from rodfem.problem.functions import SIDES, Constants, OfPlace, Place, place
 from rodfem.problem.scene import Scene
 from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPORTS, TIES, Support, Tie, kind_of
 

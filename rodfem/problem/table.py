@@ -17,7 +17,7 @@ import ufl
 
 from rodfem.errors import SceneError
 from rodfem.expressions import Expr, Indexed, Label, Sum, Variable, parts
-from rodfem.problem.roles import UnnamedError
+from rodfem.problem.functions import UnnamedError
 from rodfem.problem.trials import Symbol, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 

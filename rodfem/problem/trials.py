@@ -1,10 +1,12 @@
-"""The functions of a scene, tried before any computation: with numbers, and as expressions of UFL.
+"""The functions of a scene, tried before any computation: with numbers, as expressions of UFL, and across a plane.
 
 What a function returns has the declared size, and is finite and real.  In the equations each constant is an expression
 that stands for any number of its range.  A function that branches by the value of a constant (``c.on == 1``, ``in``,
 ``if c.on``, a key of a dictionary) takes one branch for numbers and may take another there, where ``==`` compares how
-two expressions are written, and all are true.  So the function and its expression are compared at the same constants
-and states.
+two expressions are written.  So the function and its expression are compared at the same constants and states.
+
+Of a planar rod, functions of the constants are zero across the plane; functions of the state, and the stored energy,
+have one value at two states that are each other's image by the plane.
 """
 
 from __future__ import annotations
@@ -17,25 +19,39 @@ from math import inf, isfinite, isnan, nan
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
 from rodfem.expressions import EQ, NE, ComplexValue, ScalarValue, Variable, differentiated, evaluated, parts
+from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.arguments import check_scalar, check_vector, number_of, plain, takes
-from rodfem.problem.local_state import STATES, Constants, inside, some_places
-from rodfem.problem.roles import LOG_OF_UFL, Role, UnnamedError, derived, functions_of
+from rodfem.problem.functions import (
+    LOG_OF_UFL,
+    SIDES,
+    STATES,
+    Constants,
+    Place,
+    Role,
+    UnnamedError,
+    derived,
+    functions_of,
+    inside,
+    places_at,
+    some_places,
+    watched,
+)
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
+OF_PLACES = ("f(x, c)", "of(x, c)", "W(v, k, c)")
+"""Calls of functions of a place."""
 SAME = 1e-9
 """Difference of two values of a function, over the larger one, below which they are equal."""
-OF_PLACES = {"f(x, c)": ("x.q", "x.r", "x.v", "x.k"), "of(x, c)": ("x.q", "x.r", "x.v", "x.k")}
-OF_PLACES["W(v, k, c)"] = ("q", "r", "v", "k")
-"""Calls of functions of a place, with the names that its quaternion, position and strains have there."""
-Pair = tuple[float, float, Constants]
-"""Values of an expression and of a function of numbers at these constants; nan if UFL has none, inf if undefined."""
+ASIDE = 1e-3
+"""Displacement over length, strain or rotation out of the plane, to either side, at which energies are tried."""
 
 
 class Symbol(Variable):  # type: ignore[misc]
@@ -78,10 +94,8 @@ def _no_truth() -> Iterator[None]:
 
 def symbols(scene: Scene, names: Container[str] | None = None) -> Constants:
     """Constants as a function of them meets them in the equations: those with the ``names`` (all) as expressions."""
-    values = vars(scene.constants())
-    return Constants(
-        **{n: Symbol.named(f"c.{n}") if names is None or n in names else value for n, value in values.items()}
-    )
+    values = vars(scene.constants()).items()
+    return Constants(**{n: x if names is not None and n not in names else Symbol.named(f"c.{n}") for n, x in values})
 
 
 def check_function(what: str, function: Any, role: Role) -> None:
@@ -111,15 +125,11 @@ def expressions_of(scene: Scene) -> Iterator[Any]:
 def _trials(scene: Scene) -> Iterator[_Trial]:
     for what, function, role in functions_of(scene):
         if role.call in OF_PLACES or (role.call == "f(c)" and role.size is not None):
-            yield from (_Trial(scene, what, function, role, s) for s in _places(scene, function, role))
-
-
-def _places(scene: Scene, function: Any, role: Role) -> list[float | None]:
-    """Arclengths at which something acts, numbers in the equations too; None for what is a function of them."""
-    if role.along or not role.placed or role.call == "W(v, k, c)":
-        return [None]
-    at = [x.s for x in scene.parts if x.s is not None and any(function is f for f in vars(x.of).values())]
-    return [*dict.fromkeys(at)] or [None]
+            places: list[float | None] = []
+            if not role.along and role.placed and role.call != "W(v, k, c)":  # numbers in the equations, too
+                owners = (x for x in scene.parts if any(function is f for f in vars(x.of).values()))
+                places = [*dict.fromkeys(x.s for x in owners)]
+            yield from (_Trial(scene, what, function, role, s) for s in places or [None])
 
 
 @dataclass(frozen=True)
@@ -131,6 +141,11 @@ class _Trial:
     function: Callable[..., Any]
     role: Role
     s: float | None
+
+    @property
+    def of_place(self) -> bool:
+        """Whether it is a function of a place."""
+        return self.role.call in OF_PLACES
 
     def compare(self) -> None:
         """Raise :class:`SceneError` for a value of the expression that is not the one of the function of numbers."""
@@ -147,8 +162,11 @@ class _Trial:
                 f"if, nor use them as keys; write ufl.conditional(ufl.eq(c.{name}, 1), ..., ...)."
             )
 
-    def _pairs(self) -> Iterator[Pair]:
-        """Values of both: in all :data:`STATES`, and at loads and arclengths in the first."""
+    def _pairs(self) -> Iterator[tuple[float, float, Constants]]:
+        """Values of expression and function, nan if UFL has none, inf if undefined, and the constants there.
+
+        They are tried in all :data:`STATES`, and in the first one at loads and arclengths.
+        """
         for state in range(len(STATES) if self.of_place else 1):
             if self.of_place:
                 self.expressions(state)  # what it raises is no matter of the state
@@ -159,6 +177,16 @@ class _Trial:
                     if isinstance(symbol, Symbol):
                         symbol.value = vars(there)[name]
                 yield from ((*_pair(e, x), there) for e, x in zip(expressions, numbers, strict=True))
+
+    def _constants(self, state: int) -> Iterator[Constants]:
+        """Constants at which the function is tried."""
+        scene = self.scene
+        s = inside(scene.interval)[0] if self.s is None and self.of_place else self.s
+        yield scene.constants(s=s)
+        if state == 0:
+            yield from (scene.constants(load, s) for load in scene.loads())
+        if self.role.along and not self.of_place:
+            yield from (scene.constants(s=place) for place in scene.samples())
 
     def _numbers(self, there: Constants, state: int) -> list[Any]:
         """Numbers that the function returns; none if it is undefined: the rod need not take the state."""
@@ -171,31 +199,15 @@ class _Trial:
         self._check(values)
         return values
 
-    @property
-    def of_place(self) -> bool:
-        """Whether it is a function of a place."""
-        return self.role.call in OF_PLACES
-
-    def _constants(self, state: int) -> Iterator[Constants]:
-        """Constants at which the function is tried."""
-        scene = self.scene
-        s = inside(scene.interval)[0] if self.s is None and self.of_place else self.s
-        yield scene.constants(s=s)
-        if state == 0:
-            yield from (scene.constants(load, s) for load in scene.loads())
-        if self.role.along and not self.of_place:
-            yield from (scene.constants(s=place) for place in scene.samples())
-
-    def _called(self, c: Constants, state: int, wrap: Callable[[Any], Any] | None = None) -> list[Any]:
+    def _called(self, c: Constants, state: int, wrap: Callable[[Any], Any] = lambda x: x) -> list[Any]:
         """Components of what the function returns for constants and a state, whose vectors pass through ``wrap``."""
-        if self.role.call == "f(c)":
-            values = self.function(c)
-            if self.role.size:
-                check_vector(self.what, values, self.role.size)
-            return list(values) if self.role.size else [values]
-        energy = self.role.call == "W(v, k, c)"
-        x = some_places(self.scene, state, wrap, c.s)[energy or self.role.along]
-        return [self.function(x.v, x.k, c) if energy else self.function(x, c)]
+        if self.of_place:
+            places = some_places(self.scene, state, wrap, c.s)
+            return [of_state(self.function, self.role, places, c)]
+        values = self.function(c)
+        if self.role.size:
+            check_vector(self.what, values, self.role.size)
+        return list(values) if self.role.size else [values]
 
     def _check(self, values: list[Any]) -> None:
         """Check kinds, and that constants are finite."""
@@ -217,8 +229,14 @@ class _Trial:
         c = symbols(self.scene, None if self.s is None else self.scene.parameters)
         if self.s is not None:
             c.s = self.s
+        names = iter(("q", "r", "v", "k") if self.role.call == "W(v, k, c)" else ("x.q", "x.r", "x.v", "x.k"))
+
+        def symbolic(vector: Any) -> Any:
+            name, size = next(names), vector.ufl_shape[0]
+            return ufl.as_vector([Symbol.named(f"{name}[{i}]", float(vector[i])) for i in range(size)])
+
         with _no_truth():
-            found = self._called(c, state, _named(OF_PLACES.get(self.role.call, ())))
+            found = self._called(c, state, symbolic)
         if self.of_place:
             self._check(found)
         for part in chain.from_iterable(parts(e) for e in found if e is not None):
@@ -227,32 +245,104 @@ class _Trial:
         return c, [e if e is None else differentiated(ufl.as_ufl(e)) for e in found]
 
 
-def _named(names: tuple[str, ...]) -> Callable[[Any], Any]:
-    """Return what makes vectors of symbols, of these ``names`` in turn, with the values of other vectors."""
-    following = iter(names)
-
-    def symbolic(vector: Any) -> Any:
-        name, size = next(following), vector.ufl_shape[0]
-        return ufl.as_vector([Symbol.named(f"{name}[{i}]", float(vector[i])) for i in range(size)])
-
-    return symbolic
+def of_state(function: Callable[..., Any], role: Role, places: tuple[Place, Place], c: Constants) -> Any:
+    """Value of a function of a place, or of the strains, at a point or along the rod."""
+    point, rod = places
+    return function(rod.v, rod.k, c) if role.call == "W(v, k, c)" else function(rod if role.along else point, c)
 
 
 def _pair(expression: Any, value: Any) -> tuple[float, float]:
     """Values of an expression and of a function; of two that are None nan, of one that is None none that agree."""
     if expression is None or value is None:
         return (nan, nan) if expression is value else (inf, 0.0)
-    return _value(expression), number_of(value)
-
-
-def _value(expression: Any) -> float:
-    """Value of an expression at the numbers that its symbols have: inf if undefined, nan if UFL has none."""
     silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True
     try:
-        return plain(evaluated(expression))
+        return plain(evaluated(expression)), number_of(value)
     except (ArithmeticError, ValueError):
-        return inf
+        return inf, number_of(value)
     except Exception:  # of UFL's own, too, for a function that it does not evaluate
-        return nan
+        return nan, number_of(value)
     finally:
         LOG_OF_UFL.disabled = silent
+
+
+# --- the plane of a planar rod
+
+
+def check_plane(scene: Scene) -> None:
+    """Raise :class:`SceneError` for what moves a planar rod out of its plane, or pushes it out."""
+    if scene.normal is not None:
+        for c in map(scene.constants, scene.loads()):
+            _check_ends(scene, scene.normal, c)
+        for what, function, role in functions_of(scene):
+            if role.load is not None and role.call == "f(c)":
+                _check_load(scene, what, function, [i for i in range(3) if (i == scene.normal) != role.load.moment])
+        _check_functions_of_states(scene, scene.normal)
+
+
+def _check_ends(scene: Scene, normal: int, c: Constants) -> None:
+    left, right = (end.held(c)[normal] for end in scene.sides)
+    if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
+        raise SceneError(
+            f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod is "
+            "planar: hold both at the same, or leave planar out."
+        )
+    for side, end in zip(SIDES, scene.sides, strict=True):
+        frame = np.array([float(x) for x in end.frame(c) or ()])
+        if frame.size and abs(np.delete(frame[1:], normal)).max() > NEGLIGIBLE * np.linalg.norm(frame):
+            raise SceneError(
+                f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
+            )
+
+
+def _check_load(scene: Scene, what: str, function: Callable[..., Any], out: list[int]) -> None:
+    """Try a load, whose components ``out`` push out of the plane, at loads and arclengths, if it asks for them."""
+    c, asked = watched(scene.constants())
+    function(c)
+    for load in scene.loads() if scene.load in asked else [None]:
+        for s in scene.samples() if "s" in asked else [None]:
+            values = [float(x) for x in function(scene.constants(load, s))]
+            if any(values[i] for i in out):
+                raise SceneError(
+                    f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
+                    "leave that component out, or planar out of the scene."
+                )
+
+
+def _check_functions_of_states(scene: Scene, normal: int) -> None:
+    own = scene.constants()
+    others = [*map(scene.constants, scene.loads()), *(scene.constants(s=s) for s in scene.samples())]
+    functions = [(what, f, role) for what, f, role in functions_of(scene) if role.call in ("f(x, c)", "W(v, k, c)")]
+    for state in range(len(STATES)):
+        for c in [own, *others] if state == 0 else [own]:
+            sides = [_side(scene, normal, state, c.s, sign) for sign in (1.0, -1.0)]
+            for what, function, role in functions:
+                one, other = (_defined(function, role, places, c) for places in sides)
+                if abs(one - other) > NEGLIGIBLE * max(abs(one), abs(other)):
+                    raise SceneError(
+                        f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
+                        "are not alike to it; leave that out, or planar out of the scene."
+                    )
+
+
+def _side(scene: Scene, normal: int, state: int, s: float, sign: float) -> tuple[Place, Place]:
+    """A point and a place along the rod, in one of :data:`STATES` moved into the plane and then aside."""
+    q, r, v, k = (np.array(x) for x in STATES[state])
+    out = np.arange(3) == normal
+    free = np.isin(np.arange(3), scene.free_strains)
+    # generic: no motion is another's opposite
+    aside = sign * ASIDE * np.random.default_rng(0).uniform(0.5, 1.0, (4, 3))
+    turned = np.append(q[0], np.where(out, q[1:], 0.0))
+    turned /= np.linalg.norm(turned)
+    turned[1:] += np.where(out, 0.0, aside[0])
+    strains = np.where(out, free * aside[2], np.where(free, v, UNDEFORMED))
+    return places_at(scene.length, s, (turned, np.where(out, aside[1], r), strains, np.where(out, k, aside[3])))
+
+
+def _defined(function: Callable[..., Any], role: Role, places: tuple[Place, Place], c: Constants) -> float:
+    """Value of a function, zero if it is undefined: at a state that the rod need not take."""
+    try:
+        value = number_of(of_state(function, role, places, c))
+    except SceneError:
+        return 0.0
+    return value if isfinite(value) else 0.0

@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
-from rodfem.problem.local_state import STATES, some_places
+from rodfem.problem.functions import STATES, some_places
 
 if TYPE_CHECKING:
     from rodfem.problem.contribution import Block, Unknown

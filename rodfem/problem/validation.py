@@ -9,8 +9,7 @@ import numpy as np
 
 from rodfem.errors import SceneError
 from rodfem.problem.arguments import number_of
-from rodfem.problem.end import SIDES
-from rodfem.problem.local_state import STATES, asked_for, asks_where, floats, functions_of_places
+from rodfem.problem.functions import SIDES, STATES, asked_for, asks_where, floats, functions_of_places
 from rodfem.problem.trials import check_functions, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 

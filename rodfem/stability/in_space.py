@@ -10,7 +10,7 @@ from rodfem.errors import SceneError
 from rodfem.fem.newton import correct
 from rodfem.fem.state import State
 from rodfem.fem.system import System
-from rodfem.problem.end import CLOSING_MOMENT
+from rodfem.problem.ends import CLOSING_MOMENT
 from rodfem.stability.inertia import NULL, Factored, Index, Inertia
 from rodfem.stability.near_zero import inside_band
 from rodfem.tolerances import same_place

@@ -25,7 +25,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered, local_rows, rounding_of, shared
-from rodfem.problem.local_state import floats
+from rodfem.problem.functions import floats
 from rodfem.stability import motion_names
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.pencil import (

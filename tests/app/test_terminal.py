@@ -166,7 +166,7 @@ def test_help_has_all_that_pages_name() -> None:
     paths = re.findall(r"`([a-z_0-9]+(?:/[a-z_0-9]+)+)\.py`", (HOME / "docs" / "architecture.md").read_text())
     paths = [path.removeprefix("rodfem/") for path in paths if "tests" not in path]
     named |= {"rodfem." + path.replace("/", ".") for path in paths}
-    assert {"rodfem.modes.modes", "rodfem.problem.constraint", "rodfem.fem.shape.link", "rodfem.forms.loads"} <= named
+    assert {"rodfem.modes.modes", "rodfem.problem.contribution", "rodfem.fem.shape.link", "rodfem.forms.loads"} <= named
     lines = ["import pydoc, rodfem"] + [f"pydoc.render_doc({name!r})" for name in sorted(named)]
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, env=environment)

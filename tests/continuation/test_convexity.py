@@ -14,7 +14,7 @@ from rodfem.codim2.follow import locus
 from rodfem.continuation.arc import lost_between
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.local_state import Constants
+from rodfem.problem.functions import Constants
 
 MESH = Discretization("auto", 4, 4)
 Energy = Callable[[Any, Any, Any], Any]

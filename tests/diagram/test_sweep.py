@@ -25,7 +25,7 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_frequencies import curves, draw_frequencies, figure_of, ranges_of
-from rodfem.problem.end import End
+from rodfem.problem.ends import End
 from rodfem.problem.scene import Scene
 from rodfem.stability.nonsymmetric import PILE, NonsymmetricSolver
 

@@ -27,7 +27,7 @@ from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.problem.ends import Attachment, clamped, free, pinned, sliding
-from rodfem.problem.local_state import needs_centreline
+from rodfem.problem.functions import needs_centreline
 from rodfem.problem.scene import Inertia, Scene
 
 pytestmark = pytest.mark.alone

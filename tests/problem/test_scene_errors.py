@@ -23,6 +23,7 @@ from rodfem.fem.fields import Discretization, Fields
 from rodfem.fem.system import System
 from rodfem.output.files import load_json
 from rodfem.problem import ends, scene
+from rodfem.problem.contribution import Group
 from rodfem.problem.ends import (
     Attachment,
     End,
@@ -398,7 +399,8 @@ def takes_functions(owner: type) -> list[str]:
     return [f.name for f in fields(owner) if any(word in str(f.type) for word in words)]
 
 
-STATED = [x for module in (ends, scene) for x in vars(module).values() if is_dataclass(x) and isinstance(x, type)]
+CLASSES = [x for module in (ends, scene) for x in vars(module).values() if is_dataclass(x) and isinstance(x, type)]
+STATED = [x for x in CLASSES if x.__module__ != "rodfem.problem.functions" and x not in (Group, ends.JoinedEnd)]
 EVERY = sorted({(owner.__name__, name) for owner in STATED for name in takes_functions(owner)})
 
 

@@ -19,7 +19,7 @@ from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import Look
 from rodfem.output.render import _read
 from rodfem.output.style import STEEL
-from rodfem.problem.end import End
+from rodfem.problem.ends import End
 
 pytestmark = pytest.mark.alone
 

@@ -17,7 +17,7 @@ from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
 from rodfem.continuation.singular_points import coupling_of
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.words import in_decimals, number
-from rodfem.problem.local_state import Constants
+from rodfem.problem.functions import Constants
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 DNA, PIPELINE = (1e-8, 2e-28, 1e-15), (1e4, 1e9, 1e3)

@@ -17,7 +17,7 @@ import numpy as np
 import ufl
 
 from rodfem import Attachment, End, Inertia, Parameter, Scene
-from rodfem.problem.roles import Role, changes
+from rodfem.problem.functions import Role, changes
 
 from . import known
 from .known import Known, Timed

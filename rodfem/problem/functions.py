@@ -1,0 +1,364 @@
+"""The functions that a scene is made of: what each is for, its arguments, and the words on what it does wrong.
+
+The ``metadata`` of a dataclass's field has under ``role`` the :class:`Role` of the function that the field holds, or a
+function that returns one for the object, and under ``places`` the words for where the objects of a tuple are.
+:func:`changes` walks a scene by these declarations alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import wraps
+from logging import getLogger
+from math import sqrt
+from numbers import Real
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+import numpy as np
+import ufl
+
+from rodfem.errors import POINTWISE, SceneError
+from rodfem.forms.kinematics import UNDEFORMED
+from rodfem.forms.rotation import IDENTITY, rotation
+
+if TYPE_CHECKING:
+    from rodfem.problem.contribution import Load
+    from rodfem.problem.scene import Scene
+
+T = TypeVar("T")
+Vector = Sequence[Any]
+Place = SimpleNamespace
+Quaternion = tuple[float, float, float, float]
+Given: TypeAlias = Any
+"""A function of the constants ``c``, or a constant in the place of one; None if there is none."""
+SIDES, LETTERS = ("left", "right"), "ab"
+"""The two ends in words, and in names of unknowns."""
+LOG_OF_UFL = getLogger("UFL")
+UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
+MEANINGS = {
+    "v": "v[0], v[1], v[2] are the strains",
+    "k": "k[0], k[1], k[2] the curvatures and the twist",
+    "x": "x has what is known of a place, as x.r",
+    "c": "c has the scene's parameters, as c.P, and the arclength, c.s, numbers or expressions of UFL",
+    "r": "r[0], r[1], r[2] are the position",
+    "q": "q[0] to q[3] the rotation's quaternion",
+}
+"""What the arguments of the functions of a scene are."""
+
+
+class UnnamedError(SceneError):
+    """What a function of a scene does wrong; :func:`guarded` puts the subject before its words."""
+
+
+class NoCentreline(SceneError):
+    """A function of a place asked for the centreline where there is none."""
+
+
+# --- what a function is for
+
+
+@dataclass(frozen=True)
+class Role:
+    """Purpose of a function of a scene.
+
+    ``words`` have ``{}`` for where it is: ``force on the {} end``; ``call`` is ``f(c)`` of the constants, ``f(x, c)``
+    of a place, or another.  It returns ``size`` components, 0 for a scalar, None if that is checked elsewhere; one may
+    be None if there are ``gaps``.  Its place is the whole rod if it is ``along``; unless ``placed`` its constants lack
+    the arclength.  ``or_value`` lets a constant stay as it is, ``returns`` converts its value.
+    """
+
+    words: str
+    call: str
+    size: int | None = None
+    along: bool = False
+    or_value: bool = False
+    load: Load | None = None
+    hint: str = UFL
+    returns: Callable[[Any], Any] | None = None
+    gaps: bool = False
+    placed: bool = True
+
+    @property
+    def arguments(self) -> int:
+        """Number of its arguments."""
+        return self.call.count(",") + 1
+
+    @property
+    def meanings(self) -> str:
+        """What its arguments are, in words."""
+        letters = self.call.partition("(")[2].rstrip(")").split(", ")
+        return ", ".join(MEANINGS[letter] for letter in letters if letter in MEANINGS)
+
+
+def role_field(role: Role | Callable[[Any], Role], default: Any = None) -> Any:
+    """Field of a dataclass for a function of this role, or of the role that it has for the object; optional."""
+    return field(default=default, metadata={"role": role})
+
+
+def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
+    """Return ``function`` such that all it raises is a :class:`SceneError` that names it; or one for a constant."""
+    if hasattr(function, "guards"):
+        return function
+    if not callable(function):
+        constant = function
+        function = lambda c: constant  # noqa: E731
+
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True  # what it prints is in what it raises
+        try:
+            value = function(*arguments) if role.placed else function(*map(Placeless, arguments))
+            return in_floats(value) if role.returns is None else role.returns(value)
+        except UnnamedError as trouble:
+            raise SceneError(f"The {what} {trouble}") from None
+        except SceneError:
+            raise
+        except (Exception, SystemExit) as trouble:  # whatever a person's function may raise
+            first = str(trouble).split("\n", 1)[0].rstrip(".")
+            wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
+            hint = role.meanings if wrong and role.meanings else role.hint
+            raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {hint}.") from trouble
+        finally:
+            LOG_OF_UFL.disabled = silent
+
+    call.guards = what  # type: ignore[attr-defined]
+    return call
+
+
+def in_floats(value: Any) -> Any:
+    """Replace fractions and numbers of numpy, which UFL does not know, by floats, also in tuples, lists and arrays."""
+    if type(value) in (tuple, list):
+        floats = type(value)(map(in_floats, value))
+        return value if all(a is b for a, b in zip(floats, value, strict=True)) else floats
+    if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
+        return value.astype(float, copy=False)
+    return float(value) if isinstance(value, Real) and not isinstance(value, (int, float)) else value
+
+
+def derived(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
+    """Return what ``make()`` derives from an object that does not change, once, by its ``key``: it is kept with it.
+
+    Of a function of a scene it is what does not depend on constants, and serves all scenes that have the function.
+    """
+    known: dict[Hashable, T] = vars(owner).setdefault("derived", {})
+    if key not in known:
+        known[key] = make()
+    return known[key]
+
+
+def functions_of(owner: Any, *, nested: bool = True) -> list[tuple[str, Callable[..., Any], Role]]:
+    """All functions given in the fields of an object, and in what they hold if ``nested``: words, function, role."""
+    found: list[tuple[str, Callable[..., Any], Role]] = []
+
+    def note(what: str, function: Callable[..., Any], role: Role) -> Callable[..., Any]:
+        found.append((what, function, role))
+        return function
+
+    changes(owner, note, nested=nested)
+    return found
+
+
+def changes(
+    owner: Any, visit: Callable[[str, Any, Role], Any], place: str = "", *, nested: bool = True
+) -> dict[str, Any]:
+    """Fields of a dataclass with each function ``f``, and all in what they hold, replaced by ``visit(words, f, role)``.
+
+    ``place`` says in words where the dataclass is in the scene.  A field's own default is left out, and so is what is
+    replaced by itself; unless ``nested`` only the dataclass's own fields are visited.
+    """
+    new = {}
+    for f in fields(owner):
+        value = found = getattr(owner, f.name)
+        role = f.metadata.get("role")
+        if value is f.default:
+            continue
+        if role is not None:
+            role = role if isinstance(role, Role) else role(owner)
+            constant = role.or_value and not callable(value)
+            found = in_floats(value) if constant else visit(role.words.format(place), value, role)
+        elif nested and isinstance(value, (tuple, list)):
+            places = f.metadata.get("places") or ("",) * len(value)
+            parts = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))
+            found = parts if any(a is not b for a, b in zip(parts, value, strict=True)) else value
+        elif nested:
+            found = _changed(value, visit, place)
+        if found is not value:
+            new[f.name] = found
+    return new
+
+
+def _changed(owner: Any, visit: Callable[[str, Any, Role], Any], place: str) -> Any:
+    new = changes(owner, visit, place) if is_dataclass(owner) and not isinstance(owner, type) else {}
+    return replace(owner, **new) if new else owner
+
+
+# --- constants, and the state of the rod at a place
+
+
+FRACTIONS = tuple(sorted(i * (sqrt(5.0) - 1.0) / 2.0 % 1.0 for i in range(1, 8)))
+"""Parts of an interval, multiples of the golden section: a polynomial or a sine with zeros at simple fractions of the
+interval, or of a number near to it, has none there."""
+STATES = (
+    ((0.5, 0.1, 0.7, 0.5), (0.2, 0.3, 0.4), (0.01, 0.02, 1.01), (0.1, 0.2, 0.3)),
+    ((0.7, -0.1, 0.1, 0.7), (-0.2, 0.1, 0.9), (-0.02, 0.01, 0.97), (-0.3, 0.1, 0.2)),
+    (IDENTITY, (0.0, 0.0, 0.5), UNDEFORMED, (0.0, 0.0, 0.0)),
+)
+"""Quaternion, centreline, strain and curvature at which functions of a place are tried, lengths relative to the rod's;
+the last is undeformed."""
+
+
+def inside(interval: tuple[float, float]) -> list[float]:
+    """Return numbers inside an ``interval`` at which a function that is not zero there is seen not to be."""
+    low, high = interval
+    return [low + part * (high - low) for part in FRACTIONS]
+
+
+class Constants(SimpleNamespace):
+    """The named constants of a scene and the arclength ``s``; an unknown name is a :class:`SceneError`."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Name what is missing, and what there is."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        known = [*(f"c.{x}" for x in sorted(vars(self)) if x != "s"), "c.s (the arclength)"]
+        raise UnnamedError(
+            f"asks for a constant {name!r}: add it to the parameters, or choose one of {', '.join(known)}."
+        )
+
+
+OfConstants = Callable[[Constants], Vector]
+OfPlace = Callable[[Place, Constants], Any]
+
+
+class Placeless:
+    """Constants without the arclength: a function of ``c.s`` at an end would be one along the rod under an integral."""
+
+    def __init__(self, c: Any) -> None:
+        """Be the constants ``c`` otherwise."""
+        self._constants = c
+
+    def __getattr__(self, name: str) -> Any:
+        """Constant of a ``name``; raises :class:`UnnamedError` for the arclength."""
+        if name == "s":
+            raise UnnamedError("asks for the arclength c.s, but does not vary along the rod: write the number.")
+        return getattr(self._constants, name)
+
+
+def watched(c: Constants) -> tuple[Constants, set[str]]:
+    """Return the same constants, and the set of names that they will have been asked for."""
+    asked: set[str] = set()
+
+    class Watched(Constants):
+        def __getattribute__(self, name: str) -> Any:
+            asked.add(name)
+            return super().__getattribute__(name)
+
+    return Watched(**vars(c)), asked
+
+
+class Known(SimpleNamespace):
+    """A place; an attribute that it does not have is a :class:`SceneError`."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Say what a place has; raises :class:`NoCentreline` for the centreline of the reduced formulation."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        if name in ("r", "dr") and "r" not in vars(self):
+            raise NoCentreline("The reduced formulation has no centreline here", POINTWISE)
+        raise UnnamedError(
+            f"asks for {name!r} of a place: it has r, q, R, d1, d2, d3, s and length, and where it is the "
+            "whole rod dr, v and k."
+        )
+
+
+def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
+    """Make a place of quaternion ``q``, rotation ``R``, arclength ``s``, centreline ``r`` (None: none) and ``more``."""
+    d = {f"d{i + 1}": ufl.as_vector([R[j, i] for j in range(3)]) for i in range(3)}
+    return Known(q=q, R=R, s=s, **d, **({} if r is None else {"r": r}), **more)
+
+
+def some_places(
+    scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x, s: float | None = None
+) -> tuple[Place, Place]:
+    """Return a point and a place along the rod in the ``state`` of :data:`STATES`, whose vectors pass through ``wrap``.
+
+    The arclength ``s`` is by default one inside the rod: at an end a factor may vanish, or a logarithm have its pole.
+    """
+    return places_at(scene.length, inside(scene.interval)[0] if s is None else s, STATES[state], wrap)
+
+
+def places_at(
+    length: float, s: float, state: Sequence[Any], wrap: Callable[[Any], Any] = lambda x: x
+) -> tuple[Place, Place]:
+    """Return a point and a place along the rod of a ``length``, in a ``state`` given as :data:`STATES` are."""
+    units = (1.0, length, 1.0, 1.0 / length)
+    numbers = ([float(unit * x) for x in values] for unit, values in zip(units, state, strict=True))
+    q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
+    R = rotation(q)
+    return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+
+
+# --- what the functions of a scene depend on
+
+
+def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
+    """Functions of a place in the equations, each with a place of the kind that it will be given, without numbers."""
+    point, rod = some_places(scene, wrap=ufl.variable)
+    for what, function, role in functions_of(scene):
+        if role.call == "f(x, c)":
+            yield what, function, rod if role.along else point
+
+
+def asked_for(scene: Scene, c: Constants | None = None) -> set[str]:
+    """Names of the constants ``c``, by default the scene's own, that the equations of a scene ask for."""
+    c, asked = watched(c or scene.constants())
+    for _, function, role in functions_of(scene):
+        if role.call == "f(c)":
+            function(c)
+    for _, function, known in functions_of_places(scene):
+        function(known, c)
+    scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0]), c)
+    return asked
+
+
+def asks_where(function: OfPlace | None, c: Constants) -> bool:
+    """Whether there is a function of a place, and it depends on where the rod is."""
+    q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
+    strains = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": 1.0}
+    try:
+        if function is not None:
+            function(place(q, rotation(q), c.s, **strains), c)
+    except NoCentreline:
+        return True
+    return False
+
+
+def floats(scene: Scene) -> bool:
+    """Whether nothing holds the rod where it is: no end, no spring, no constraint."""
+    c = scene.constants()
+    if scene.closed or any(len(end.fixed(c)) for end in scene.sides):
+        return False
+    return not any(asks_where(function, c) for _, function, _ in functions_of_places(scene))
+
+
+def needs_centreline(scene: Scene) -> str:
+    """Say what in a scene needs the centreline as a field, in words; empty where nothing does."""
+    return next((what for what, needs in _needs(scene) if needs), "")
+
+
+def _needs(scene: Scene) -> Iterator[tuple[str, bool]]:
+    c, ordinate = scene.constants(), scene.ordinate
+    attached = [x for x in scene.attachments if scene.is_inside(x.s)]
+    yield "the mass of a rod under a load without potential", not scene.conservative
+    yield "a distributed force", scene.distributed is not None
+    yield "what is attached along the rod", any(x.force or x.mass for x in attached)
+    yield "the mass of the rod", scene.inertia.rho_A(c) != 0
+    floating = floats(scene) and not all(scene.plain)
+    yield "a rod that nothing holds, with more than dead forces at its ends,", floating
+    yield "the potential along the rod", asks_where(scene.potential, c)
+    yield "the ordinate", not ordinate.places and asks_where(ordinate.of, c)
+    yield "what is attached along the rod", any(asks_where(x.energy, c) for x in attached)
+    of_points = [x for x in scene.constraints if x.s is None or scene.is_inside(x.s)]
+    yield "a constraint", any(asks_where(x.of, c) for x in of_points)
