@@ -26,7 +26,7 @@ from petsc4py import PETSc
 import rodfem.fem.system
 from benchmarks.common import ROOT, exponent, machine, measured, milliseconds, table, versions
 from benchmarks.store import Store
-from rodfem.continuation.regular_point import RegularPoints
+from rodfem.continuation.branch_solver import RegularPoints
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.kumar_healey.coordinates import Coordinates

@@ -343,7 +343,7 @@ FAULTS = {
         "tests/diagram/test_shorter_steps.py",
     ),
     "bars-of-a-double-point-hold-for-one-load": Fault(
-        f"{CONTINUATION}index_chain.py",
+        f"{CONTINUATION}branch.py",
         "max(q.error_estimate, apart + p.error_estimate)",
         "q.error_estimate",
         "tests/continuation/test_index_chain.py",
@@ -769,16 +769,16 @@ FAULTS = {
         f"{CONTINUATION}flutter.py", "np.argmin(abs(real))", "np.argmax(abs(real))", LOCATE
     ),
     "unresolved-points-are-merged-with-others": Fault(
-        f"{CONTINUATION}index_chain.py",
+        f"{CONTINUATION}branch.py",
         "s.resolved is not False for s in (p, q))",
         "True for s in (p, q))",
         CHAIN,
     ),
     "two-passages-of-one-load-are-merged": Fault(
-        f"{CONTINUATION}index_chain.py", "for row in between)\n", "for row in ())\n", CHAIN
+        f"{CONTINUATION}branch.py", "for row in between)\n", "for row in ())\n", CHAIN
     ),
     "breaks-are-not-recorded": Fault(
-        f"{CONTINUATION}index_chain.py",
+        f"{CONTINUATION}branch.py",
         "if left[1] < right[0] or right[1] < left[0]:",
         "if left[1] < right[0] and right[1] < left[0]:",
         CHAIN,

@@ -10,8 +10,7 @@ from typing import Protocol
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import ROWS, cubic_weights, lagrange
+from rodfem.continuation.branch_solver import ROWS, BranchSolver, cubic_weights, lagrange
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.state import Line, line
 from rodfem.fem.system import System

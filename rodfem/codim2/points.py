@@ -25,8 +25,8 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 
 from rodfem.codim2.plane import REACH, Criterion, LocusPoint, Plane, Prediction, Sought, between
+from rodfem.continuation.branch_solver import lagrange
 from rodfem.continuation.kinds import GAP
-from rodfem.continuation.prediction import lagrange
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine
 from rodfem.output.words import number

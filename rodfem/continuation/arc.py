@@ -16,10 +16,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.branch_solver import ALIGNED, BranchSolver, between, cubic
+from rodfem.continuation.branch_solver import Knot as Row
 from rodfem.continuation.crossings import Node, places
-from rodfem.continuation.prediction import ALIGNED, between, cubic
-from rodfem.continuation.prediction import Knot as Row
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import correct, linear_step
@@ -110,7 +109,7 @@ class Arc:
 
         low, high = sorted(known)
         margin = INSIDE * (high - low)  # never onto an end: a branch point is a state of the other branch, too
-        return min(max(zero_between(beyond, first, last, 1e-15), low + margin), high - margin)
+        return min(max(zero_between(beyond, first, last, 1e-15), low + margin), high - margin)  # exactly
 
     def lost_convexity(self) -> str:
         """Why a branch ends on the arc; empty where the stored energy stays convex."""

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.kinds import EVENT, Kind
+from rodfem.continuation.kinds import BRANCH_POINT, EVENT, Kind
 from rodfem.errors import SMALLER_STEPS, InputError, many
 from rodfem.libraries import optional
 from rodfem.problem.arguments import SHORT
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, SoftMode, index_range, is_stable, stability
-from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch_solver import BranchSolver
@@ -32,83 +33,38 @@ FIRST_BRANCH = "first branch"
 class Point:
     """One equilibrium, a row of a branch.  Numbers are nondimensional, or in the units of the scene.
 
-    Attributes
-    ----------
-    x, tangent
-        State vector, and unit tangent of the branch in the metric; None where no branch is followed.
-    arclength
-        Length of the branch from its start, in the metric.
-    load, ordinate
-        The two numbers of the diagram.
-    energy
-        Stored energy ``int W ds`` alone, without the potential of the loads: of two equilibria at one load the one with
-        less of it need not be the one with less total energy.
-    potential, conjugate
-        Total potential energy ``V`` of rod, loads, springs and foundations, and ``-dV/dload``, what the load does work
-        on: :class:`~rodfem.fem.state.Energies`.  nan where a load has no potential.
-    stretch
-        Smallest stretch ``v3`` along the rod.
-    negative, zero
-        Numbers of negative eigenvalues (the index) and of zero ones.
-    undecided
-        Number of eigenvalues whose sign is not decided: they are not among the negative ones, and the index is between
-        ``negative`` and ``negative + undecided``.  Symmetries, and what vanishes at a special point, are decided.
-    kink
-        What has a kink at the very state, the equations: there ``negative`` is the index on one side only, and
-        stability is undecided.  Empty where nothing has.
-    uncompared
-        Why the index was not compared with that of a richer mesh, if it was to be: that has no such state.  Stability
-        is undecided there.
-    slope
-        The load's component of the tangent.
-    drift, error
-        Largest drift scalar, zero but for round-off, and the last correction of Newton's method.
-    spectrum
-        Left-most eigenvalues, where they were asked for.
-    omega2, motion, curve
-        Of frequencies: eigenvalues (real and imaginary part), types of motion, numbers of their curves against the
-        load.
-    negative_in_space
-        Index in space of a planar rod; None: not computed.
-    mesh, solver, branch
-        Number of the discretisation that ``x`` belongs to, its solver, and the name of the branch.
-    estimate
-        Error of the discretisation in load and ordinate, where an accuracy was asked for.
-    soft
-        Eigenvalues near zero, by name: :class:`~rodfem.stability.soft_mode.SoftMode`.
-    nearest
-        Estimated distance of the nearest eigenvalue from zero, symmetry modes left out; 0 where one factorisation does
-        not tell the index: an eigenvalue may be soft.
+    It also has ``s``, ``r``, ``directors``, ``strain``, ``curvature``, ``force``, ``moment``: arrays along the rod; and
+    the ``reactions`` of its supports.
     """
 
-    x: PETSc.Vec
-    tangent: PETSc.Vec | None
-    arclength: float
-    load: float
-    ordinate: float
-    energy: float
-    stretch: float
-    negative: int
-    zero: int
-    slope: float
-    drift: float
-    error: float
-    spectrum: list[float] = field(default_factory=list)
-    omega2: list[list[float]] = field(default_factory=list)
-    motion: list[str] = field(default_factory=list)
-    curve: list[int] = field(default_factory=list)
-    negative_in_space: int | None = None
-    mesh: int = 0
-    estimate: float = float("nan")
-    undecided: int = 0
-    soft: list[SoftMode] = field(default_factory=list)
-    nearest: float = 0.0
-    potential: float = float("nan")
-    conjugate: float = float("nan")
-    kink: str = ""
-    uncompared: str = ""
-    solver: BranchSolver | None = field(default=None, compare=False)
-    branch: str = field(default="", compare=False)
+    x: PETSc.Vec  #: state vector
+    tangent: PETSc.Vec | None  #: unit tangent of the branch in the metric; None where no branch is followed
+    arclength: float  #: length of the branch from its start, in the metric
+    load: float  #: the one number of the diagram
+    ordinate: float  #: the other one
+    energy: float  #: ``int W ds`` alone: less of it need not be less total energy
+    stretch: float  #: smallest ``v3`` along the rod
+    negative: int  #: number of negative eigenvalues
+    zero: int  #: number of zero ones
+    slope: float  #: the load's component of the tangent
+    drift: float  #: largest drift scalar, zero but for round-off
+    error: float  #: last correction of Newton's method
+    spectrum: list[float] = field(default_factory=list)  #: left-most eigenvalues, where they were asked for
+    omega2: list[list[float]] = field(default_factory=list)  #: squares of frequencies, real and imaginary part
+    motion: list[str] = field(default_factory=list)  #: their types of motion
+    curve: list[int] = field(default_factory=list)  #: numbers of their curves against the load
+    negative_in_space: int | None = None  #: index in space of a planar rod; None: not computed
+    mesh: int = 0  #: number of the discretisation that ``x`` belongs to
+    estimate: float = float("nan")  #: error of the mesh in load and ordinate, where an accuracy was asked for
+    undecided: int = 0  #: eigenvalues of either sign, which are not among the negative ones
+    soft: list[SoftMode] = field(default_factory=list)  #: eigenvalues near zero, by name
+    nearest: float = 0.0  #: estimate of the least eigenvalue but for symmetries; 0: one factorisation does not tell
+    potential: float = float("nan")  #: total energy ``V`` of rod, loads, springs and foundations, if there is one
+    conjugate: float = float("nan")  #: ``-dV/dload``, what the load does work on
+    kink: str = ""  #: what has a kink at the very state: ``negative`` is the index on one side of it
+    uncompared: str = ""  #: why the index was not compared with that of a richer mesh: that has no such state
+    solver: BranchSolver | None = field(default=None, compare=False)  #: of the mesh
+    branch: str = field(default="", compare=False)  #: name of the branch
 
     @property
     def index(self) -> int:
@@ -120,15 +76,12 @@ class Point:
         """Whether no eigenvalue is negative, of a planar rod in space, too, where :attr:`negative_in_space` is known.
 
         None where :attr:`undecided` ones may be, and no other is, on a kink, and if a richer mesh has no such state.
-        Zero ones, which :attr:`zero` counts, are those of symmetries, or leave it undecided beyond that.
         """
         return is_stable(self._stability)
 
     @property
     def _stability(self) -> str:
         return stability(self.negative, self.undecided, self.kink or self.uncompared, self.negative_in_space)
-
-    # --- along the rod ---------------------------------------------------------------------------------------------
 
     def profile(self, s: Sequence[float] | np.ndarray | None = None) -> Profile:
         """Shape, strains, contact force and moment at arclengths ``s`` (m,), by default at the nodes; collective.
@@ -232,13 +185,12 @@ LAWS = (PITCHFORK, f"supercritical {PITCHFORK}", f"subcritical {PITCHFORK}", TRA
 
 @dataclass(repr=False)
 class NormalForm:
-    """``load = load_b + coefficient x^power + ...`` at a bifurcation of a ``kind``; the coefficient's ``uncertainty``.
+    """``load = load_b + coefficient x^power + ...`` on the branch that leaves a bifurcation of a ``kind``.
 
-    ``side`` is the sign of the load's change on the bifurcating branch, zero where there is none or none is known, and
-    ``x`` the change ``of`` the ordinate.  Where the ordinate does not change to leading order it is the distance from
-    the branch point, in the metric.  Of ``x = o1 a + o2 a^2`` in the distance a the first term gives the law.  Where it
-    leads only as long as the ordinate does not change visibly the second one does, and the uncertainty has what the
-    first adds to it where the branch was solved.
+    ``x`` is the change ``of`` the ordinate, or the distance from the branch point, in the metric, where that does not
+    change to leading order; ``side`` is the sign of the load's change, zero where there is none or none is known.  Of
+    ``x = o1 a + o2 a^2`` in the distance the first term gives the law.  Where it leads only as long as the ordinate
+    does not change visibly the second one does, and the ``uncertainty`` has what the first adds.
     """
 
     kind: str
@@ -253,10 +205,7 @@ class NormalForm:
         return self.uncertainty <= part * abs(self.coefficient)
 
     def classify(self, index_below: int, index_above: int) -> None:
-        """Name a pitchfork by the index of the branch that it leaves at loads just below and just above.
-
-        One whose side is not determined keeps its name.
-        """
+        """Name a pitchfork of a known side by the index of the trunk at loads just below and just above."""
         if self.kind == PITCHFORK and self.side:
             there, here = (index_above, index_below) if self.side > 0 else (index_below, index_above)
             self.kind = LAWS[1] if there > here else LAWS[2]
@@ -269,75 +218,30 @@ class NormalForm:
 
 @dataclass(repr=False)
 class SpecialPoint:
-    """A special point: kind, precision of its location, null vectors, and the index on either side.
+    """A special point: kind, precision of its location, null vectors, and the index on either side."""
 
-    Attributes
-    ----------
-    kind, point, row
-        One of :mod:`rodfem.continuation.kinds`, the equilibrium, and the number of its row in the branch.
-    negative_before, negative_after
-        Index on either side, in order of arclength.
-    located_to
-        Uncertainty of the load for the given mesh.
-    null_vectors, nearby
-        Vectors of metric norm 1, one for each eigenvalue that vanishes; and those of others that are nearly zero there.
-    coupling
-        Cosine between the null vector and the derivative of the equations in the load: zero at a branch point, not at a
-        fold.
-    error_estimate, ordinate_error
-        Bound of the error, that of the discretisation included: of the load for folds and branch points, of the
-        ordinate at user points and ends; and that of the ordinate for all (see
-        :mod:`rodfem.adaptivity.error_estimate`).
-    resolved
-        Whether the mesh resolves the state; else errors may well exceed their bounds.  None: not examined.
-    connects_to
-        Branch, and number of its special point, that this branch meets here.
-    switched
-        Whether the branches that leave here have been sought.
-    test_function
-        The test function whose zero was located: the eigenvalue ``mu``, the ``slope`` of the load, the least
-        ``stretch``.
-    note
-        Remark in words.
-    law
-        Normal form of the branch that leaves here.
-    omega2, omega2_error, cluster
-        Double eigenvalue of flutter, the bound of its error, and the :class:`~rodfem.stability.cluster.Cluster` of the
-        eigenvalues that collide.
-    unfolding
-        Size of the unfolding parameters that make it a branch point, relative to the metric as eigenvalues are
-        (:mod:`rodfem.continuation.unfolding`): round-off, unless an imperfection has taken it apart.
-    event
-        The event that happens here, of those that the plan asks for.
-    """
-
-    kind: Kind
-    point: Point
-    negative_before: int
-    negative_after: int
-    located_to: float
-    null_vectors: list[PETSc.Vec] = field(default_factory=list)
-    nearby: list[PETSc.Vec] = field(default_factory=list)
-    coupling: float = 0.0
-    error_estimate: float = float("nan")
-    ordinate_error: float = float("nan")
-    resolved: bool | None = None
-    connects_to: tuple[str, int] | None = None
-    switched: bool = False
-    row: int = -1
-    test_function: str = "mu"
-    note: str = ""
-    law: NormalForm | None = None
-    omega2: float = float("nan")
-    omega2_error: float = float("nan")
-    unfolding: float = float("nan")
-    cluster: Cluster | None = None
-    event: Event | None = None
-
-    @classmethod
-    def given(cls, kind: Kind, point: Point, one: float) -> SpecialPoint:
-        """One at a load that is given, of a natural size ``one``: nothing changes there."""
-        return cls(kind, point, point.negative, point.negative, round_off(point.load, one))
+    kind: Kind  #: one of :mod:`rodfem.continuation.kinds`
+    point: Point  #: the equilibrium
+    negative_before: int  #: index on either side, in order of arclength
+    negative_after: int  #: the same
+    located_to: float  #: uncertainty of the load for the given mesh
+    null_vectors: list[PETSc.Vec] = field(default_factory=list)  #: of metric norm 1, for each eigenvalue that vanishes
+    nearby: list[PETSc.Vec] = field(default_factory=list)  #: of eigenvalues that are nearly zero there
+    coupling: float = 0.0  #: cosine between null vector and derivative in the load: zero at a branch point, not a fold
+    error_estimate: float = float("nan")  #: bound of the error in the load, the mesh included; ordinate if it is given
+    ordinate_error: float = float("nan")  #: bound of the error in the ordinate
+    resolved: bool | None = None  #: whether the mesh resolves the state, so that the bounds hold; None: not examined
+    connects_to: tuple[str, int] | None = None  #: branch, and number of its special point, that this one meets here
+    switched: bool = False  #: whether the branches that leave here have been sought
+    row: int = -1  #: number of its row in the branch
+    test_function: str = "mu"  #: what vanishes: the eigenvalue ``mu``, the ``slope`` of the load, the ``stretch``
+    note: str = ""  #: remark in words
+    law: NormalForm | None = None  #: normal form of the branch that leaves here
+    omega2: float = float("nan")  #: double eigenvalue of flutter
+    omega2_error: float = float("nan")  #: bound of its error
+    unfolding: float = float("nan")  #: size of the unfolding parameters: round-off, unless there is an imperfection
+    cluster: Cluster | None = None  #: the eigenvalues that collide
+    event: Event | None = None  #: the event that happens here, of those that the plan asks for
 
     def __repr__(self) -> str:
         """Kind, load and change of the index."""
@@ -364,10 +268,7 @@ class SpecialPoint:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Neighbouring rows ``a``, ``b``: the index changes from ``before`` to ``after`` without a special point.
-
-    The ``remedy`` is what to try.
-    """
+    """Neighbouring rows ``a``, ``b``: the index changes from ``before`` to ``after`` without a special point."""
 
     a: Point
     b: Point
@@ -384,63 +285,40 @@ class Unexplained:
 
 
 COLUMNS = (
-    "arclength",
-    "load",
-    "ordinate",
-    "energy",
-    "potential",
-    "conjugate",
-    "stretch",
-    "negative",
-    "zero",
-    "undecided",
-    "negative_in_space",
-    "stable",
-    "slope",
-)
+    "arclength", "load", "ordinate", "energy", "potential", "conjugate", "stretch",
+    "negative", "zero", "undecided", "negative_in_space", "stable", "slope",
+)  # fmt: skip
 """Attributes of a point of which a branch has a column."""
 
 
 @dataclass(repr=False)
 class Branch:
-    """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
+    """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended."""
 
-    ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk determine it.
-    ``singular_start`` is the number of eigenvalues that vanish at the first state of a range and not all along the
-    branch: a branch point there, if it is one, is not located.  ``name`` is unique in the diagram; ``parent`` is the
-    branch and the number of its special point that this one left, and ``depth`` the number of such switches.
-    ``points`` and ``special`` are in order of arclength, ``ended`` says why no more follow, and ``unexplained`` lists
-    changes of index without a special point.  ``image`` names the symmetry of the scene that carries the branch to one
-    with the opposite ordinate, which is not traced; it is empty where there is none.
-    """
-
-    name: str
-    parent: tuple[str, int] | None
-    depth: int
-    points: list[Point] = field(default_factory=list)
-    special: list[SpecialPoint] = field(default_factory=list)
-    ended: str = NOT_TRACED
-    unexplained: list[Unexplained] = field(default_factory=list)
-    begins: int | None = None
-    singular_start: int = 0
-    image: str = ""
+    name: str  #: unique in the diagram
+    parent: tuple[str, int] | None  #: branch, and number of its special point, that this one left
+    depth: int  #: number of such switches
+    points: list[Point] = field(default_factory=list)  #: in order of arclength
+    special: list[SpecialPoint] = field(default_factory=list)  #: in order of arclength
+    ended: str = NOT_TRACED  #: why no more points follow
+    unexplained: list[Unexplained] = field(default_factory=list)  #: changes of the index without a special point
+    begins: int | None = None  #: index right after the branch point that it leaves, where that of the trunk says it
+    singular_start: int = 0  #: eigenvalues that vanish at its first state and not all along: no point is located there
+    image: str = ""  #: symmetry that carries it to a branch of opposite ordinate, which is not traced
 
     def __repr__(self) -> str:
         """Name, size and end."""
         return f"<Branch {self.name!r}: {len(self.points)} points, {len(self.special)} special, ended: {self.ended}>"
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Column of an attribute of its points, a number or a yes or no for each: ``branch["load"]``, (P,).
-
-        What is not computed is nan.  Raises :class:`KeyError` for what points do not have.
-        """
+        """Column (P,) of an attribute of its points, nan where it is not known; raises :class:`KeyError`."""
         values = [getattr(p, name, KeyError) for p in self.points]
         if KeyError in values or not all(x is None or isinstance(x, int | float) for x in values):
             raise KeyError(f"points have no number {name!r}: there are {', '.join(COLUMNS)}")
         return np.array([np.nan if x is None else x for x in values])
 
     def to_dataframe(self) -> Any:
-        """All numbers of its rows as a ``pandas.DataFrame``; raises :class:`~rodfem.errors.SetupError` without it."""
+        """All numbers of its rows as a ``pandas.DataFrame``."""
         return optional("pandas", "tables").DataFrame({name: self[name] for name in COLUMNS})
 
     def start_in_words(self, load: str) -> str:
@@ -487,6 +365,10 @@ class Branch:
         for special in self.special:
             special.point = others.get(id(special.point), special.point)
 
+    def explain(self) -> None:
+        """Keep what is not explained of the changes of the index along the whole branch, which must be in order."""
+        self.unexplained = breaks(self.points, self.special, self.begins)
+
     def renumber(self) -> None:
         """Sort points and special points along the branch, set their rows, and name the branch of the points."""
         self.points.sort(key=lambda p: p.arclength)
@@ -496,6 +378,75 @@ class Branch:
         self.special.sort(key=lambda s: s.point.arclength)
         for special in self.special:
             special.row = row[id(special.point)]
+
+
+def breaks(points: Sequence[Point], specials: Sequence[SpecialPoint], begins: int | None = None) -> list[Unexplained]:
+    """Neighbours among rows in order of arclength, some of them special points, whose indices do not agree.
+
+    Each special point has its own index before and after.  A row allows an interval: eigenvalues that are zero within
+    the tolerance of the count may be of either sign.  If the intervals of two neighbours are disjoint an eigenvalue has
+    crossed zero unseen, or a number is wrong.  ``begins`` is the index right after the first row, where it is known
+    although it is none of these special points.
+    """
+    at = {id(s.point): s for s in specials if s.kind.singular}
+    persistent = persistent_zeros(points)
+    found = []
+    for a, b in pairwise(points):
+        left, right = _interval(a, at, persistent, after=True), _interval(b, at, persistent, after=False)
+        if a is points[0] and begins is not None:
+            left = begins, begins
+        if left[1] < right[0] or right[1] < left[0]:
+            found.append(Unexplained(a, b, left[0], right[0]))
+    return found
+
+
+def persistent_zeros(points: Sequence[Point]) -> int:
+    """Number of eigenvalues that are zero at every row: of symmetries, or of families of equilibria at one load."""
+    return min((p.zero for p in points), default=0)
+
+
+def _interval(point: Point, at: dict[int, SpecialPoint], persistent: int, after: bool) -> tuple[int, int]:
+    """Least and greatest index right before or after a row."""
+    if (special := at.get(id(point))) is not None:
+        index = special.negative_after if after else special.negative_before
+        return index, index
+    return point.negative, point.negative + max(point.zero - persistent, point.undecided)
+
+
+def merge_doubles(branch: Branch) -> None:
+    """Merge neighbouring branch points that are closer than the error of the discretisation.
+
+    A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
+    The rod itself may have them apart, so that the bars of the one point are to hold for each of them.
+    """
+    bars = {id(s): s.error_estimate for s in branch.special}
+    for p, q in list(pairwise(branch.special)):
+        if not _double(branch, p, q, bars[id(p)] + bars[id(q)]):
+            continue
+        apart, ordinates = abs(p.point.load - q.point.load), abs(p.point.ordinate - q.point.ordinate)
+        q.error_estimate = max(q.error_estimate, apart + p.error_estimate)
+        q.ordinate_error = max(q.ordinate_error, ordinates + p.ordinate_error)
+        q.null_vectors = p.null_vectors + q.null_vectors
+        q.negative_before = p.negative_before
+        q.point.zero += p.multiplicity
+        if p.negative_after > p.negative_before:  # those of p are negative at q, and count as zero now
+            q.point.negative -= p.multiplicity
+        q.note = f"{q.multiplicity} eigenvalues that this mesh does not tell apart vanish within {apart:.0e}"
+        branch.special.remove(p)
+        branch.points = [point for point in branch.points if point is not p.point]
+        branch.renumber()
+
+
+def _double(branch: Branch, p: SpecialPoint, q: SpecialPoint, bar: float) -> bool:
+    """Whether two neighbouring branch points are one within their ``bar``, as all rows between them are.
+
+    The bar of a point that the mesh does not resolve says nothing of its neighbour, and a branch that comes back to the
+    load at which it was passes two points there.
+    """
+    points = all(s.kind == BRANCH_POINT and s.test_function == "mu" and s.resolved is not False for s in (p, q))
+    between = [x for x in branch.points if p.point.arclength <= x.arclength < q.point.arclength]
+    same = p.point.mesh == q.point.mesh and bar < inf
+    return points and same and all(abs(row.load - q.point.load) <= bar for row in between)
 
 
 def not_followed(branches: Sequence[Branch]) -> int:

@@ -1,4 +1,19 @@
-"""Equilibria at given loads and along branches: steps, tangents, and the index and records of each state."""
+"""Equilibria at given loads and along branches: predictions, steps, tangents, and the index and records of each state.
+
+*Predictions* are polynomials through the last rows of a branch, or between two rows with their tangents.  Of a scene
+with symmetries the rows are states of some orbits.  Where they are on these is arbitrary: a prediction stays where the
+last row is.
+
+*Tangent and index of a regular point* are those of one symmetric factorisation at that state.  At fixed load the saddle
+matrix ``S`` of a conservative rod is symmetric.  With ``F_lam``, the derivative of the equations in the load,
+``z = (-S^-1 F_lam, 1)`` is a tangent of the branch, and the inertia of the factors is the index
+(:mod:`rodfem.stability.inertia`).  ``S`` is singular at a fold, and a count says nothing about eigenvalues within its
+tolerance: both show in the same solves.  A block of vectors ``v`` is carried along the branch and iterated inversely,
+once a point; the least ``|v| / |S^-1 M v|`` is an upper bound of the distance of the nearest eigenvalue from zero, and
+an estimate as good as the block is rich in its vector: 1e-3 of a generic vector is added every time, and a vector whose
+eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  If that is too near zero, the tangent is by LU
+factors of the bordered matrix, and two shifts count.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
+from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -13,8 +29,6 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import Kind
 from rodfem.continuation.natural_shape import natural_shape, sampled, uniform_turn
-from rodfem.continuation.prediction import across_orbit, predict
-from rodfem.continuation.regular_point import RegularPoints
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
@@ -23,41 +37,203 @@ from rodfem.fem.shape import Shape
 from rodfem.fem.state import LOAD, Energies, NodalValues
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
-from rodfem.linalg.factorization import Factors
+from rodfem.linalg.orthogonal import combine
 from rodfem.problem.units import Units
 from rodfem.stability.in_space import InSpace
-from rodfem.stability.inertia import Index, Inertia
+from rodfem.stability.inertia import FRESH, Factored, Index, Inertia
 from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.symmetric import SymmetricSolver
+from rodfem.tolerances import TINY, round_off
 
 VERTICAL = 1e-8
 """Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""
+ALIGNED = 0.9
+"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
+ROWS = 4
+"""Rows of a branch that a prediction extrapolates, at most."""
+BLOCK = 2
+"""Number of vectors that are iterated along a branch."""
+NEAR = 1e-3
+"""Distance of an eigenvalue from zero, over the lowest bending eigenvalue, below which the two shifts count."""
+
+
+class Knot(Protocol):
+    """A state of a curve."""
+
+    @property
+    def arclength(self) -> float:
+        """Its place."""
+
+    @property
+    def x(self) -> PETSc.Vec:
+        """The state."""
+
+    @property
+    def tangent(self) -> PETSc.Vec | None:
+        """The derivative of the curve, where it is known."""
+
+
+def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
+    known = [float(x) for x in nodes]
+    value, slope = np.empty(len(known)), np.empty(len(known))
+    for j, node in enumerate(known):
+        p, dp, scale = 1.0, 0.0, 1.0
+        for i, other in enumerate(known):
+            if i != j:
+                dp = dp * (s - other) + p
+                p *= s - other
+                scale *= node - other
+        value[j], slope[j] = p / scale, dp / scale
+    return value, slope
+
+
+def predict(points: Sequence[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """State and direction at arclength ``s``, extrapolated from up to four points, or the last one and its tangent."""
+    last, recent = points[-1], points[-ROWS:]
+    if len(points) < 3:
+        assert last.tangent is not None
+        return combine([last.x, last.tangent], np.array([1.0, s - last.arclength])), last.tangent.copy()
+    value, slope = lagrange(np.array([p.arclength for p in recent]), s)
+    return combine([p.x for p in recent], value), combine([p.x for p in recent], slope)
+
+
+def predict_at_load(system: System, points: Sequence[Point], load: float) -> PETSc.Vec:
+    """Extrapolate equilibria at loads, the last of some ``points``, to another ``load``.
+
+    Of a scene with symmetries it is the line through two: a polynomial of higher degree would magnify, from load to
+    load, where these are on their orbits.
+    """
+    recent = points[-2 if system.drifts else -ROWS :]
+    return combine([p.x for p in recent], lagrange(np.array([p.load for p in recent]), load)[0])
+
+
+def cubic(ends: list[PETSc.Vec], h: float, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Cubic of length ``h`` at ``s``, and its derivative, by the ``ends``: value and derivative of each."""
+    value, slope = cubic_weights(h, s)
+    return combine(ends, value), combine(ends, slope)
+
+
+def cubic_weights(h: float, s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (4,) of values and slopes at both ends in their cubic of length ``h`` at ``s``, and in its derivative."""
+    t = s / h
+    value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
+    return value, np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
+
+
+def between(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """State and direction at ``s`` on the polynomial of least degree through two states and what tangents they have."""
+    h = b.arclength - a.arclength
+    if a.tangent is not None and b.tangent is not None:
+        return cubic([a.x, a.tangent, b.x, b.tangent], h, s - a.arclength)
+    way = (b.x - a.x) * (1.0 / h)
+    for end, sign in ((a, 1.0), (b, -1.0)):
+        if end.tangent is not None:
+            d, bend = s - end.arclength, (way - end.tangent) * (sign / h)
+            return combine([end.x, end.tangent, bend], np.array([1.0, d, d * d])), end.tangent + bend * (2 * d)
+    return a.x + way * (s - a.arclength), way
+
+
+def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc.Vec) -> None:
+    """Take from a prediction ``x`` and its ``direction``, in place, what moves the ``last`` state along its symmetries.
+
+    The phase conditions of a row are those of its prediction, and leave such a part as it is; an extrapolation of rows
+    that have one hands it on, from row to row a little more, until it is most of a step.  The motions ``g`` of the
+    ``system`` are orthonormal in the metric: ``direction - g (Mg . direction)`` is what remains of the direction.
+    """
+    system.set_phase(last)
+    phase, generators = system.phase, system.at(last).generators
+    for i, weights in phase.broken.items():
+        motion, condition = system.generators.vector(weights @ generators), phase.conditions[i]
+        assert condition is not None
+        x.axpy(phase.offsets[i] - condition.dot(x), motion)
+        direction.axpy(-condition.dot(direction), motion)
+
+
+@dataclass(frozen=True)
+class RegularPoint:
+    """A state whose factors serve: no eigenvalue is near zero."""
+
+    index: Index | None  # by the count of the factors; None where an eigenvalue is too near zero for one count
+    nearest: float  # estimated distance of the eigenvalue nearest zero from zero
+    tangent: PETSc.Vec  # unit tangent, on the side of increasing load
+
+    def along(self, row: PETSc.Vec) -> PETSc.Vec:
+        """Unit tangent on the side to which ``row`` points."""
+        return self.tangent * -1.0 if row.dot(self.tangent) < 0 else self.tangent
+
+
+class RegularPoints:
+    """Regular points among the states of one :class:`~rodfem.stability.inertia.Inertia`."""
+
+    def __init__(self, inertia: Inertia) -> None:
+        self.inertia, self.system = inertia, inertia.system
+        self._fresh = np.stack([inertia.seed(i).array_r.real for i in range(BLOCK)], axis=1)
+        self._fresh_images = inertia.weighed(self._fresh)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin a branch: nothing is known about its eigenvectors."""
+        self._block, self._images, self._started = self._fresh, self._fresh_images, False
+
+    def at(self, x: PETSc.Vec) -> RegularPoint | None:
+        """The regular point ``x``; None where an eigenvalue is too near zero, or a load has no potential."""
+        inertia = self.inertia
+        if not self.system.scene.conservative:  # S is not symmetric
+            return None
+        found = inertia.at(x)
+        try:
+            below = found.below(0.0)
+        except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
+            return None
+        # inverse iteration: one step a point along a branch, three from generic vectors
+        for _ in range(1 if self._started else 3):
+            own, nearest = self._solve(found)
+        self._started = nearest > NEAR * inertia.scale
+        if not self._started:
+            self.restart()
+            return None
+        tangent = self.system.new_vector()
+        tangent.array[:] = own
+        self.system.set_load(tangent, 1.0)
+        tangent.scale(1.0 / self.system.norm(tangent))
+        certain = nearest >= NEAR * inertia.scale + 10 * inertia.tolerance
+        return RegularPoint(Index(below, found.drifts, nearest) if certain else None, nearest, tangent)
+
+    def _solve(self, found: Factored) -> tuple[np.ndarray, float]:
+        """Change of state with the load, and the distance of the nearest eigenvalue: a step of inverse iteration."""
+        inertia = self.inertia
+        block = self._block + FRESH * self._fresh
+        images = self._images + FRESH * self._fresh_images
+        sizes = np.sqrt(inertia.sum((images * block).sum(axis=0)))
+        with self.system.clock("solve"):
+            solved = found.factors.solve_all(np.column_stack([found.border.array_r.real, images]))
+        # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
+        block = solved[:, 1:]
+        images = inertia.weighed(block)
+        grown = np.sqrt(np.maximum(inertia.sum((images * block).sum(axis=0)), TINY))
+        growth = float((grown / sizes).max()) if np.isfinite(grown).all() else inf
+        block, images = block / grown, images / grown
+        for i in range(1, BLOCK):  # else all vectors of the block become the same one
+            along = inertia.sum(images[:, i] @ block[:, :i])
+            block[:, i] -= block[:, :i] @ along
+            images[:, i] -= images[:, :i] @ along
+        self._block, self._images = block, images
+        return -solved[:, 0], 1.0 / growth
 
 
 @dataclass(frozen=True)
 class Step:
-    """A step along a branch: the state ``x``, a prediction where it was not corrected, and its ``load``.
-
-    Attributes
-    ----------
-    outcome
-        The Newton iteration; None where none was made.
-    tangent, index
-        Of an equilibrium its unit tangent, and its index where one factorisation determines it.
-    aligned
-        Cosine between the direction of the prediction and the tangent.
-    length
-        Distance from the last row, in the metric.
-    """
+    """A step along a branch: the state ``x``, a prediction where it was not corrected, and its ``load``."""
 
     x: PETSc.Vec
     load: float
-    outcome: NewtonResult | None = None
-    tangent: PETSc.Vec | None = None
-    index: Index | None = None
-    aligned: float = -1.0
-    length: float = 0.0
+    outcome: NewtonResult | None = None  # None where no Newton iteration was made
+    tangent: PETSc.Vec | None = None  # of an equilibrium
+    index: Index | None = None  # where one factorisation determines it
+    aligned: float = -1.0  # cosine between the direction of the prediction and the tangent
+    length: float = 0.0  # distance from the last row, in the metric
 
 
 class BranchSolver:
@@ -67,17 +243,19 @@ class BranchSolver:
     """
 
     def __init__(self, system: System, spectrum: int = 0) -> None:
-        """Tabulate the shape; with ``spectrum`` record that many left-most eigenvalues.
-
-        ``mesh`` is the number of this discretisation where there are several.
-        """
-        self.system, self.mesh, self.modes = system, 0, spectrum
+        """Tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
+        self.system, self.mesh, self.modes = system, 0, spectrum  # mesh: number of this one among several
         self.shape, self.axis = Shape(system), system.load_axis()
 
     @property
     def conservative(self) -> bool:
         """Whether all loads have a potential: else ``S`` is not symmetric, and no count is an index."""
         return self.system.scene.conservative
+
+    @property
+    def units(self) -> Units:
+        """Natural sizes of the rod's numbers."""
+        return self.system.scene.units
 
     @cached_property
     def inertia(self) -> Inertia:
@@ -94,23 +272,33 @@ class BranchSolver:
         """What finds left-most eigenvalues, if they are recorded."""
         return SymmetricSolver(self.inertia) if self.modes else None
 
-    def factors(self) -> list[Factors]:
-        """Those of Newton's method, and the symmetric ones that count."""
-        return [self.system.lu, self.inertia.factors] if self.conservative else [self.system.lu]
-
     @cached_property
     def resultants(self) -> Resultants:
         """Strains, contact forces and moments of the states, compiled when they are first asked for."""
         return Resultants(self.shape)
 
-    def reactions(self, x: PETSc.Vec) -> Reactions:
-        """Reactions of supports and attachments at the equilibrium ``x``."""
-        return reactions(self.resultants, x)
-
     @cached_property
     def convexity(self) -> Convexity:
         """Convexity of the stored energy, where it varies: from state to state, along the rod, or with the load."""
         return Convexity(self.system, self.system.scene.load)
+
+    @cached_property
+    def space(self) -> InSpace | None:
+        """Index in space of a planar rod, where all its loads have a potential there."""
+        scene = self.system.scene
+        return None if scene.planar is None or scene.without_potential(in_space=True) else InSpace(self.system)
+
+    def reactions(self, x: PETSc.Vec) -> Reactions:
+        """Reactions of supports and attachments at the equilibrium ``x``."""
+        return reactions(self.resultants, x)
+
+    def energies(self, x: PETSc.Vec) -> Energies:
+        """Stored and potential energy of the equilibrium ``x``, and what the load does work on."""
+        return self.system.at(x).energies()
+
+    def energy(self, x: PETSc.Vec) -> float:
+        """Stored energy of the state ``x``."""
+        return self.system.at(x).energy()
 
     def lost_convexity(self, x: PETSc.Vec) -> str:
         """Why a branch ends at the state ``x``, where the stored energy is not convex any more; empty where it is."""
@@ -128,20 +316,14 @@ class BranchSolver:
                 f"{self.system.scalar(x):g}: choose constants that make it so, or another load."
             )
 
-    @property
-    def units(self) -> Units:
-        """Natural sizes of the rod's numbers."""
-        return self.system.scene.units
-
     def given(self, kind: Kind, point: Point) -> SpecialPoint:
-        """Special point at a load that is given."""
-        return SpecialPoint.given(kind, point, self.units.load)
+        """Special point at a load that is given: nothing changes there."""
+        return SpecialPoint(kind, point, point.negative, point.negative, round_off(point.load, self.units.load))
 
     def start(self, load: float, bent: float = 0.0) -> PETSc.Vec:
-        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces.
+        """First guess at ``load``: the scene's ``start`` rotation, or straight and turned as its ends are; no forces.
 
-        Without one it is straight, and turned as its ends are.  ``bent`` is the size, in radian, of a smooth rotation
-        on top: a taut straight rod is a singular place to start.
+        ``bent`` is the size, in radian, of a smooth rotation on top: a taut straight rod is a singular place to start.
         """
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
@@ -182,7 +364,7 @@ class BranchSolver:
     def notices(self) -> list[str]:
         """Sentences for the record that nobody has read: symmetries that were none, factors by the last resort."""
         out = self.system.verification.read()
-        for factors in self.factors():
+        for factors in [self.system.lu, self.inertia.factors] if self.conservative else [self.system.lu]:
             if isinstance(factors, Chain) and factors.times:
                 out.append(
                     f"{factors.times} matrices could not be factored along the rod, too many pivots were delayed: "
@@ -190,20 +372,6 @@ class BranchSolver:
                 )
                 factors.times = 0
         return out
-
-    def energies(self, x: PETSc.Vec) -> Energies:
-        """Stored and potential energy of the equilibrium ``x``, and what the load does work on."""
-        return self.system.at(x).energies()
-
-    def energy(self, x: PETSc.Vec) -> float:
-        """Stored energy of the state ``x``."""
-        return self.system.at(x).energy()
-
-    @cached_property
-    def space(self) -> InSpace | None:
-        """Index in space of a planar rod, where all its loads have a potential there."""
-        scene = self.system.scene
-        return None if scene.planar is None or scene.without_potential(in_space=True) else InSpace(self.system)
 
     def point(
         self,
@@ -214,11 +382,7 @@ class BranchSolver:
         index: Index | None = None,
         energies: Energies | None = None,
     ) -> Point:
-        """Evaluate all records of the equilibrium ``x``; its index is counted, its energies are summed, unless given.
-
-        ``arclength`` and ``tangent`` are its place on the branch, ``outcome`` is the Newton iteration that led to it,
-        ``index`` that of the factors, if they are those of ``x``.
-        """
+        """Evaluate all records of the equilibrium ``x``; its index and its energies unless they are given."""
         system = self.system
         if index is None:
             index = decide(self.inertia.at(x)).index
@@ -260,8 +424,7 @@ class BranchSolver:
     def step(self, known: Sequence[Point], s: float, bounds: tuple[float, float], reach: float) -> Step:
         """Predict from the ``known`` rows the equilibrium at arclength ``s``, and correct the prediction.
 
-        A prediction whose load is not within the ``bounds`` is not
-        corrected, nor one that turns back; ``reach`` bounds a correction, in the metric.
+        Not if its load is not within the ``bounds``, or it turns back; ``reach`` bounds a correction, in the metric.
         """
         last, system = known[-1], self.system
         x, direction = predict(known, s)
@@ -271,25 +434,12 @@ class BranchSolver:
         back = last.tangent is not None and row.dot(last.tangent) <= 0
         if back or not bounds[0] <= load <= bounds[1]:
             return Step(x, load)
-        outcome, tangent, index = self.correct(x, row, reach)
-        if tangent is None:
-            return Step(x, load, outcome)
-        return Step(x, system.scalar(x), outcome, tangent, index, row.dot(tangent), system.distance(last.x, x))
-
-    def correct(
-        self, x: PETSc.Vec, row: PETSc.Vec, reach: float
-    ) -> tuple[NewtonResult, PETSc.Vec | None, Index | None]:
-        """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index, both at ``x``.
-
-        The tangent is None without convergence, the index where one factorisation does not determine it.  ``row`` is
-        the normal of the plane on which the equilibrium lies, and ``reach`` bounds how far ``x`` may move, in the
-        metric.
-        """
-        outcome = correct(self.system, x, row, reach, STEPS)
+        outcome = correct(system, x, row, reach, STEPS)
         if not outcome.converged:
-            return outcome, None, None
+            return Step(x, load, outcome)
         at = self.regular.at(x)
-        return outcome, at.along(row) if at else self._tangent(row, x), at.index if at else None
+        tangent, index = (at.along(row), at.index) if at else (self._tangent(row, x), None)
+        return Step(x, system.scalar(x), outcome, tangent, index, row.dot(tangent), system.distance(last.x, x))
 
     def damp(self, freedoms: int) -> None:
         """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
@@ -301,31 +451,25 @@ class BranchSolver:
         row.scale(1.0 / self.system.norm(direction))
         return row
 
-    def tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
-        """Unit tangent of the branch on the side to which ``row`` points.
-
-        From the LU factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that
-        very state, symmetric where they serve.
-        """
-        regular = None if at is None else self.regular.at(at)
+    def tangent(self, row: PETSc.Vec, at: PETSc.Vec) -> PETSc.Vec:
+        """Unit tangent of the branch at a state, on the side to which ``row`` points."""
+        regular = self.regular.at(at)
         return regular.along(row) if regular else self._tangent(row, at)
 
-    def _tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
+    def _tangent(self, row: PETSc.Vec, at: PETSc.Vec) -> PETSc.Vec:
         """The same by LU factors."""
-        if at is not None:
-            self.system.set_phase(at)
-            self.system.at(at).factor(row)
-        tangent = self.system.new_vector()
-        solved = self.system.solve(self.axis, tangent)
-        if not solved and at is not None:  # exactly singular: of all directions that across the null space
-            self.system.at(at).factor(row, damping=self.inertia.tolerance)
-            solved = self.system.solve(self.axis, tangent)
-        size = self.system.norm(tangent) if solved else 0.0
+        system, tangent = self.system, self.system.new_vector()
+        system.set_phase(at)
+        system.at(at).factor(row)
+        solved = system.solve(self.axis, tangent)
+        if not solved:  # exactly singular: of all directions that across the null space
+            system.at(at).factor(row, damping=self.inertia.tolerance)
+            solved = system.solve(self.axis, tangent)
+        size = system.norm(tangent) if solved else 0.0
         if not 0.0 < size < inf:
-            load = "" if at is None else f" at {self.system.scene.load} = {self.system.scalar(at):.8g}"
             raise ConvergenceError(
-                f"The equations{load} are singular, and the branch has no tangent: begin the range elsewhere, or use "
-                "another number of elements."
+                f"The equations at {system.scene.load} = {system.scalar(at):.8g} are singular, and the branch has no "
+                "tangent: begin the range elsewhere, or use another number of elements."
             )
         tangent.scale(1.0 / size)
         return tangent

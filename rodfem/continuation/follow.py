@@ -16,8 +16,7 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import BranchSolver, Step
-from rodfem.continuation.prediction import ALIGNED, ROWS, predict
+from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver, Step, predict
 from rodfem.continuation.row_checks import defect
 from rodfem.continuation.step_control import StepControl
 from rodfem.tolerances import SAME_LOAD

@@ -20,8 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.prediction import ROWS, lagrange
+from rodfem.continuation.branch_solver import ROWS, BranchSolver, lagrange
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import EPS

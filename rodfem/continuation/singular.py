@@ -404,7 +404,7 @@ class SingularSystem:
         modes, _ = self._modes(self._bordered[0])  # of this very state
         null = [combine(modes, z) for z in at.Z.T]
         # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times
-        noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale
+        noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale  # or all vanish
         if self._section is not None:
             curve = self._curve(step.share[:2], rows, at, noise)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z

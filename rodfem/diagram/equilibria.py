@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH, Point
-from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.branch_solver import ROWS, BranchSolver, across_orbit, predict_at_load
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.continuation.observer import Remark
-from rodfem.continuation.prediction import ROWS, across_orbit, predict_at_load
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape

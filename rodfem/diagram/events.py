@@ -11,10 +11,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import between
 from rodfem.continuation.event_piece import End, EventPiece, end
 from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.observer import Remark
-from rodfem.continuation.prediction import between
 from rodfem.diagram.finders import Step
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.tolerances import round_off

@@ -11,10 +11,9 @@ from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes, TooCoarse
 from rodfem.adaptivity.soft_states import SoftRows
 from rodfem.adaptivity.zero_stretch import before_the_end, end_at_zero_stretch, last_admissible
 from rodfem.continuation.arc import Arc
-from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
+from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, follow
-from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.row_checks import RowCheck
@@ -364,7 +363,7 @@ class Tracer:
         for finder in self.finders:
             finder.finish(self.observer)
         branch.renumber()
-        explain(branch)
+        branch.explain()
         self._singular_start(branch)
         last = branch.points[-1]
         if branch.ended == END_OF_RANGE and last.zero > self.solver.system.active_drifts(last.x):
@@ -388,7 +387,7 @@ class Tracer:
     def _soft_modes(self, branch: Branch) -> None:
         with self.without(f"Soft modes of {branch.name} were not found"):
             self.soft.examine(branch)
-            explain(branch)  # once more: richer meshes may have decided more than a factorisation does
+            branch.explain()  # once more: richer meshes may have decided more than a factorisation does
         for sentence in self.soft.undecided(branch):
             self.observer.warn(sentence)
 

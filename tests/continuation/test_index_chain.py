@@ -39,9 +39,8 @@ from rodfem import (
 )
 from rodfem.app.terminal import Report
 from rodfem.codim2.follow import locus
-from rodfem.continuation.branch import Point
+from rodfem.continuation.branch import Point, breaks, merge_doubles
 from rodfem.continuation.follow import follow
-from rodfem.continuation.index_chain import breaks, explain, merge_doubles
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.switching import directions, leave
 from rodfem.diagram import explorer
@@ -331,7 +330,7 @@ def test_what_is_not_explained_is_kept() -> None:
     assert "index changes from 0 to 1" in str(broken)
     branch.points, branch.special = rows, singular[1:]
     branch.renumber()
-    explain(branch)
+    branch.explain()
     columns, (entry,) = branch_data(branch)["columns"], branch_data(branch)["unexplained"]
     assert (entry["before"], entry["after"]) == (0, 1)
     assert columns["load"][entry["row"]] == broken.a.load

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from rodfem.continuation.branch import Branch
-from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.branch_solver import NEAR, BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.regular_point import NEAR
 
 BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}
 

@@ -43,16 +43,17 @@ def interface() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef, str]]:
                     )
 
 
-def parameters(name: str, node: ast.FunctionDef | ast.ClassDef) -> list[str]:
-    """Parameters of a function; of a class its fields that have no docstring of their own, if there are many."""
+def parameters(place: str, node: ast.FunctionDef | ast.ClassDef) -> list[str]:
+    """Parameters of a function; of a class its fields without a docstring, or a comment ``#:``, if there are many."""
     if isinstance(node, ast.FunctionDef):
         given = node.args
         found = [a.arg for a in (*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg) if a]
         found = [x for x in found if x not in ("self", "cls")]
         return found if len(found) >= MANY else []
     made = " ".join(map(ast.unparse, (*node.decorator_list, *node.bases)))
+    lines = (HOME / place.split(":")[0]).read_text().splitlines()
     fields = [
-        (child.target.id, isinstance(after, ast.Expr))
+        (child.target.id, isinstance(after, ast.Expr) or "  #: " in lines[child.lineno - 1])
         for child, after in zip(node.body, [*node.body[1:], None], strict=True)
         if isinstance(child, ast.AnnAssign) and isinstance(child.target, ast.Name)
     ]
