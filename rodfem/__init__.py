@@ -70,7 +70,7 @@ _HOMES = {
     "Event": "problem.events",
     "IndexStepControl": "continuation.step_control",
     "run": "app.run",
-    "trace": "diagram.trace",
+    "trace": "diagram.diagram",
     "load": "diagram.saved",
     "Diagram": "diagram.diagram",
     "Solver": "diagram.solver",

@@ -12,10 +12,10 @@ from rodfem.continuation.observer import Observer as Observer
 from rodfem.continuation.step_control import IndexStepControl as IndexStepControl
 from rodfem.continuation.step_control import StepControl as StepControl
 from rodfem.diagram.diagram import Diagram as Diagram
+from rodfem.diagram.diagram import trace as trace
 from rodfem.diagram.plan import Plan as Plan
 from rodfem.diagram.saved import load as load
 from rodfem.diagram.solver import Solver as Solver
-from rodfem.diagram.trace import trace as trace
 from rodfem.errors import ConvergenceError as ConvergenceError
 from rodfem.errors import InputError as InputError
 from rodfem.errors import SceneError as SceneError

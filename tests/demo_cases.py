@@ -13,8 +13,8 @@ import numpy as np
 from rows import verify
 
 from rodfem.continuation.branch import Branch, Point
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.problem.scene import Scene
 

@@ -21,7 +21,7 @@ from rodfem.continuation.branch import Branch
 from rodfem.continuation.observer import Observer
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
+from rodfem.diagram.diagram import trace
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 

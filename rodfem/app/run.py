@@ -20,10 +20,9 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import USER
 from rodfem.continuation.observer import Remark
-from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.diagram import PLAN, Diagram, traced
 from rodfem.diagram.plan import Plan, plan_of
 from rodfem.diagram.solver import MESH, RANKS, SCENE
-from rodfem.diagram.trace import PLAN, traced
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System

@@ -7,7 +7,7 @@ mean of eigenvalues that pass through zero together is smooth in the load.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -39,8 +39,6 @@ JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
 MOVED, OUTSIDE = 0.3, 0.2
 """Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, of another one."""
-SECANT = 1e-6
-"""Relative distance of the first two loads of a secant method."""
 AROUND = (1e-4, 1e-5, 1e-6)
 """Half widths, relative to a divergence load, over which its eigenvalues are sampled."""
 
@@ -56,11 +54,10 @@ class Side:
 
 @dataclass
 class Critical:
-    """A critical ``load`` of some ``kind``, before its state is evaluated, with a ``note``.
+    """A critical load, before its state is evaluated, at which a cluster of eigenvalues collides or passes zero.
 
-    Its ``cluster`` of eigenvalues collides or passes through zero at ``omega2``; ``still`` of them, those of rigid
-    motions, are zero at all loads.  ``uncertainty`` is what the location leaves open of the load, ``change`` is that of
-    the number of unstable eigenvalues.
+    ``change`` is that of the number of unstable eigenvalues; ``still`` ones of the cluster, those of rigid motions, are
+    zero at all loads.  Without a cluster round-off hides the collision: the pair is complex at both ends of the step.
     """
 
     kind: Kind
@@ -71,22 +68,6 @@ class Critical:
     cluster: Cluster | None = None
     note: str = ""
     still: int = 0
-
-
-@dataclass
-class Findings:
-    """What happens in a step: ``events``, what ``entered`` (less what left), and ``doubts``, in words, where not all.
-
-    Complex eigenvalues that ``entered`` are complex at both loads, but by no more than round-off at the first one.
-    """
-
-    events: list[Critical] = field(default_factory=list)
-    entered: int = 0
-    doubts: list[str] = field(default_factory=list)
-
-    def __add__(self, other: Findings) -> Findings:
-        """What happens in two steps, one after the ``other``."""
-        return Findings(self.events + other.events, self.entered + other.entered, self.doubts + other.doubts)
 
 
 def pairs_in_common(mine: Spectrum, others: Spectrum) -> dict[int, int]:
@@ -112,92 +93,106 @@ def _shares(mine: Spectrum, others: Spectrum) -> np.ndarray:
 
 
 def others_negative(mine: Spectrum, others: Spectrum) -> bool:
-    """Whether the fewer of the negative eigenvalues of two states go on from some that are not negative, by vectors."""
-    if len(mine.negative) > len(others.negative):
-        mine, others = others, mine
+    """Whether the negative eigenvalues of two states, as many, are others, by their vectors."""
     if not len(mine.negative):
         return False
     basis = others.condensed.pairs.right[:, others.negative].real
     return bool(inside(basis, others.coordinates(mine)[:, mine.negative].real).min() < 1.0 - OUTSIDE)
 
 
+def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:
+    """Cluster of some eigenvalues of a state's ``spectrum``, and the conjugates of complex ones."""
+    found = pencil.of(spectrum, np.array(places))
+    conjugates = [found.vectors.conj()] if found.values.imag.any() else []
+    vectors = np.concatenate([found.vectors, *conjugates], axis=1)
+    return Cluster(real_span(pencil, vectors), float(found.values.real.mean()))
+
+
+class Measuring:
+    """A cluster of eigenvalues against the load: at the equilibrium near a ``guess``."""
+
+    def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> None:
+        self.solver, self.eigensolver, self.guess = solver, eigensolver, guess
+
+    def __call__(self, load: float, cluster: Cluster) -> Measured:
+        """Measure a cluster; raises :class:`ConvergenceError` where it is not found."""
+        return measure(self.pencil(load), cluster)
+
+    def noise(self, load: float, cluster: Cluster) -> ClusterNoise:
+        """Round-off of what is measured; raises :class:`ConvergenceError` where the cluster is not found."""
+        pencil = self.pencil(load)
+        return noise_of(pencil, measure(pencil, cluster))
+
+    def pencil(self, load: float) -> NonsymmetricPencil:
+        """Pencil at a load."""
+        return self.eigensolver.at(at_load(self.solver, self.guess, load))
+
+
 class Collisions:
     """Finds the eigenvalues of a sweep that collide in a step."""
 
     def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver) -> None:
-        """Take equilibria from the ``solver``, pencils from the ``eigensolver``."""
         self.solver, self.eigensolver = solver, eigensolver
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
 
-    def between(self, a: Side, b: Side) -> Findings:
-        """Collisions between two loads, those at one and the same load together."""
-        findings, common = Findings(), pairs_in_common(b.spectrum, a.spectrum)
+    def between(self, a: Side, b: Side) -> list[Critical]:
+        """Collisions between two loads, those at one load together; raises :class:`ConvergenceError`."""
+        events, common = list[Critical](), pairs_in_common(b.spectrum, a.spectrum)
         born = [i for i in b.spectrum.upper.tolist() if i not in common]
         gone = [i for i in a.spectrum.upper.tolist() if i not in common.values()]
         for sign, here, there, chosen in ((1, b, a, born), (-1, a, b, gone)):
             for group in groups(here.spectrum.values[chosen], np.inf, MULTIPLE):
-                upper = [chosen[i] for i in group]
-                try:
-                    event = self._end(here, there, upper)
-                except ConvergenceError as trouble:
-                    findings.doubts.append(
-                        f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was "
-                        f"not followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
-                    )
-                    continue
-                if event is None:
-                    findings.entered += 2 * sign * len(upper)
-                else:
-                    event.change *= sign
-                    self._add(findings, event, here)
-        return findings
+                event = self._end(here, there, [chosen[i] for i in group])
+                event.change *= sign
+                self._add(events, event, here)
+        return events
 
-    def _add(self, findings: Findings, event: Critical, here: Side) -> None:
+    def _add(self, events: list[Critical], event: Critical, here: Side) -> None:
         """Take a collision, followed from ``here``, together with others at its load; none is to be found twice."""
-        same = [e for e in findings.events if abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
-        if not same:
-            findings.events.append(event)
+        same = [e for e in events if e.cluster and abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
+        if not same or event.cluster is None:
+            events.append(event)
             return
         known = same[0]
-        if known.change * event.change > 0 and self._common(known, event, here) > 0.5:
-            findings.doubts.append(
+        if known.change * event.change > 0 and self._common(known.cluster, event.cluster, here) > 0.5:
+            raise ConvergenceError(
                 f"Two pairs at {self._load} = {here.load:.6g} end in one collision at {event.load:.8g}: use a smaller "
                 "range."
             )
-            return
         known.change += event.change
         known.uncertainty = max(known.uncertainty, event.uncertainty + abs(known.load - event.load))
         if abs(event.omega2) < abs(known.omega2):
             known.omega2, known.cluster = event.omega2, event.cluster
 
-    def _common(self, one: Critical, other: Critical, here: Side) -> float:
-        """Share of the smaller cluster of two collisions in the other one's subspace, in the mass of a state."""
-        assert one.cluster is not None and other.cluster is not None
+    def _common(self, one: Cluster | None, other: Cluster, here: Side) -> float:
+        """Share of the smaller one of two clusters in the other one's subspace, in the mass of a state."""
+        assert one is not None
         pencil = self.eigensolver.at(here.x)
-        parts = pencil.product(one.cluster.basis, pencil.weighed(other.cluster.basis))
+        parts = pencil.product(one.basis, pencil.weighed(other.basis))
         return float((abs(parts) ** 2).sum() / min(parts.shape))
 
-    def _end(self, here: Side, there: Side, upper: list[int]) -> Critical | None:
-        """Collision, on the way ``there``, of pairs complex ``here``; None if, by round-off, they are so there, too."""
+    def _end(self, here: Side, there: Side, upper: list[int]) -> Critical:
+        """Collision, on the way ``there``, of pairs complex ``here``."""
         cluster = cluster_at(self.eigensolver.at(here.x), here.spectrum, upper)
         other = measure(self.eigensolver.at(there.x), cluster)
-        scale = abs(other.values).max()
-        if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
+        D, scale, mean = other.discriminant, abs(other.values).max(), other.cluster.mean
+        just_met = abs(D) < (JUST_MET * scale) ** 2
+        if abs(D) < (MULTIPLE * scale) ** 2:
             return self._at_once(here, there, other)
-        just_met = abs(other.discriminant) < (JUST_MET * scale) ** 2
-        if other.discriminant < 0 and not just_met:
-            nearest = abs(there.spectrum.values - other.cluster.mean).argmin()
-            if -other.discriminant <= 4.0 * there.spectrum.noise[nearest] ** 2:
-                return None
-            raise ConvergenceError("it is complex there, too")
-        try:
-            return self._located(here, there, cluster, just_met=just_met)
-        except ConvergenceError:
-            if other.discriminant < 0:
-                return None
-            if abs(other.discriminant) < (ALIKE * scale) ** 2:
-                return self._at_once(here, there, other)
-            raise
+        if D > 0 or just_met:
+            try:
+                return self._located(here, there, cluster, just_met=just_met)
+            except ConvergenceError:
+                if 0 < D < (ALIKE * scale) ** 2:
+                    return self._at_once(here, there, other)
+                if D > 0:
+                    raise
+        elif -D > 4.0 * there.spectrum.noise[abs(there.spectrum.values - mean).argmin()] ** 2:
+            raise ConvergenceError(
+                f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was not "
+                "followed to where it becomes complex: use a smaller range."
+            )
+        return Critical(FLUTTER, there.load, cluster.size, np.inf, mean)
 
     def _at_once(self, here: Side, there: Side, measured: Measured) -> Critical:
         """Frequencies that are double ``there``, and complex next to it, on the way from ``here``."""
@@ -214,46 +209,17 @@ class Collisions:
         measured, width = Measuring(self.solver, self.eigensolver, here.x), abs(here.load - there.load)
         located = located_flutter(measured, cluster, (there.load + here.load) / 2, width)
         load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
-        if uncertainty > width:
-            raise ConvergenceError("they part so slowly that where they met is not known to a step")
         outside = (load - there.load) * (here.load - there.load) < 0
         if apart <= uncertainty or (outside and just_met and apart < JUST_MET * width):
             load, uncertainty = there.load, uncertainty + apart  # at that row, at which they still count as real
         low, high = sorted((here.load, there.load))
-        if not low - uncertainty <= load <= high + uncertainty:
-            raise ConvergenceError(f"two that meet at {load:.6g}, beyond this step, are not its own")
-        if located.slope * (here.load - there.load) > 0:
-            raise ConvergenceError(f"the two that meet at {load:.6g} are complex on the other side of it")
+        inside = low - uncertainty <= load <= high + uncertainty and located.uncertainty <= width
+        if not inside or located.slope * (here.load - there.load) > 0:
+            raise ConvergenceError(
+                f"Frequencies that are complex at {self._load} = {here.load:.6g} meet at {load:.6g}, which is none of "
+                "this step: use a smaller range."
+            )
         return Critical(FLUTTER, load, cluster.size, uncertainty, located.cluster.mean, located.cluster)
-
-
-def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:
-    """Cluster of some eigenvalues of a state's ``spectrum``, and the conjugates of complex ones."""
-    found = pencil.of(spectrum, np.array([i for i in places if spectrum.values[i].imag >= 0.0]))
-    conjugates = [found.vectors.conj()] if found.values.imag.any() else []
-    vectors = np.concatenate([found.vectors, *conjugates], axis=1)
-    return Cluster(real_span(pencil, vectors), float(found.values.real.mean()))
-
-
-class Measuring:
-    """A cluster of eigenvalues against the load: at the equilibrium near a ``guess``."""
-
-    def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> None:
-        """Compute nothing yet."""
-        self.solver, self.eigensolver, self.guess = solver, eigensolver, guess
-
-    def __call__(self, load: float, cluster: Cluster) -> Measured:
-        """Measure a cluster; raises :class:`ConvergenceError` where it is not found."""
-        return measure(self.pencil(load), cluster)
-
-    def noise(self, load: float, cluster: Cluster) -> ClusterNoise:
-        """Round-off of what is measured; raises :class:`ConvergenceError` where the cluster is not found."""
-        pencil = self.pencil(load)
-        return noise_of(pencil, measure(pencil, cluster))
-
-    def pencil(self, load: float) -> NonsymmetricPencil:
-        """Pencil at a load."""
-        return self.eigensolver.at(at_load(self.solver, self.guess, load))
 
 
 def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:
@@ -320,20 +286,11 @@ def interpolated_zero(mean: Mean, load: float, one: float) -> tuple[float, float
 
 
 def zero_near(mean: Mean, load: float, one: float) -> tuple[float, float]:
-    """Load near ``load``, of natural size ``one``, at which a ``mean`` vanishes, and what its round-off leaves open.
-
-    By secants; raises :class:`ConvergenceError` where it does not vanish near.
-    """
+    """The same on another mesh than that of a ``load``, by secants first."""
     from scipy.optimize import newton  # slow to load
 
-    step = SECANT * unit(load, one=one)
+    step = AROUND[-1] * unit(load, one=one)
     with catch_warnings():  # two equal values end the secants
         simplefilter("ignore", RuntimeWarning)
-        found, result = newton(mean, load, x1=load + step, tol=round_off(load, one), full_output=True, disp=False)
-    slope = (mean(found + step) - mean(found - step)) / (2 * step)
-    left = mean.noise(found)
-    if not result.converged:  # round-off of the mean may be more than the tolerance
-        left = max(left, abs(mean(found)))
-        if left > step * abs(slope):
-            raise ConvergenceError(f"No divergence load was found near {load:.6g}: use a smaller range.")
-    return float(found), abs(left / slope)
+        near = newton(mean, load, x1=load + step, tol=step, full_output=True, disp=False)[0]
+    return interpolated_zero(mean, float(near), one)

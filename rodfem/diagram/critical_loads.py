@@ -1,28 +1,41 @@
-"""Loads of flutter and of divergence between two loads of a sweep, from all eigenvalues at both.
+r"""Loads of flutter and of divergence between two loads of a sweep, from all eigenvalues at both.
 
 Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 - mu2)/2)^2``
 passes through zero.  Unlike the eigenvalues, which have a square root there, ``D`` is a smooth function of the load:
 the discriminant of the pencil projected on the two of them.  Its zero is found by Chebyshev interpolation, at spectral
 accuracy and without ever solving at the double eigenvalue.  Where a single real one passes through zero the rod
-diverges: the eigenvalue itself is smooth there.
+diverges: the eigenvalue itself is smooth there.  A step in which what is found does not explain the numbers at both
+ends is parted.
 
-A step in which what is found does not explain the numbers at both ends is parted.  So is one in which eigenvalues may
-meet and part again (:mod:`rodfem.diagram.meetings`).
+Frequencies that meet and part again, or pass through zero and back, between two rows show in neither.  In ``nu``
+(:mod:`rodfem.stability.spectrum`) ``D`` of two real ones vanishes where they meet, ``-D`` of a complex pair, and
+``mu`` of a single one where it passes through zero.  A parabola through three rows tells where each is lowest; where
+that comes near zero, the sweep has a load more.  Eigenvalues are known again at the neighbours of a row by their
+vectors: with ``Z^t Y = 1`` for the left and right ones at the row, ``|Z^t Y'|`` is greatest for the same motion.  Two
+real ones meet only where the load couples them, and not by a potential: with ``E`` the change of ``Z^t T Y``, to first
+order
+
+    D = ((nu_i + E_ii - nu_j - E_jj) / 2)^2 + E_ij E_ji,
+
+and the product is negative there.  All others cross, or turn away from one another.  Multiple eigenvalues are left out,
+and so is the upper half of a mesh's: it tells of the mesh rather than of the rod.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.eigenvalue_curves import assignment
 from rodfem.continuation.flutter import SHARP
 from rodfem.continuation.kinds import DIVERGENCE
 from rodfem.diagram.collisions import (
     Collisions,
     Critical,
-    Findings,
     Mean,
     Measuring,
     Side,
@@ -31,27 +44,21 @@ from rodfem.diagram.collisions import (
     others_negative,
 )
 from rodfem.diagram.equilibria import at_load
-from rodfem.diagram.meetings import Meeting, meetings
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
-from rodfem.stability.cluster import measure, noise_of
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.nonsymmetric import ALIKE, NonsymmetricSolver
+from rodfem.stability.spectrum import Spectrum, times
 from rodfem.tolerances import ROUND_OFF, unit
 
-PARTS, PART = 16, 0.47
-"""Times that a step is parted, at most, and where: not in its middle, which is likely to be special."""
-PATIENCE = 3
-"""Steps of a sweep that are not clear, whatever is tried, after which no other one is parted."""
-SMALL = 1e-3
-"""Change of negative eigenvalues, relative, that takes none of them to zero."""
-CLEAR = 1e-4
-"""Distance from a collision, relative to a step of the sweep, at which its eigenvalues are counted: they are apart."""
+PARTS, PART = 100, 0.47
+"""Times that steps of a sweep are parted, at most, and where: not in the middle, which is likely to be special."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
-NEARER, CLOSEST, NEAR = 10, 1e-6, 1e-2
-"""Loads at which a meeting is looked for, at most, their least distance, over a step, and that of the meeting found."""
-SAME = 1e-2
-"""Change of the mean of eigenvalues, relative, within which they are the same ones at a load nearby."""
+NEARER, CLOSEST = 10, 1e-6
+"""Loads at which a meeting is looked for, at most, and their least distance, over a step."""
+SMALL, CLEAR, ONE = 0.3, 100.0, 0.9
+"""Relative distance of two eigenvalues that do not meet in a step; products of changes, over their noise, that are none
+of round-off; square of the cosine of two vectors that are nearly one."""
 
 
 class CriticalLoads:
@@ -61,196 +68,113 @@ class CriticalLoads:
         """Take equilibria and their eigenvalues from the solvers; ``warn`` gets sentences on what is not clear."""
         self.solver, self.eigensolver, self.warn = solver, eigensolver, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
-        self.collisions, self._still, self._parted, self._unclear = Collisions(solver, eigensolver), 0, 0, 0
-        self._ahead = list[Meeting]()  # parts of the next step at which eigenvalues may meet
+        self.collisions, self._still, self._parted = Collisions(solver, eigensolver), 0, 0
+        self._ahead = list[Meeting]()
 
-    def between(self, a: Side, b: Side, behind: Side | None, still: int) -> Findings:
+    def between(self, a: Side, b: Side, behind: Side | None, still: int) -> list[Critical]:
         """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish.
 
         Steps are given one after the other, each with the row ``behind`` it; ``still`` eigenvalues are zero at all
         loads.
         """
-        self._still, self._parted = still, 0
-        findings, sides = Findings(), [a]
-        for side in [*self._met(findings, a, b, behind), b]:
-            findings += self._parted_step(sides[-1], side)
-            sides.append(side)
-        self._unclear += bool(findings.doubts)
-        for words in dict.fromkeys(findings.doubts):
-            self.warn(words)
-        findings.events.sort(key=lambda e: abs(e.load - a.load))
-        return findings
+        self._still = still
+        sides = [a, *self._met(a, b, behind), b]
+        events = [event for step in pairwise(sides) for event in self._step(*step)]
+        return sorted(events, key=lambda event: abs(event.load - a.load))
 
-    def _met(self, findings: Findings, a: Side, b: Side, behind: Side | None) -> list[Side]:
+    def _met(self, a: Side, b: Side, behind: Side | None) -> list[Side]:
         """Loads of a step at which eigenvalues come nearest to one another, or to zero, and may meet; in its order."""
-        ahead, self._ahead, width = self._ahead, [], b.load - a.load
-        found, reach = (_meetings(a, b, behind), behind.load - b.load) if behind else ([], 0.0)
-        for m in found:
-            if abs(m.t) < CLOSEST:
-                self._examine(findings, b, m.places)
-            elif m.t < 0.0:
-                ahead.append(m._replace(t=1.0 + m.t * reach / width))
-            else:
-                self._ahead.append(m)
+        ahead, self._ahead = self._ahead, []
+        for meeting in meetings(a, b, behind) if behind else ():
+            beyond = (meeting.load - b.load) * (b.load - a.load) > 0.0
+            (self._ahead if beyond else ahead).append(meeting)
         out = [a]
-        for m in sorted(ahead):
-            load = a.load + m.t * width
-            if min(abs(load - side.load) for side in (*out, b)) > CLOSEST * abs(width):
-                try:
-                    out.append(self._nearest(findings, out[-1], b, m._replace(t=load)))
-                except ConvergenceError as trouble:
-                    findings.doubts.append(
-                        f"Whether frequencies meet, and part again, between {self._load} = {a.load:.6g} and "
-                        f"{b.load:.6g} is not known ({str(trouble).rstrip('.')})."
-                    )
+        for meeting in sorted(ahead, key=lambda m: abs(m.load - a.load)):
+            if min(abs(meeting.load - side.load) for side in (*out, b)) > CLOSEST * abs(b.load - a.load):
+                out.append(self._nearest(out[-1], b, meeting))
         return out[1:]
 
-    def _nearest(self, findings: Findings, a: Side, b: Side, meeting: Meeting) -> Side:
-        """Where the eigenvalues of a ``meeting``, about its load ``t``, are nearest, or a load where they met."""
-        low, high, mine = a, b, self._side(a, meeting.t)
+    def _nearest(self, a: Side, b: Side, meeting: Meeting) -> Side:
+        """Where the eigenvalues of a ``meeting`` are nearest, or a load where they met."""
+        low, high, mine = a, b, self._side(a, meeting.load)
         for _ in range(NEARER):
-            if mine.spectrum.numbers != a.spectrum.numbers:
-                return mine
-            move = _move(low, mine, high, meeting.mean)
-            if abs(move) < CLOSEST * abs(b.load - a.load):
+            found = [m.load for m in meetings(low, mine, high) if abs(m.mean - meeting.mean) < 0.01 * abs(m.mean)]
+            load = min(found, key=lambda at: abs(at - mine.load), default=mine.load)
+            move = (load - mine.load) / (b.load - a.load)
+            if mine.spectrum.numbers != a.spectrum.numbers or abs(move) < CLOSEST:
                 break
-            low, high = (mine, high) if move * (b.load - a.load) > 0.0 else (low, mine)
-            mine = self._side(mine, mine.load + move)
-        for m in _meetings(a, mine, b):
-            if abs(m.t) < NEAR:
-                self._examine(findings, mine, m.places)
+            low, high = (mine, high) if move > 0.0 else (low, mine)
+            mine = self._side(mine, load)
         return mine
-
-    def _examine(self, findings: Findings, side: Side, places: list[int]) -> None:
-        """Say that eigenvalues may meet at a side where round-off leaves that open."""
-        pencil = self.eigensolver.at(side.x)
-        cluster = cluster_at(pencil, side.spectrum, places)
-        if len(places) == 1:
-            value, noise = cluster.mean, 2.0 * side.spectrum.zero
-        else:
-            here = measure(pencil, cluster)
-            value, noise = here.discriminant, noise_of(pencil, here).of_discriminant
-        if abs(value) <= noise:
-            findings.doubts.append(
-                f"Two frequencies come so near one another at {self._load} = {side.load:.8g}, or one so near zero, "
-                "that whether they meet there, and part again, is not known."
-            )
-
-    def _parted_step(self, a: Side, b: Side) -> Findings:
-        """What happens in a step, which is parted where not all of it is clear."""
-        findings = self._whole(a, b)
-        if not findings.doubts or self._parted >= (PARTS if self._unclear < PATIENCE else 0):
-            return findings
-        self._parted += 1
-        try:
-            middle = self._side(a, a.load + PART * (b.load - a.load))
-        except ConvergenceError:
-            return findings
-        return self._parted_step(a, middle) + self._parted_step(middle, b)
 
     def _side(self, a: Side, load: float) -> Side:
         """A load of a step that begins at a side: the equilibrium, and its eigenvalues."""
         x = at_load(self.solver, a.x, load)
         return Side(load, x, self.eigensolver.at(x).spectrum)
 
-    def _whole(self, a: Side, b: Side) -> Findings:
-        """What happens in a step that is not parted."""
-        findings = self.collisions.between(a, b)
-        negative = [event for event in findings.events if event.omega2 < 0]
-        left = sum(event.change for event in negative)
+    def _step(self, a: Side, b: Side) -> list[Critical]:
+        """What happens in a step, which is parted where not all of it is clear."""
+        try:
+            return self._whole(a, b)
+        except ConvergenceError as trouble:
+            if self._parted == PARTS or abs(b.load - a.load) < CLOSEST * unit(a.load, one=self.units.load):
+                self.warn(str(trouble))
+                return []
+        self._parted += 1
+        middle = self._side(a, a.load + PART * (b.load - a.load))
+        return self._step(a, middle) + self._step(middle, b)
+
+    def _whole(self, a: Side, b: Side) -> list[Critical]:
+        """What happens in a step that is not parted; raises :class:`ConvergenceError` where that is not clear."""
+        events = self.collisions.between(a, b)
+        negative = [event for event in events if event.omega2 < 0]
+        before, after = (np.sort(s.spectrum.values[s.spectrum.negative].real) for s in (a, b))
+        passed = len(after) - len(before) + sum(event.change for event in negative)
         for event in negative:  # both are unstable before and after
             event.change = 0
-        sides, passed = {a.load: a, b.load: b}, 0
-        for piece in self._pieces(a, b, [event.load for event in negative]):
-            first, last = (len((sides.get(x) or self._side(a, x)).spectrum.negative) for x in piece)
-            findings += self._diverging(a, piece, first, last)
-            passed += last - first
-        if not findings.doubts:
-            findings.doubts += self._unexplained(a, b, passed - left, collided=bool(negative))
-        return findings
+        exchanged = not (passed or negative) and others_negative(a.spectrum, b.spectrum)
+        if (passed and negative) or (exchanged and (abs(before - after) > 1e-3 * abs(before)).any()):
+            raise ConvergenceError(
+                f"What becomes of the negative eigenvalues, {len(before)} at {self._load} = {a.load:.6g} and "
+                f"{len(after)} at {b.load:.6g}, is not clear: use a smaller range."
+            )
+        return events + (self._diverging(a, b, len(before), len(after)) if passed else [])
 
-    def _unexplained(self, a: Side, b: Side, change: int, *, collided: bool) -> list[str]:
-        """Sentence on negative eigenvalues of which a ``change`` in a step does not tell all; none if it does."""
-        numbers = [len(side.spectrum.negative) for side in (a, b)]
-        if numbers[0] + change != numbers[1]:
-            return [
-                f"Between {self._load} = {a.load:.6g} and {b.load:.6g} the number of negative eigenvalues changes from "
-                f"{numbers[0]} to {numbers[1]}, which what was found does not explain: use a smaller range."
-            ]
-        if not collided and self._exchanged(a, b):
-            return [
-                f"Whether eigenvalues that are negative at {self._load} = {a.load:.6g} and at {b.load:.6g} are the "
-                "same ones, or some pass through zero between them, others back, is not known: use a smaller range."
-            ]
-        return []
+    def _diverging(self, a: Side, b: Side, first: int, last: int) -> list[Critical]:
+        """Loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
+        found = np.sort([self._vanishing(a, b, number) for number in range(min(first, last), max(first, last))])
+        apart = np.diff(found) >= TOGETHER * unit(found[0], one=self.units.load)
+        sign, bounds = 1 if last > first else -1, sorted((a.load, b.load))
+        groups = np.split(found, np.flatnonzero(apart) + 1)
+        return [self._divergence(a, group.tolist(), bounds, sign) for group in groups]
 
-    def _exchanged(self, a: Side, b: Side) -> bool:
-        """Whether other eigenvalues may be negative after a step, by vectors: near rigid motions they are round-off."""
-        if not others_negative(a.spectrum, b.spectrum):
-            return False
-        before, after = (np.sort(s.spectrum.values[s.spectrum.negative].real) for s in (a, b))
-        if not self._parted or len(before) != len(after):
-            return True
-        return bool((abs(before - after) > SMALL * abs(before)).any())
+    def _vanishing(self, a: Side, b: Side, number: int) -> float:
+        """Load at which the real eigenvalue of this number vanishes: an end of the step where it does but for noise."""
+        sides = {a.load: a, b.load: b}
 
-    @staticmethod
-    def _pieces(a: Side, b: Side, between: list[float]) -> list[tuple[float, float]]:
-        """Ranges of the load between ``a`` and ``b``, in their order, without the loads ``between`` them.
+        def mu(load: float) -> float:
+            """Real eigenvalues near the origin, in ascending order, but for those that are zero at all loads."""
+            values = (sides.get(load) or self._side(a, load)).spectrum.values
+            real = values[values.imag == 0].real
+            return float(np.sort(real[np.argsort(abs(real), kind="stable")][self._still :])[number])
 
-        Where two negative eigenvalues collide, fewer are real on one side: what passes through zero has another number
-        in ascending order.
-        """
-        width, edges = b.load - a.load, [a.load]
-        for load in sorted(between, key=lambda x: abs(x - a.load)):
-            edges += [load - CLEAR * width, load + CLEAR * width]
-        edges.append(b.load)
-        return [(x, y) for x, y in zip(edges[::2], edges[1::2], strict=True) if (y - x) * width > 0]
-
-    def _diverging(self, a: Side, span: tuple[float, float], first: int, last: int) -> Findings:
-        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``.
-
-        At the loads of the ``span``, in the order of the sweep, so many are negative.
-        """
-        loads = sorted(span)
-        found: list[float] = []
-        for number in range(min(first, last), max(first, last)):
-
-            def mu(load: float, number: int = number) -> float:
-                return self._real(a, load)[number]
-
-            try:
-                found.append(self._zero(mu, loads[0], loads[1], self._side(a, loads[0]).spectrum.zero))
-                ends = min(abs(mu(loads[0])), abs(mu(loads[1])))
-                beyond = abs(mu(found[-1])) > max(ends, self.units.omega2)
-            except (ConvergenceError, IndexError, ValueError):
-                words = f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
-                return Findings(doubts=[words])
-            if beyond:  # a pole: of a rod whose mass is all at a few points, where these do not move
-                words = (
-                    f"At {self._load} = {found[-1]:.8g} an eigenvalue changes its sign through infinity, not zero: the "
-                    "motion there has no inertia; give the rod a mass along it."
-                )
-                return Findings(doubts=[words])
-        together: list[list[float]] = []
-        for load in sorted(found):
-            if together and abs(load - together[-1][0]) < TOGETHER * unit(load, one=self.units.load):
-                together[-1].append(load)
-            else:
-                together.append([load])
-        out = Findings()
-        for group in together:
-            try:
-                out.events.append(self._divergence(a, group, loads, 1 if last > first else -1))
-            except ConvergenceError as trouble:
-                out.doubts.append(str(trouble))
-        return out
-
-    def _zero(self, mu: Callable[[float], float], low: float, high: float, noise: float) -> float:
-        """Load at which ``mu`` vanishes: a bound where it does there but for ``noise``: its sign says nothing then."""
-        for load in (low, high):
-            if abs(mu(load)) <= noise:
-                return load
-        return zero_between(mu, low, high, ROUND_OFF * max(abs(low), abs(high)))
+        low, high = sorted(sides)
+        try:
+            for load in (low, high):
+                if abs(mu(load)) <= sides[low].spectrum.zero:
+                    return load
+            found = zero_between(mu, low, high, ROUND_OFF * max(abs(low), abs(high)))
+            pole = abs(mu(found)) > max(min(abs(mu(low)), abs(mu(high))), self.units.omega2)
+        except (IndexError, ValueError) as trouble:
+            raise ConvergenceError(
+                f"Divergence between {low:.6g} and {high:.6g} could not be located: use a smaller range."
+            ) from trouble
+        if pole:  # of a rod whose mass is all at a few points, where these do not move
+            raise ConvergenceError(
+                f"At {self._load} = {found:.8g} an eigenvalue changes its sign through infinity, not zero: the motion "
+                "there has no inertia; give the rod a mass along it."
+            )
+        return found
 
     def _divergence(self, a: Side, loads: list[float], bounds: list[float], sign: int) -> Critical:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero.
@@ -259,29 +183,91 @@ class CriticalLoads:
         is within ``bounds``.
         """
         at, number = self._side(a, loads[0]), len(loads)
-        places = np.argsort(abs(at.spectrum.values), kind="stable")[: number + self._still].tolist()
-        cluster = cluster_at(self.eigensolver.at(at.x), at.spectrum, places)
+        places = np.argsort(abs(at.spectrum.values), kind="stable")[: number + self._still]
+        cluster = cluster_at(
+            self.eigensolver.at(at.x), at.spectrum, places[at.spectrum.values[places].imag >= 0.0].tolist()
+        )
         mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, self._still)
         load, uncertainty = interpolated_zero(mean, loads[0], self.units.load)
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
         inside = min(max(load, bounds[0]), bounds[1])
-        load, uncertainty = inside, uncertainty + abs(load - inside)
-        return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster, still=self._still)
-
-    def _real(self, a: Side, load: float) -> list[float]:
-        """Real eigenvalues at a load near the origin, in ascending order, but for those that are zero at all loads."""
-        values = self._side(a, load).spectrum.values
-        real = values[values.imag == 0].real.tolist()
-        return sorted(sorted(real, key=abs)[self._still :])
+        uncertainty += abs(load - inside)
+        return Critical(DIVERGENCE, inside, sign * number, uncertainty, 0.0, cluster, still=self._still)
 
 
-def _meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
+class Meeting(NamedTuple):
+    """A ``load`` at which eigenvalues of this ``mean`` may meet, or one may vanish."""
+
+    load: float
+    mean: float
+
+
+def meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
     """What comes near zero between a row and its neighbours."""
-    ratio = abs(before.load - row.load) / abs(behind.load - row.load)
-    return meetings(row.spectrum, before.spectrum, behind.spectrum, ratio)
+    mine, size = row.spectrum, row.spectrum.right.shape[0]
+    if not (mine.complete and before.spectrum.right.shape[0] == behind.spectrum.right.shape[0] == size):
+        return []  # too many to find all of them, or sections have mass at some loads only
+    count = len(mine.values)
+    if count > 12:
+        count = max(12, count // 2)
+        count += int(mine.values[count - 1].imag < 0.0)  # of a pair that comes first
+    first, back = _neighbour(mine, before.spectrum, count)
+    last, ahead = _neighbour(mine, behind.spectrum, count)
+    nu = np.array([first, mine.condensed.pairs.nu[:count], last])
+    t = abs(before.load - row.load) / abs(behind.load - row.load)
+    found = [
+        *_pairs(mine, nu, np.array([back * back.T, ahead * ahead.T]), t),
+        *_single(mine, nu, t),
+    ]
+    return [Meeting(row.load + at * (behind.load - row.load), mean) for at, mean in found]
 
 
-def _move(low: Side, row: Side, high: Side, mean: float) -> float:
-    """Change of the load from a row to where eigenvalues about a ``mean`` meet within its neighbours; zero for none."""
-    found = [m for m in _meetings(low, row, high) if abs(m.mean - mean) < SAME * abs(mean)]
-    return min((m.t * (high.load - row.load) for m in found), key=abs, default=0.0)
+def _neighbour(row: Spectrum, other: Spectrum, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (k,) of a neighbour, as the row has them, and the change of ``Z^t T Y`` to it (k, k)."""
+    mine, there = row.condensed, other.condensed
+    left = times(mine.lower, mine.pairs.left[:count].T).T
+    places, others = assignment(-abs(left @ other.right))
+    matched = mine.pairs.nu[:count].astype(complex)
+    matched[places] = there.pairs.nu[others]
+    projected = left @ times(there.inverse, times(there.lower.T, row.right[:, :count]))
+    return matched, projected - np.diag(mine.pairs.nu[:count])
+
+
+def _pairs(row: Spectrum, nu: np.ndarray, products: np.ndarray, t: float) -> list[tuple[float, float]]:
+    """Where pairs come near one another, two real ones or a complex one and its conjugate, and their means."""
+    count = nu.shape[1]
+    values, noise, right = row.values[:count], row.condensed.pairs.noise[:count], row.condensed.pairs.right[:, :count]
+    i, j = np.triu_indices(count, 1)
+    one = abs((right.conj().T @ right)[i, j]) ** 2 > ONE
+    real, apart = (values.imag[i] == 0.0) & (values.imag[j] == 0.0), abs(nu[1, i] - nu[1, j])
+    size = np.minimum(abs(nu[1, i]), abs(nu[1, j]))
+    multiple = (apart < ALIKE * size) & ~one
+    alone = ~np.isin(np.arange(count), [*i[multiple], *j[multiple]])
+    conjugate = (values.imag[i] != 0.0) & (abs(nu[1, i] - nu[1, j].conj()) < ALIKE * size)
+    D = np.where(real, 1.0, -1.0) * ((nu[:, i] - nu[:, j]) ** 2).real / 4.0
+    rounded = (CLEAR * np.maximum(noise[i], noise[j])) ** 2
+    coupled = (products[:, i, j].real < -rounded) | one | conjugate
+    coupled &= (apart < SMALL * size) & (real | conjugate) & alone[i] & alone[j] & (D[[0, 2]] > rounded).all(axis=0)
+    return [(at, float((values[i[n]] + values[j[n]]).real / 2)) for n, at in _lowest(D, t, coupled)]
+
+
+def _single(row: Spectrum, nu: np.ndarray, t: float) -> list[tuple[float, float]]:
+    """Where eigenvalues come near zero, and do not pass through it, and what they are at the row."""
+    real = np.flatnonzero(row.values[: nu.shape[1]].imag == 0.0)
+    mu = row.condensed.shift + 1.0 / nu[:, real].real
+    ends = (mu[0] * mu[2] > 0.0) & (np.minimum(abs(mu[0]), abs(mu[2])) > row.zero / row.one)
+    found = _lowest(np.sign(mu[0]) * mu, t, np.array([ends, ends]))
+    return [(at, float(row.values[real[n]].real)) for n, at in found]
+
+
+def _lowest(f: np.ndarray, t: float, allowed: np.ndarray) -> list[tuple[int, float]]:
+    """Where parabolas through ``f`` (3, k), at ``-t``, 0 and 1, are lowest near zero, as ``allowed``: column, place."""
+    back, ahead = (f[1] - f[0]) / t, f[2] - f[1]
+    bend = (ahead - back) / (1.0 + t)
+    slope = ahead - bend
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = np.where(bend > 0.0, -slope / (2.0 * bend), np.inf)
+        low = f[1] + at * (slope + at * bend)
+    ends = np.minimum(f[0], f[2])
+    inside = (-t < at) & (at < 1.0) & np.where(at >= 0.0, allowed[1], allowed[0]) & (ends > 0.0)
+    return [(int(n), float(at[n])) for n in np.flatnonzero(inside & (low < 0.7 * ends))]

@@ -1,4 +1,4 @@
-"""The whole picture: branches of equilibria with the solvers of their meshes, and all that can be asked of them."""
+"""The whole picture: tracing a scene, without a file or a line of output, and all that can be asked of its diagram."""
 
 from __future__ import annotations
 
@@ -12,16 +12,26 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
+from mpi4py import MPI
+
+from rodfem import compat
+from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch import LAWS, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
-from rodfem.continuation.observer import Remark
+from rodfem.continuation.observer import Observer, Recorder, Remark
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.search import Coexisting, equilibria_at, with_copies
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
+from rodfem.diagram.equilibria import check_start
+from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.plan import EQUATIONS, Plan, entries, plan_of
+from rodfem.diagram.solver import MESH, METHOD, POINT, RANKS, SCENE, Solver, state_of
+from rodfem.diagram.sweep import Sweep, mesh_of_frequencies
 from rodfem.errors import InputError
+from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
+from rodfem.fem.fingerprint import fingerprint
+from rodfem.fem.shape import compile_richer
 from rodfem.libraries import optional
 from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
@@ -30,8 +40,10 @@ from rodfem.output.table import REMARK
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
-from rodfem.ranks import on_first
+from rodfem.problem.validation import FLEXIBLE, round_off_of_strains, statement
+from rodfem.ranks import agree, end_together, on_first
 from rodfem.stability.assessment import Verdict
+from rodfem.stability.nonsymmetric import FREQUENCIES
 from rodfem.timing import Clock
 from rodfem.whole_files import PICTURES, draft_of, locked, picture_at
 
@@ -241,8 +253,6 @@ class Diagram:
         ``changes`` are fields of :class:`~rodfem.Plan`, or constants of the scene, which share its forms.  The mesh
         stays unless one is given, or an accuracy.  Raises :class:`~rodfem.errors.InputError` for any other change.
         """
-        from rodfem.diagram.trace import trace
-
         system, plans = self.solvers[0].system, [f.name for f in fields(Plan)]
         in_plan = {name: changes.pop(name) for name in plans if name in changes}
         self._check_changes(in_plan, changes)
@@ -407,3 +417,113 @@ class Diagram:
         title = "".join(f"<th>{escape(name)}</th>" for name in head)
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         return f"<p>{escape(repr(self)[1:-1])}</p><table><thead><tr>{title}</tr></thead><tbody>{body}</tbody></table>"
+
+
+PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
+
+
+@checked(scene=SCENE, discretization=MESH, plan=PLAN, observer=a(Observer, "a rodfem.Observer"), comm=RANKS)
+def trace(
+    scene: Scene,
+    discretization: Discretization | None = None,
+    plan: Plan | None = None,
+    observer: Observer | None = None,
+    *,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    **of_plan: Any,
+) -> Diagram:
+    """Trace the equilibria of a scene and decide the stability of each; collective over the ranks of ``comm``.
+
+    Conservative scenes are followed by continuation, from branch to branch; of loads without a potential the range is
+    swept, and frequencies are computed.
+
+    Parameters
+    ----------
+    scene
+        The rod.
+    discretization
+        Elements and degree, by default 8 elements of degree 6; where the plan has an accuracy few elements to start
+        with.
+    plan
+        What is explored, by default the scene's range to a depth of 2; its fields may be given instead, as
+        ``of_plan``: ``trace(scene, depth=1, at=(0.5,))``.
+    observer
+        What hears of the progress; by default nothing does.
+    comm
+        Ranks that share the rod.
+
+    Returns
+    -------
+    diagram
+        Branches, special points and solvers; its ``warnings`` say what could not be decided.
+
+    Raises
+    ------
+    InputError
+        For bad input, before any computation.
+    ConvergenceError
+        Where not even a first equilibrium is found.
+
+    An error after the first branch was begun, or an interrupt, carries the branches so far in its attribute
+    ``diagram``.  On several ranks one that nobody catches ends all ranks, which would wait for the one that fails; so
+    does the end of what started them (:func:`rodfem.ranks.end_together`).
+    """
+    plan = plan_of(plan, of_plan)
+    diagram = traced(scene, discretization or Discretization(), plan, observer or Observer(), comm)
+    diagram.complete = True
+    return diagram
+
+
+def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: Observer, comm: MPI.Comm) -> Diagram:
+    """Trace a ``scene`` as :func:`trace` does: the diagram is not yet ``complete``, as a run has more to do."""
+    end_together()
+    if comm.size > 1:
+        agree(comm, scene=statement(scene), discretisation=discretization, plan=entries(plan, scene))
+    plan.check(scene, discretization)
+    recorder, clock = Recorder(observer), Clock()
+    with form_compiler.announce_compilation(recorder.compiling) as compiled:
+        with clock("setup"):
+            mesh = _mesh(scene, discretization, plan, recorder, comm)
+            found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
+            if plan.accuracy is None:
+                check_start(found, plan.over(scene), recorder.warn)
+        asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
+        recorder.system(found.system, plan.accuracy)
+        if doubt := round_off_of_strains(scene):
+            recorder.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
+            plan = replace(plan, error_bars=False)  # two meshes have that round-off alike: no bar would hold it
+        elif plan.error_bars and (doubt := found.system.equations.known.rough()):
+            recorder.warn(doubt)
+        if compiled and plan.error_bars and form_compiler.ALONE:
+            compile_richer(found.system)
+
+        def complete() -> None:
+            compat.destroy_garbage(comm)
+            recorder.complete(diagram)
+
+        explorer = Explorer if found.conservative else Sweep
+        tracer = explorer(found, plan, recorder, complete)
+        diagram = Diagram(scene, plan, tracer.branches, tracer.solvers)
+        diagram.warnings, diagram.notes, diagram.asked = recorder.warnings, recorder.notes, asked
+        try:
+            tracer.run()
+        except BaseException as trouble:  # an interrupt, too: nothing that has been computed is lost
+            if diagram.branches:
+                trouble.diagram = diagram  # type: ignore[attr-defined]
+                trouble.add_note("The branches traced before are in the attribute `diagram` of this error.")
+            raise
+    return diagram
+
+
+def _mesh(
+    scene: Scene, discretization: Discretization, plan: Plan, observer: Observer, comm: MPI.Comm
+) -> Discretization:
+    """Discretisation as given, or for the accuracy of the plan: to start with, or of a whole sweep."""
+    if plan.accuracy is None or discretization.vertices is not None:
+        return discretization
+    if scene.conservative:
+        mesh = start_mesh(scene, discretization.formulation, plan.accuracy, comm)
+    else:
+        mesh, change = mesh_of_frequencies(scene, discretization.formulation, plan, plan.accuracy, comm)
+        observer.frequency_mesh(mesh, plan.spectrum or FREQUENCIES, change, plan.accuracy)
+    return replace(mesh, factors=discretization.factors)

@@ -1,4 +1,4 @@
-"""Whether two points of a diagram are one, neighbours, or mirror images; and the image of a whole branch.
+"""Whether two points of a diagram are one, neighbours, or mirror images; where a branch closes, or meets another one.
 
 Points are compared by what no symmetry of the rod changes: load, energy and stretch.  Two sides of a pitchfork may be
 mirror images in their plane, and differ in what they do across it: then no symmetry of the rod carries one into the
@@ -11,20 +11,22 @@ shows that image where its ordinate has the opposite sign.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
-from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.deflation.discrete_symmetries import candidates, mirrors
+from rodfem.diagram.events import Step
 from rodfem.errors import ConvergenceError
 from rodfem.problem.units import Units
 from rodfem.stability.inertia import NULL, Factored
-from rodfem.tolerances import LOCATED, NEGLIGIBLE, SAME_STATE, unit
+from rodfem.tolerances import LOCATED, NEGLIGIBLE, SAME_SPECIAL, SAME_STATE, unit
 
 STEP = 0.05
 """Change of load and energy in a step of a branch, relative to values greater than the rod's units."""
@@ -154,3 +156,55 @@ def _sampled(branch: Branch, solver: BranchSolver) -> tuple[list[Point], float]:
     points = [point for point in branch.points if point.mesh == solver.mesh]
     chosen = [points[round(share * (len(points) - 1))] for share in SHARES] if points else []
     return chosen, max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])
+
+
+def loop_end(branch: Branch, step: Step, width: float, here: Callable[[Point], Point], alike: Alike) -> Point | None:
+    """Last point of a ``branch`` that is back at its beginning in a ``step``; None if it is not.
+
+    It is the very state that the branch begins with.  One that leaves a branch point, a singular state, comes back to
+    its first row; where loads are equal, within the ``width`` of their range, it ends with the step.
+    """
+    if len(branch.points) < 12:
+        return None
+    solver, a, b = step.solver, step.a, step.b
+    if max(abs(a.slope), abs(b.slope)) < VERTICAL * width:  # equal loads: compare the states
+        passed = solver.system.distance(b.x, here(branch.points[0]).x) < b.arclength - a.arclength
+        return b if passed else None
+    first = branch.points[0 if branch.parent is None else 1]
+    passes = min(a.load, b.load) <= first.load <= max(a.load, b.load) and a.load != b.load and a.slope * first.slope > 0
+    if not (passes and near(first, a, solver.units, 4)):
+        return None
+    try:
+        point = Arc(solver, a, b).at_load(first.load)
+    except ConvergenceError:  # near a fold, say: not there
+        return None
+    return point if alike(point, first, SAME_STATE) else None
+
+
+def connection(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:
+    """Recognise a ``special`` point that one of the ``branches`` has; a reason if the ``branch`` ends there."""
+    from_the_side, where = special.test_function == "slope", f"at {load} = {special.point.load:.8g}"
+    found = next(_known(branch, special, branches, alike), None)
+    if found is None:
+        return f"meets another branch {where}" if from_the_side else ""
+    other, i = found
+    special.connects_to = (other.name, i)
+    special.switched = other.special[i].switched = True
+    if branch.parent == special.connects_to:
+        return "closed loop"
+    if not from_the_side and other.special[i].test_function == "slope":
+        return ""  # the branch on which the known one ended: it goes on
+    return f"meets {other.name} {where}"
+
+
+def _known(
+    branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike
+) -> Iterator[tuple[Branch, int]]:
+    """Yield where a ``special`` point of a ``branch`` is known: a branch, and the number of the point on it."""
+    for other in branches:
+        # a neighbour on this branch is another point: of a nearly double eigenvalue
+        until = special.point.arclength - 0.5 if other is branch else inf
+        for i, known in enumerate(other.special):
+            at = known.point
+            if known.kind.branches and at.arclength <= until and alike(at, special.point, SAME_SPECIAL):
+                yield other, i

@@ -1,28 +1,85 @@
-"""The events that a plan asks for, step by step along a branch: zeros of the cubic of a number of the state.
+"""What a plan asks for in a step of a branch: its loads, and its events, zeros of the cubic of a number of the state.
 
 An event at a row is a special point of the step that ends there, or of the first one of a branch that begins there:
 unless that is a branch point of another one, or the state at which a closed branch began.  A number that is zero at
 both ends of a step is zero along it, and has no special points there.
+
+Folds and branch points are zeros of eigenvalues, whose number the index tells
+(:mod:`rodfem.diagram.special_search`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
+from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.branch_solver import between
+from rodfem.continuation.branch_solver import BranchSolver, between
 from rodfem.continuation.event_piece import End, EventPiece, end
-from rodfem.continuation.kinds import EVENT
-from rodfem.continuation.observer import Remark
-from rodfem.diagram.finders import Step
+from rodfem.continuation.kinds import EVENT, USER
+from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
+from rodfem.problem.events import Event
 from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
     from rodfem.continuation.crossings import Node
-    from rodfem.continuation.observer import Observer
-    from rodfem.diagram.plan import Plan
+
+
+class Step(NamedTuple):
+    """From a point ``a`` of a branch to the next, ``b``, both on the mesh of a ``solver``.
+
+    ``singular`` has the folds and branch points between them; the branch ``begins`` at ``a``, or has come there; it is
+    ``closed`` at ``b``, a state that has been examined as its beginning.
+    """
+
+    solver: BranchSolver
+    a: Point
+    b: Point
+    singular: Sequence[SpecialPoint] = ()
+    begins: bool = False
+    closed: bool = False
+
+    def pieces(self) -> Iterator[Arc]:
+        """Arcs between ``a``, the folds and branch points, and ``b``: the load is monotone along each."""
+        between = (s.point for s in self.singular if s.point.arclength > self.a.arclength)
+        return (Arc(self.solver, p, q) for p, q in pairwise([self.a, *between, self.b]))
+
+    def up_to(self, bounds: tuple[float, float]) -> Step:
+        """The step up to where its load leaves the ``bounds`` for the first time, at one of the singular points."""
+        low, high = bounds
+        arc = next(arc for arc in self.pieces() if not low <= arc.b.load <= high)
+        last = arc.at_load(low if arc.b.load < low else high)
+        before = [s for s in self.singular if self.a.arclength < s.point.arclength < last.arclength]
+        return self._replace(b=last, singular=before, closed=False)
+
+
+def at_loads(step: Step, loads: Sequence[float]) -> list[SpecialPoint]:
+    """Points at these loads in a step; at its first point, too, where a branch begins there.
+
+    A row at such a load is the point itself, and the branch has it once, unless it is a special point of another kind:
+    one at which an eigenvalue vanishes, in a step, or where a branch leaves another one.
+    """
+    found = [
+        step.a if step.a.zero <= step.b.zero else replace(step.a)
+        for load in loads
+        if step.begins and load == step.a.load
+    ]
+    found += [point for arc in step.pieces() for load in loads for point in _on(step, arc, load)]
+    return [step.solver.given(USER, point) for point in found]
+
+
+def _on(step: Step, arc: Arc, load: float) -> Iterator[Point]:
+    """The point at a load on an arc of the step, if there is one, without its beginning."""
+    if (arc.a.load - load) * (arc.b.load - load) < 0:
+        yield arc.at_load(load)
+    elif load == arc.b.load and arc.b is not step.b:
+        yield replace(arc.b)
+    elif load == arc.b.load and not step.closed:
+        yield arc.b
 
 
 class Events:
@@ -32,9 +89,8 @@ class Events:
     of steps on which it is zero.
     """
 
-    def __init__(self, plan: Plan) -> None:
-        """Nothing is known yet."""
-        self.events = tuple(plan.events)
+    def __init__(self, events: Sequence[Event]) -> None:
+        self.events = events
         self._open: dict[str, list[float]] = {}
         self._still: dict[str, list[float]] = {}
         self._last: tuple[Point, End] | None = None
@@ -48,12 +104,17 @@ class Events:
 
     def finish(self, observer: Observer) -> None:
         """Say where an event was not located, and where it is zero all along."""
-        for name, loads in self._open.items():
-            where = f"between loads {min(loads):.8g} and {max(loads):.8g}"
-            observer.warn(Remark(f"The event {name!r} was not located {where}: {SMALLER_STEPS}.", *loads))
-        for name, loads in self._still.items():
-            where = f"between loads {min(loads):.8g} and {max(loads):.8g}"
-            observer.note(Remark(f"  the event {name!r} is zero all along {where}: no special points", *loads))
+        words = (
+            (self._open, observer.warn, "The event {!r} was not located between loads {:.8g} and {:.8g}: {}."),
+            (
+                self._still,
+                observer.note,
+                "  the event {!r} is zero all along between loads {:.8g} and {:.8g}: no special points",
+            ),
+        )
+        for found, say, sentence in words:
+            for name, loads in found.items():
+                say(Remark(sentence.format(name, min(loads), max(loads), SMALLER_STEPS), *loads))
         self._open, self._still, self._last = {}, {}, None
 
     def _end(self, step: Step, row: Point) -> End:

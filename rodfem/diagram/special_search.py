@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -26,7 +27,6 @@ from rodfem.continuation.singular_points import (
     special_point,
     taut_where_it_turns,
 )
-from rodfem.diagram.shorter_steps import ShorterSteps, Unresolved
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
 DIP = 0.1
@@ -38,25 +38,27 @@ PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is taken to stay zero."""
 ASIDE = 0.02
 """Distance of a regular state from a singular one at the end of a piece, over the piece."""
+SHORTER, PARTS = 2, 8
+"""How many times steps are made shorter about one place of a branch, and by what factor."""
+
+
+class Unresolved(Exception):
+    """A piece of a branch is to be looked at again, with shorter steps."""
 
 
 class SpecialSearch:
     """Special points between the rows of one branch, and bounds of its steps.
 
-    Attributes
-    ----------
-    undecided
-        Number of eigenvalues that are zero at both ends of the last piece: those stay zero along the branch.
+    ``undecided`` eigenvalues are zero at both ends of the last piece: those stay zero along the branch.
     """
 
     def __init__(self, meshes: Meshes, gaps: Gaps, observer: Observer) -> None:
-        """Nothing is known about a branch before :meth:`begin`."""
         self.meshes, self.gaps, self.observer = meshes, gaps, observer
         self.undecided = 0
         self._open: list[Point] = []
         self._before: Point | None = None
         self._nearest = -inf
-        self._steps = ShorterSteps()
+        self._short: list[tuple[float, float, float]] = []  # from one arclength to another steps of at most this length
         self._condensations: dict[int, Condensation] = {}
         self._phi: np.ndarray | None = None
         self._mesh = -1
@@ -64,7 +66,7 @@ class SpecialSearch:
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
-        self._steps = ShorterSteps(short or inf, until)
+        self._short = [(-inf, until, short)]
         self.undecided, self._nearest, self._before = first.zero, -inf, None
         self._known.clear()
 
@@ -78,20 +80,26 @@ class SpecialSearch:
         return self._open[0].arclength
 
     def reach(self, point: Point) -> float:
-        """Largest step from a point: near gaps, and where a step was not explained, short ones."""
-        return min(self.gaps.reach(self.meshes.solvers[point.mesh], point), self._steps.reach(point))
+        """Largest step from a point: near gaps, and up to and in pieces that are to be resolved, short ones."""
+        s = point.arclength
+        ahead = [max(largest, since - s) for since, until, largest in self._short if s < until]
+        return min([self.gaps.reach(self.meshes.solvers[point.mesh], point), *ahead])
+
+    def _shorten(self, a: Point, b: Point) -> None:
+        """Ask for short steps from ``a`` to beyond ``b``, unless they are short already.
+
+        A piece is known for as long as the branch is followed: it may go back beyond one on account of another one.
+        """
+        first, last = a.arclength, b.arclength
+        if sum(-inf < since < last and first < until for since, until, _ in self._short) < SHORTER:
+            self._short.append((first, 2 * last - first, (last - first) / PARTS))
+            raise Unresolved
 
     def after(self, b: Point) -> list[SpecialPoint]:
-        """Special points that the row ``b`` shows, in order of arclength.
+        """Special points that the row ``b`` shows, in order; a singular row, of no index, waits for the next one.
 
-        At a singular row the index is not known: it waits for the next one.
-
-        Raises
-        ------
-        Gap
-            For one that an imperfection takes apart, unless it is known.
-        Unresolved
-            If shorter steps are to be tried.
+        Raises :class:`Gap` for one that an imperfection takes apart, unless it is known, and :class:`Unresolved` if
+        shorter steps are to be tried.
         """
         settled = self._open[0]
         if settled.mesh != b.mesh:
@@ -106,15 +114,6 @@ class SpecialSearch:
     def rest(self) -> list[SpecialPoint]:
         """Special points among the last rows of a branch that only its end shows: those of singular rows."""
         return self._shown(ended=True) if len(self._open) > 1 else []
-
-    def beyond(self, a: Point, b: Point) -> list[SpecialPoint]:
-        """Special points between a row and a point past the end of its branch."""
-        return self._between(a, b, ended=True)
-
-    def _forget(self) -> None:
-        self._nearest = -inf
-        self._phi = None
-        self._known.clear()
 
     def _on(self, point: Point) -> Condensation:
         if point.mesh not in self._condensations:
@@ -135,14 +134,12 @@ class SpecialSearch:
         return found
 
     def _reduced(self, row: Point) -> ReducedStiffness:
-        known = self._known.get(id(row))
-        if known is None:
-            assert self._phi is not None
-            assert row.tangent is not None
-            known = self._known[id(row)] = row, self._on(row).at(row.x, row.tangent, self._phi)
+        if id(row) not in self._known:
+            assert self._phi is not None and row.tangent is not None
+            self._known[id(row)] = row, self._on(row).at(row.x, row.tangent, self._phi)
             if len(self._known) > PATIENCE + 2:
                 del self._known[next(iter(self._known))]
-        return known[1]
+        return self._known[id(row)][1]
 
     def _nodes(self, a: Point, b: Point) -> tuple[Piece, Node, Node]:
         """The piece from ``a`` to ``b`` with its ends, and a border with all modes that pass zero between them.
@@ -151,18 +148,15 @@ class SpecialSearch:
         that does not serve, or it lacks one, it is made anew of the modes nearest zero: those of ``b``, else those
         where the index changes.
         """
-        phi = self._prepare(a)
-        piece, p, q = self._ends(a, b, phi)
-        if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) >= ROTATED:
-            self._known.clear()
-            self._phi = self._on(b).improved(max((p.kept.reduced, q.kept.reduced), key=lambda found: found.rotated))
-            piece, p, q = self._ends(a, b, self._phi)
+        piece, p, q = self._ends(a, b, self._prepare(a))
+        worst = max((p.kept.reduced, q.kept.reduced), key=lambda found: found.rotated)
+        if p.far == q.far and worst.rotated >= ROTATED:
+            piece, p, q = self._ends(a, b, self._border(self._on(b).improved(worst)))
         for halvings in HALVINGS:
             if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
                 break
-            self._forget()
-            self._phi = self._on(b).border(self._changing(piece, p, q, halvings))
-            piece, p, q = self._ends(a, b, self._phi)
+            self._nearest = -inf
+            piece, p, q = self._ends(a, b, self._border(self._on(b).border(self._changing(piece, p, q, halvings))))
         first, still = p.kept.reduced, min(n.kept.reduced.zero for n in (p, q))
         if still:
             values, vectors = np.linalg.eigh(first.H)
@@ -172,17 +166,21 @@ class SpecialSearch:
 
     def _prepare(self, row: Point) -> np.ndarray:
         """The border, on the mesh of a row, made there unless there is one."""
-        if self._mesh != row.mesh:
-            self._forget()
-            self._mesh = row.mesh
-        if self._phi is None:
-            self._phi = self._on(row).border(row.x)
+        if self._mesh != row.mesh or self._phi is None:
+            self._mesh, self._nearest = row.mesh, -inf
+            self._border(self._on(row).border(row.x))
+        assert self._phi is not None
         return self._phi
+
+    def _border(self, phi: np.ndarray) -> np.ndarray:
+        """Take another border."""
+        self._known.clear()
+        self._phi = phi
+        return phi
 
     def _ends(self, a: Point, b: Point, phi: np.ndarray) -> tuple[Piece, Node, Node]:
         piece = Piece(self.meshes.solvers[b.mesh], self._on(b), a, b, phi)
-        assert a.tangent is not None
-        assert b.tangent is not None
+        assert a.tangent is not None and b.tangent is not None
         return piece, piece.node(a.x, a.tangent, self._reduced(a)), piece.node(b.x, b.tangent, self._reduced(b))
 
     def _changing(self, piece: Piece, p: Node, q: Node, halvings: int) -> PETSc.Vec:
@@ -210,7 +208,7 @@ class SpecialSearch:
                 out.append(special)
                 continue
             if not ended:
-                self._steps.ask(a, b)
+                self._shorten(a, b)
             self.observer.warn(Remark(missing(a.load, b.load), a.load, b.load))
         for node in zeros.misses:
             self._missed(piece, node, resolved=ended)
@@ -259,9 +257,7 @@ class SpecialSearch:
         if found.size > found.noise:
             self._open_gap(piece, at, found, ended=ended)
             return None
-        special = special_point(piece, at, found, fold=False)
-        special.test_function = "slope"
-        return special
+        return replace(special_point(piece, at, found, fold=False), test_function="slope")
 
     def _located(self, piece: Piece, at: Candidate, *, turns: bool, ended: bool) -> SpecialPoint | None:
         """The fold or branch point of a crossing; None where there is no singular state.

@@ -2,51 +2,54 @@
 
 At each load the equilibrium is solved for, and all eigenvalues ``mu = omega^2`` that the mesh has are found
 (:mod:`rodfem.stability.spectrum`); the left-most ones are recorded.  Between loads critical ones are located
-(:mod:`rodfem.diagram.critical_loads`).
+(:mod:`rodfem.diagram.critical_loads`), whose errors a richer discretisation bounds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
-from math import isnan
+from dataclasses import replace
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.continuation.arc import lost_between
+from rodfem.adaptivity.error_estimate import OrdinateBound, bound
+from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.row_checks import RowCheck
-from rodfem.diagram.collisions import Critical, Side
+from rodfem.diagram.collisions import Critical, Mean, Measuring, Side, located_flutter, zero_near
 from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.doubts import Quadrature
 from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_first
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.sweep_errors import SweepErrors
-from rodfem.errors import ConvergenceError, SceneError, many
+from rodfem.errors import Argument, ConvergenceError, Remedy, SceneError, many
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.fem.shape import Transfer, halved, richer_system
+from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, without
-from rodfem.stability.cluster import Cluster
+from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.nonsymmetric import (
     FREQUENCIES,
     REAL,
     Frequencies,
-    NonsymmetricPencil,
     NonsymmetricSolver,
     begins_slowly,
     named,
 )
-from rodfem.tolerances import DRIFT, unit
+from rodfem.stability.spectrum import SHIFT
+from rodfem.tolerances import DRIFT, ROUND_OFF, round_off, unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
-ONE_LOAD = 1e-12
-"""Distance of two loads, over the greatest, up to which they are one: a step between them would be round-off."""
 
 
 class Row(NamedTuple):
@@ -61,18 +64,12 @@ class Sweep:
     """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
 
     def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
-        """Allocate the pencil on the mesh of the ``solver``; the ``plan``, of the loads, must have passed its check.
-
-        The ``observer`` hears of the progress, ``finished()`` is called at the end.
-        """
+        """Allocate the pencil on the mesh of the ``solver``; ``finished()`` is called at the end."""
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
+        self.solvers: Sequence[BranchSolver] = [solver]
         scene = solver.system.scene
         self.span, self.units, self._load = plan.over(scene), scene.units, scene.load
-        self._least = ONE_LOAD * max(map(abs, self.span))
-        self._asked = list[float]()
-        for load in plan.at:
-            known = (other for other in (*self.span, *self._asked) if abs(load - other) <= self._least)
-            self._asked.append(next(known, load))
+        self._asked = [self._known(load) for load in plan.at]
         self.eigensolver = NonsymmetricSolver(solver.system)
         self.number = plan.spectrum or FREQUENCIES
         self.curves = Curves(solver.system.comm)
@@ -81,11 +78,6 @@ class Sweep:
         self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._still = self.number  # frequencies that are zero at all loads
         self.branches: list[Branch] = []
-
-    @property
-    def solvers(self) -> Sequence[BranchSolver]:
-        """The one solver, as the points' mesh number 0 names it."""
-        return [self.solver]
 
     def run(self) -> list[Branch]:
         """Sweep, locate flutter, estimate errors."""
@@ -104,8 +96,7 @@ class Sweep:
         branch.renumber()
         if self.plan.error_bars:
             self._error_bars(branch)
-        Quadrature([self.solver], self.observer, self._load).examine(branch)
-        self._within_bars(branch)
+        Quadrature(self.solvers, self.observer, self._load).examine(branch)
         self.observer.finished(branch)
         if self._still:
             with without("Whether frequencies stay zero was not examined", comm, self.observer.warn):
@@ -114,6 +105,19 @@ class Sweep:
             self._asymmetry(last)
         self.finished()
         return self.branches
+
+    def _known(self, load: float, others: Sequence[float] = ()) -> float:
+        """An end of the range, or one of ``others``, from which a load differs by round-off; else that load."""
+        least = 1e-12 * max(map(abs, self.span))
+        return next((other for other in (*self.span, *others) if abs(load - other) <= least), load)
+
+    def _loads(self) -> tuple[list[float], list[float]]:
+        """Loads at which tables have corners, and all those of the sweep, in its order."""
+        a, b = self.span
+        stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
+        own = [self._known(load, self._asked) for load in (*np.linspace(a, b, LOADS).tolist(), *stops)]
+        loads = np.unique([*own, *self._asked]).tolist()
+        return stops, loads if a < b else loads[::-1]
 
     def _sweep(self, branch: Branch) -> str:
         """Compute the points of a branch, load by load, and the special points between them; why it ends early."""
@@ -134,38 +138,14 @@ class Sweep:
             self._take(branch, latest)
             for load in loads[1:]:
                 state = steps.to(load)
-                if why := self._lost_convexity(latest.x, state) or self._dependent(state):
+                if why := self.solver.lost_convexity(state) or self._dependent(state):
                     return why
                 if load in stops:
                     steps.known = steps.known[-1:]
-                latest = self._point(state)
-                self._take(branch, latest)
+                self._take(branch, self._point(state))
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._close(branch, None)
         return ""
-
-    def _loads(self) -> tuple[list[float], list[float]]:
-        """Loads at which tables have corners, and all those of the sweep, in its order."""
-        a, b = self.span
-        stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
-        own = np.unique([*np.linspace(a, b, LOADS), *stops])
-        apart = [load for load in own if all(abs(load - at) > self._least for at in self._asked)]
-        loads = np.unique([*apart, *self._asked]).tolist()
-        return stops, loads if a < b else loads[::-1]
-
-    def _lost_convexity(self, a: PETSc.Vec, b: PETSc.Vec) -> str:
-        """Why a sweep ends between the equilibria ``a`` and ``b``; empty where the stored energy stays convex."""
-        solver = self.solver
-
-        def state(t: float) -> PETSc.Vec:
-            return a * (1.0 - t) + b * t
-
-        def holds(t: float) -> bool:
-            x = b if t == 1.0 else at_load(solver, a, solver.system.scalar(state(t)))
-            return not solver.lost_convexity(x)
-
-        lost = lost_between(solver.convexity, state, holds)
-        return "" if lost is None else solver.not_convex(state(lost))
 
     def _dependent(self, x: PETSc.Vec) -> str:
         """Why a sweep ends before ``x``: constraints depend on one another, as of a rod pulled taut; empty if not."""
@@ -182,8 +162,7 @@ class Sweep:
         """Find the eigenvalues of the next row; the step before the last one can be taken then."""
         for notice in self.solver.notices():
             self.observer.warn(notice)
-        pencil = self.eigensolver.at(point.x)
-        row = Row(point, Side(point.load, point.x, pencil.spectrum), self._named(pencil))
+        row = self._row(point)
         self._close(branch, row)
         self._rows = [*self._rows[-1:], row]
 
@@ -200,9 +179,11 @@ class Sweep:
             self._special(branch, self.solver.given(USER, row.point))
         self.observer.progress(branch, row.point)
 
-    def _named(self, pencil: NonsymmetricPencil) -> Frequencies:
-        """The left-most frequencies of a state with the names of those that are recorded."""
-        return named(pencil.system, pencil.leftmost(self.number), pencil.turned, self.number)
+    def _row(self, point: Point) -> Row:
+        """A point with all its eigenvalues, and its left-most frequencies with the names of those that are recorded."""
+        pencil = self.eigensolver.at(point.x)
+        found = named(pencil.system, pencil.leftmost(self.number), pencil.turned, self.number)
+        return Row(point, Side(point.load, point.x, pencil.spectrum), found)
 
     def _family(self, last: Point) -> None:
         """Say which frequencies are zero at all loads, to which the ``last`` one belongs, too, without a symmetry.
@@ -238,8 +219,8 @@ class Sweep:
 
     def at(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""
-        point, pencil = self._point(x), self.eigensolver.at(x)
-        self._record(Row(point, Side(point.load, x, pencil.spectrum), self._named(pencil)), on_the_way=False)
+        point = self._point(x)
+        self._record(self._row(point), on_the_way=False)
         return point
 
     def _point(self, x: PETSc.Vec) -> Point:
@@ -289,34 +270,36 @@ class Sweep:
     def _between(self, branch: Branch, first: Row, second: Row, following: Row | None) -> None:
         """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
         a, b, behind = first.point, second.point, following and following.side
-        exact = min(first.found.still(), second.found.still())
+        still = min(first.found.still(), second.found.still())
         with self.solver.system.clock.scope("location"):
-            findings = self.critical.between(first.side, second.side, behind, exact)
-        events, negative = findings.events, a.negative
-        explained = negative + sum(e.change for e in events) + findings.entered == b.negative
-        in_all = explained and {e.kind for e in events} == {FLUTTER}  # of all eigenvalues that are recorded
+            events = self.critical.between(first.side, second.side, behind, still)
+        negative = a.negative
+        explained = negative + sum(event.change for event in events) == b.negative
+        in_all = explained and {event.kind for event in events} == {FLUTTER}  # of all eigenvalues that are recorded
         for event in events:
             after = b.negative if in_all and event is events[-1] else negative + event.change
-            self._critical(branch, event, (a, b), (negative, after))
+            if event.cluster is not None:
+                self._critical(branch, event, (a, b), (negative, after))
+            elif event.change > 0:
+                report = self.observer.note if a.negative else self.observer.warn
+                words = (
+                    f"{event.change} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at "
+                    f"{a.load:.6g} by no more than round-off: the rows before, which count {a.negative}, may count too "
+                    "few."
+                )
+                report(Remark(words, a.load, b.load))
             negative = after
         if not explained:
             change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
             branch.unexplained.append(change)
             self.observer.warn(Remark(str(change), a.load, b.load))
-        elif findings.entered > 0:  # of unstable rows only the number is in doubt
-            report = self.observer.note if a.negative else self.observer.warn
-            words = (
-                f"{findings.entered} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at "
-                f"{a.load:.6g} by no more than round-off: the rows before, which count {a.negative}, may count too few."
-            )
-            report(Remark(words, a.load, b.load))
 
     def _critical(self, branch: Branch, event: Critical, ends: tuple[Point, Point], negative: tuple[int, int]) -> None:
         """Take a critical load between two rows into a branch, at which the number of unstable eigenvalues changes."""
         row = next((end for end in ends if end.load == event.load), None)
         point = row or self.at(at_load(self.solver, ends[0].x, event.load))
-        if event.cluster is not None:
-            self._name(point, event.cluster, event.cluster.size - event.still)
+        assert event.cluster is not None
+        self._name(point, event.cluster, event.cluster.size - event.still)
         if event.kind == DIVERGENCE and (zero := point.negative - min(negative)) > 0:
             point.negative, point.zero = point.negative - zero, point.zero + zero
         special = SpecialPoint(event.kind, point, *negative, event.uncertainty, omega2=event.omega2)
@@ -324,25 +307,6 @@ class Sweep:
         if row is None:
             branch.points.append(point)
         self._special(branch, special)
-
-    def _within_bars(self, branch: Branch) -> None:
-        """Say of which frequencies that meet, and part at the next special point, that is not known.
-
-        Where two pass one another, of motions in two planes, round-off makes a complex pair of them for a while: the
-        two loads differ by less than their bars, or what their location leaves open.  At one load frequencies are
-        double whatever the mesh.
-        """
-        for s, t in pairwise(branch.special):
-            changes = [x.negative_after - x.negative_before for x in (s, t)]
-            bars = [x.located_to if isnan(x.error_estimate) else x.error_estimate for x in (s, t)]
-            apart = abs(s.point.load - t.point.load)
-            if s.kind == t.kind == FLUTTER and sum(changes) == 0 and 0 < apart <= sum(bars):
-                what, loads = "meet" if changes[0] > 0 else "part", f"{s.point.load:.8g} and {t.point.load:.8g}"
-                words = (
-                    f"Whether frequencies {what} between {self._load} = {loads} is not known: these loads differ by "
-                    "less than their bars. Use another mesh, without very short elements."
-                )
-                self.observer.warn(Remark(words, s.point.load, t.point.load))
 
     def _name(self, point: Point, cluster: Cluster, number: int) -> None:
         """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one."""
@@ -365,3 +329,108 @@ class Sweep:
                     errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
+
+
+class SweepErrors:
+    """Estimates the errors of special points on the mesh of one solver, over a ``span`` of loads."""
+
+    def __init__(self, solver: BranchSolver, span: tuple[float, float]) -> None:
+        """Make the richer discretisation."""
+        self.solver, self.span, self.units = solver, span, solver.system.scene.units
+        system = solver.system
+        self.richer = BranchSolver(richer_system(system))
+        self.eigensolver = NonsymmetricSolver(self.richer.system)
+        self.transfer = Transfer(system, self.richer.system)
+        self.rho = halved(system.fields.discretization.degree)
+        self.ordinate = OrdinateBound(solver.shape, self.richer.shape)
+
+    def estimate(self, s: SpecialPoint) -> None:
+        """Set all error bars of a special point, or none: then raises :class:`~rodfem.errors.ConvergenceError`."""
+        point, rho = s.point, self.rho
+        guess = self.transfer(point.x, state=True)
+        x = at_load(self.richer, guess, point.load)
+        left = round_off(point.ordinate, self.units.ordinate)
+        of_ordinate = of_load = self.ordinate(point.x, x, left, rho)
+        if s.cluster is not None:
+            measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._cluster(s.cluster)
+            if s.kind == FLUTTER:
+                load, left = self._flutter(measured, cluster, s)
+            else:
+                still = cluster.size - abs(s.negative_after - s.negative_before)
+                load, left = zero_near(Mean(measured, cluster, still), point.load, self.units.load)
+                left = max(left, s.located_to)
+            of_load = max(bound(point.load, load, left, rho), s.located_to)
+            of_ordinate += self._moved(x, point.load, of_load)
+        s.error_estimate, s.ordinate_error = of_load, of_ordinate  # none of them where one is not estimated
+
+    def _moved(self, x: PETSc.Vec, load: float, bar: float) -> float:
+        """Change of the ordinate from ``x``, at a load, on over the ``bar`` of that, up to half of the range."""
+        low, high = sorted(self.span)
+        step = min(bar, (high - low) / 2) * (1.0 if load < (low + high) / 2 else -1.0)
+        moved = at_load(self.richer, x, load + step)
+        return abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))
+
+    def _cluster(self, cluster: Cluster) -> Cluster:
+        """A cluster on the richer discretisation."""
+        vectors = as_vectors(self.solver.system, cluster.basis)
+        columns = [self.transfer(v, state=False).array_r.real for v in vectors]
+        return Cluster(np.stack(columns, axis=1), cluster.mean)
+
+    def _flutter(self, measured: Measuring, cluster: Cluster, s: SpecialPoint) -> tuple[float, float]:
+        """Flutter load on the richer discretisation and its uncertainty there; sets the error of the eigenvalue."""
+        load, left, doubt = s.point.load, 0.0, 0.0
+        if s.note:  # double there, whatever the mesh
+            mu = measured(load, cluster).cluster.mean
+        else:
+            width = 0.01 * max(abs(load), abs(self.span[1] - self.span[0]))
+            located = located_flutter(measured, cluster, load, width)
+            load, left = located.load, located.uncertainty
+            mu, doubt = located.cluster.mean, located.mean_uncertainty
+        s.omega2_error = bound(s.omega2, mu, max(doubt, 10.0 * abs(mu) * ROUND_OFF), self.rho)
+        return load, left
+
+
+def mesh_of_frequencies(
+    scene: Scene, formulation: str, plan: Plan, accuracy: float, comm: MPI.Comm
+) -> tuple[Discretization, float]:
+    """Discretisation on which frequencies change by less than the accuracy if it is refined, and by how much.
+
+    The change is relative (to one, for values mu = omega^2 smaller than that).  Flutter loads depend on two frequencies
+    that are near each other: these are to be ten times better.  Where refinement ceases to help, at round-off, the
+    best mesh is returned; coarse ones do not see all yet.
+    """
+    loads, number = np.linspace(*plan.over(scene), 3), plan.spectrum or FREQUENCIES
+    mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
+    system = System(scene, mesh, comm)
+    values, symmetries = _frequencies(system, loads, number), system.symmetries
+    best, least, worse = mesh, np.inf, 0
+    for _ in range(8):
+        finer = replace(mesh, elements=ceil(1.5 * mesh.elements))
+        richer = _frequencies(System(scene, finer, comm, symmetries=symmetries), loads, number)
+        change = max(_change(v[:number], w, scene.units.omega2) for v, w in zip(values, richer, strict=True))
+        best, least, worse = (mesh, change, 0) if change < least else (best, least, worse + 1)
+        if worse >= (3 if least > 1e-6 else 1) or least < accuracy / 10:
+            break
+        mesh, values = finer, richer
+    return best, least
+
+
+def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndarray]:
+    """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
+    solver = BranchSolver(system)
+    eigensolver = NonsymmetricSolver(solver.system)
+    x, _ = first_state(solver, float(loads[0]))
+    found = []
+    for load in loads:
+        x = at_load(solver, x, float(load))
+        values = eigensolver.at(x).near(number + 2, SHIFT * system.scene.units.omega2).values
+        found.append(values[np.argsort(abs(values))][: number + 2])
+    if min(map(len, found)) < number:
+        remedy = Remedy("ask for fewer ({})", Argument("Plan", "spectrum"))
+        raise ConvergenceError(f"The coarsest mesh has fewer than {number} frequencies", remedy)
+    return found
+
+
+def _change(values: np.ndarray, richer: np.ndarray, one: float) -> float:
+    """Largest distance of values from the nearest of the richer ones, relative to values greater than ``one``."""
+    return max(float(abs(richer - v).min() / unit(v, one=one)) for v in values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from functools import cache
 from math import isnan
 
 from rodfem.adaptivity.accuracy_control import AccuracyControl
@@ -18,14 +19,11 @@ from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.switching import FIRST
-from rodfem.diagram.branch_ends import connection, loop_end, point_past_end
 from rodfem.diagram.doubts import PersistentZeros, Quadrature
-from rodfem.diagram.equivalence import equivalent, image_of
-from rodfem.diagram.events import Events
-from rodfem.diagram.finders import Finder, RequestedLoads, Step
+from rodfem.diagram.equivalence import connection, equivalent, image_of, loop_end
+from rodfem.diagram.events import Events, Step, at_loads
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.shorter_steps import Unresolved
-from rodfem.diagram.special_search import SpecialSearch
+from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.ranks import as_failure, without
 from rodfem.tolerances import DRIFT, ROUND_OFF
@@ -38,9 +36,6 @@ REMEDIES = {
     ),
 }
 """What to try where a branch ends for a reason, by its words."""
-"""How the reason begins for which a branch ends that no step leads on from."""
-SAME_END = 1e-6
-"""A special point nearer to the end of the range than this, in spans, is the last state."""
 NEAR_START = 8
 """Steps of a branch that begins near another special point are as short as its first for so many times their length."""
 
@@ -49,28 +44,21 @@ class Tracer:
     """Traces branches one by one, each knowing those before it; ``finished`` is called after each that is complete."""
 
     def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
-        """Start with no branch, on the mesh of the ``solver``; the ``plan`` must have passed its :meth:`Plan.check`.
-
-        The ``observer`` hears of the progress.
-        """
+        """Start with no branch, on the mesh of the ``solver``; the ``plan`` must have passed its :meth:`Plan.check`."""
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.scene = solver.system.scene
         self.span = plan.over(self.scene)
         self.low, self.high = sorted(self.span)
         self.branches: list[Branch] = []
         self.meshes = Meshes(solver, plan.accuracy)
+        self.solvers: Sequence[BranchSolver] = self.meshes.solvers
         self.gaps = Gaps(self.meshes)
         self.zeros = PersistentZeros(observer, self.high - self.low)
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
-        self.finders: list[Finder] = [RequestedLoads(plan), Events(plan)]
-        self._checks: dict[int, RowCheck] = {}
+        self.events = Events(plan.events)
+        self._checks = cache(lambda mesh: RowCheck(self.meshes.solvers[mesh]))
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         self.quadrature = Quadrature(self.meshes.solvers, observer, self.scene.load)
-
-    @property
-    def solvers(self) -> Sequence[BranchSolver]:
-        """Solvers by the number of their mesh."""
-        return self.meshes.solvers
 
     def use(self, mesh: int) -> None:
         """Go on with the solver of that mesh."""
@@ -85,18 +73,16 @@ class Tracer:
         self.branches.append(branch)
         if branch.ended == NOT_TRACED:
             self.observer.branch(branch)
-        self._prepare(branch.points[-1].mesh)
-        if branch.parent:
-            self.zeros.damp(self.solver, branch.points[-1])
         self._attempt(branch)
         self._finish(branch)
 
-    def _prepare(self, mesh: int) -> None:
-        self.use(mesh)
+    def _attempt(self, branch: Branch) -> None:
+        """Follow a branch to its end, or to where that fails."""
+        self.use(branch.points[-1].mesh)
         self.control = AccuracyControl(self.meshes, (self.low, self.high))
         self.solver.damp(0)
-
-    def _attempt(self, branch: Branch) -> None:
+        if branch.parent:
+            self.zeros.damp(self.solver, branch.points[-1])
         try:
             with as_failure(self.solver.system.comm):
                 self._follow(branch)
@@ -112,7 +98,6 @@ class Tracer:
         """Follow a branch through a point, which has a tangent, in both directions, as one."""
         back = Branch(name, None, depth, [point.backwards(0.0)])
         self.observer.branch(back)
-        self._prepare(point.mesh)
         self._attempt(back)
         branch = back.backwards()
         if back.ended == "closed loop":
@@ -133,7 +118,7 @@ class Tracer:
                 self.control.row(history[-1], self.solver)
                 if not begun:
                     self._first_specials(branch)
-                    begun = True
+                begun = True
                 while not self._advance(branch, history):  # each time from where it has gone back to
                     pass
                 return
@@ -245,7 +230,7 @@ class Tracer:
 
     def _asked(self, step: Step) -> list[SpecialPoint]:
         """What the plan asks for in a step."""
-        return [special for finder in self.finders for special in finder.between(step)]
+        return at_loads(step, self.plan.at) + self.events.between(step)
 
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
@@ -319,24 +304,15 @@ class Tracer:
             branch.singular_start = extra
             self.observer.warn(Remark(branch.start_in_words(self.scene.load), first.load))
 
-    def _singular_end(self, branch: Branch, last: Point) -> None:
-        """Insert a branch point on the very end of the range, located on a piece of the branch that goes past it."""
-        previous = self.here(branch.points[-2])
-        try:
-            with self.solver.system.clock.scope("location"):
-                further = None if previous.x is last.x else point_past_end(self.solver, last, self.span)
-                found = [] if further is None else self.specials.beyond(previous, further)
-        except ConvergenceError as trouble:
-            where = f"{self.scene.load} = {last.load:g}"
-            words = f"The last state, at {where}, is singular, and was not resolved: {trouble}"
+    def _singular_end(self, branch: Branch) -> None:
+        """Say that a range ends at a singular state: a branch point there is not located, and not followed."""
+        last, before = branch.points[-1], branch.points[-2:-1]
+        located = any(s.point is last and s.kind.branches for s in branch.special)
+        if branch.ended == END_OF_RANGE and before and last.zero > before[0].zero and not located:
+            words = (
+                f"{branch.name} ends at a singular state, at {self.scene.load} = {last.load:.8g}: use a wider range."
+            )
             self.observer.warn(Remark(words, last.load))
-            return
-        width = SAME_END * (self.high - self.low)
-        for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
-            if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
-                branch.replace({id(last): special.point})
-            branch.insert(special)
-            self.observer.special(branch, special)
 
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
@@ -355,20 +331,15 @@ class Tracer:
             )
 
     def _check(self, point: Point) -> None:
-        if point.mesh not in self._checks:
-            self._checks[point.mesh] = RowCheck(self.meshes.solvers[point.mesh])
-        self._checks[point.mesh](point)
+        self._checks(point.mesh)(point)
 
     def _finish(self, branch: Branch) -> None:
-        for finder in self.finders:
-            finder.finish(self.observer)
+        self.events.finish(self.observer)
         branch.renumber()
         branch.explain()
         self._singular_start(branch)
+        self._singular_end(branch)
         last = branch.points[-1]
-        if branch.ended == END_OF_RANGE and last.zero > self.solver.system.active_drifts(last.x):
-            self._singular_end(branch, last)
-            last = branch.points[-1]
         if not any(s.point is last for s in branch.special if s.kind != USER):
             branch.special.append(self.solver.given(END, last))
             branch.renumber()

@@ -24,10 +24,9 @@ from scipy.special import ellipk
 from rodfem.app.run import run
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
-from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.diagram import Diagram, trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
-from rodfem.diagram.trace import trace
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.forms.energy import bending_and_twist

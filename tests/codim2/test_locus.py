@@ -30,9 +30,8 @@ from rodfem.codim2.locus import Locus
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.step_control import StepControl
-from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.diagram import Diagram, trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.forms import loads

@@ -10,9 +10,8 @@ import small_states
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.diagram import Diagram, trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.fem.symmetries import phase_at
 from rodfem.linalg.matrices import shared

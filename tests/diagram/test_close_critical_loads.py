@@ -7,7 +7,6 @@ its stiffness B2.  What the load does may be any function of a parameter, so tha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from math import sqrt
@@ -22,9 +21,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 from rodfem import Diagram, Plan, clamped, free
-from rodfem.continuation.observer import Observer
-from rodfem.diagram.sweep import Sweep
-from rodfem.diagram.trace import trace
+from rodfem.diagram.diagram import trace
 from rodfem.fem.fields import Discretization
 from rodfem.problem.scene import Scene
 
@@ -103,7 +100,6 @@ def humped(strong: float, top: float, curvature: float, span: tuple[float, float
 @pytest.mark.parametrize(
     ("top", "curvature"),
     [
-        *(pytest.param(*x, marks=pytest.mark.long) for x in ((1e-3, 1.0), (-1e-3, -1.0))),
         (1e-6, 1.0),
         (1e-3, 0.02),
         (-1e-6, -1.0),
@@ -119,12 +115,10 @@ def test_flutter_and_its_reverse_in_a_step(top: float, curvature: float, span: t
 
 @pytest.mark.long
 @pytest.mark.alone
-@pytest.mark.parametrize("top", [1e-12, -1e-2, -1e-8])
+@pytest.mark.parametrize("top", [-1e-2, -1e-8])
 def test_frequencies_that_nearly_meet(top: float) -> None:
-    """They flutter in a range of 2e-6, which round-off leaves open and which is said; or they do not meet."""
     diagram = in_steps(0.1, humped(10.0, top, 1.0, (4.0, 6.0)), None)
-    assert not specials(diagram[0], "flutter")
-    assert any("is not known" in said for said in diagram.warnings) == (top > 0)
+    assert not specials(diagram[0], "flutter") and not diagram.warnings
 
 
 def partly(P: float, mu: complex, share: float = SHARE) -> complex:
@@ -153,7 +147,6 @@ FLUTTERS = float(
         1.002,
         BACK / DIVERGES + 1e-3,
         FLUTTERS / DIVERGES,
-        *(pytest.param(x, marks=pytest.mark.long) for x in (1.035, FLUTTERS / DIVERGES + 1e-4)),
     ],
 )
 def test_flutter_and_divergence(strong: float, span: tuple[float, float]) -> None:
@@ -165,31 +158,3 @@ def test_flutter_and_divergence(strong: float, span: tuple[float, float]) -> Non
     adds_up(diagram)
     for a, b in pairwise(critical(diagram[0])):
         assert a[0] < b[0]
-
-
-@cache
-def beck() -> Diagram:
-    """Its first flutter load, without a bar."""
-    return in_steps(0.5, classics.beck(span=(15.0, 25.0)), error_bars=False)
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize(
-    ("apart", "bar", "before", "words"),
-    [(1e-7, 1e-6, 0, "meet"), (1e-7, 1e-6, 2, "part"), (1e-5, 1e-6, 0, ""), (1e-5, float("nan"), 0, "meet")],
-)
-def test_loads_within_their_bars(apart: float, bar: float, before: int, words: str) -> None:
-    """Of two that pass one another round-off makes a pair for a while; without bars their location counts."""
-    diagram = beck()
-    (flutter,) = diagram.special("flutter")
-    other = replace(flutter.point, load=flutter.point.load + apart)
-    both = [
-        replace(flutter, point=p, negative_before=n, negative_after=2 - n, error_estimate=bar, located_to=1e-5)
-        for p, n in ((flutter.point, before), (other, 2 - before))
-    ]
-    said: list[str] = []
-    sweep = Sweep(diagram.solvers[0], Plan(), Observer(), lambda: None)
-    sweep.observer.warn = said.append  # type: ignore[method-assign]
-    sweep._within_bars(replace(diagram[0], special=both))
-    assert [w for w in said if f"Whether frequencies {words} between P" in w] == (said if words else [])
-    assert len(said) == bool(words)

@@ -11,8 +11,8 @@ from problem.test_docs import scenes
 
 import rodfem
 from rodfem.deflation.discrete_symmetries import Mirror
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.output.plot_diagram import figure_of
 from rodfem.problem.scene import Ordinate, Scene

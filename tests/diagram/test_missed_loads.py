@@ -11,35 +11,15 @@ from typing import Any
 
 import classics
 import pytest
-from hard.thrusts import AT_ROW, BETWEEN, loads, peaked
+from hard.thrusts import AT_ROW, peaked
 from test_close_critical_loads import DIVERGES, FLUTTERS, SHARE
 
-from rodfem import Diagram, Plan, clamped, free
-from rodfem.diagram.trace import trace
+from rodfem import Plan, clamped, free
+from rodfem.diagram.diagram import trace
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
 
 FINE, COARSE = Discretization("pointwise", 4, 6), Discretization("pointwise", 2, 4)
-
-
-def near_its_greatest(
-    kind: str, top: float, at: float, mesh: Discretization, curvature: float = 1.0, *, error_bars: bool = True
-) -> Diagram:
-    """Rows every 0.1, as from 0 to 10, where the thrust is about as large as its greatest value."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rodfem.diagram.sweep.LOADS", 21)
-        return peaked(kind, top, at, mesh, curvature, (4.0, 6.0), error_bars=error_bars)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("at", [AT_ROW, BETWEEN])
-@pytest.mark.parametrize(("kind", "top"), [("late flutter", 5e-12), ("divergence", 1e-9), ("divergence", 1e-13)])
-def test_round_off_hides_two_loads(kind: str, top: float, at: float) -> None:
-    """It is said without another mesh, too: on this one flutter begins 5e-12 later than that of the column."""
-    diagram = near_its_greatest(kind, top, at, FINE, error_bars=False)
-    assert not [one for words in ("flutter", "divergence") for one in loads(diagram, words, at)]
-    assert ["is not known" in said for said in diagram.warnings] == [True]
 
 
 @pytest.mark.long

@@ -19,8 +19,8 @@ from scipy.optimize import brentq, fsolve
 from rodfem import Inertia, Ordinate, Plan, clamped, compat, everywhere, free
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.solver import Solver
-from rodfem.diagram.trace import trace
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
@@ -255,7 +255,7 @@ def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytes
     def lost(*given: object) -> object:
         raise ConvergenceError("There is none: use a smaller range.")
 
-    monkeypatch.setattr("rodfem.diagram.sweep_errors.located_flutter", lost)
+    monkeypatch.setattr("rodfem.diagram.sweep.located_flutter", lost)
     diagram = trace(classics.beck(span=(19.0, 21.0)), Discretization("pointwise", 4, 6))
     (point,) = specials(diagram[0], "flutter")
     assert np.isnan([point.error_estimate, point.ordinate_error]).all()

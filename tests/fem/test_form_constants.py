@@ -10,8 +10,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from rodfem import compat
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.fem import form_compiler
 from rodfem.fem.equations import with_constants
 from rodfem.fem.fields import Discretization

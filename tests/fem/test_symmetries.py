@@ -12,9 +12,9 @@ from hemitropic_cases import DEFAULT
 from hemitropic_cases import scene as hemitropic
 
 from rodfem.continuation.first_equilibrium import first_equilibrium
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import relax
 from rodfem.fem.shape import link

@@ -7,8 +7,8 @@ import pytest
 from hemitropic_cases import explored, follower, scene
 from mpi4py import MPI
 
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")

@@ -21,8 +21,8 @@ from mpi4py import MPI
 
 from rodfem import Ordinate, clamped, free
 from rodfem.continuation.branch import Branch
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.solver import Solver
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver

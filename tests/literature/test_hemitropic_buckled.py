@@ -14,8 +14,8 @@ from scipy.special import ellipe, ellipk
 
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from scipy.special import ellipe, ellipk
 
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.fem.shape import link
 from rodfem.file_format import LOCUS

@@ -22,8 +22,8 @@ from shooting_solver import Problem, Rod
 
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.problem.ends import Attachment, clamped, free, pinned, sliding
