@@ -19,9 +19,8 @@ from benchmarks.speed.scenes import loads, scene, value
 from benchmarks.targets import TARGETS
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.observer import Observer
-from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.diagram import Diagram, trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.diagram import trace
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 

@@ -14,8 +14,8 @@ from time import process_time
 
 from benchmarks.speed.branches import Timed
 from benchmarks.speed.scenes import scene
+from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
 from rodfem.problem.scene import Scene
 
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from math import isnan, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -142,14 +143,15 @@ class CriticalLoads:
 
     def _diverging(self, a: Side, b: Side, first: int, last: int) -> list[Critical]:
         """Loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
-        found = np.sort([self._vanishing(a, b, number) for number in range(min(first, last), max(first, last))])
-        apart = np.diff(found) >= TOGETHER * unit(found[0], one=self.units.load)
+        numbers = range(min(first, last), max(first, last))
+        found = np.sort([load for number in numbers if not isnan(load := self._vanishing(a, b, number))])
+        apart = np.diff(found) >= TOGETHER * unit(a.load, one=self.units.load)
         sign, bounds = 1 if last > first else -1, sorted((a.load, b.load))
         groups = np.split(found, np.flatnonzero(apart) + 1)
-        return [self._divergence(a, group.tolist(), bounds, sign) for group in groups]
+        return [self._divergence(a, group.tolist(), bounds, sign) for group in groups if len(group)]
 
     def _vanishing(self, a: Side, b: Side, number: int) -> float:
-        """Load at which the real eigenvalue of this number vanishes: an end of the step where it does but for noise."""
+        """Load at which the real eigenvalue of this number vanishes, at an end to round-off; nan for a pole."""
         sides = {a.load: a, b.load: b}
 
         def mu(load: float) -> float:
@@ -170,11 +172,11 @@ class CriticalLoads:
                 f"Divergence between {low:.6g} and {high:.6g} could not be located: use a smaller range."
             ) from trouble
         if pole:  # of a rod whose mass is all at a few points, where these do not move
-            raise ConvergenceError(
+            self.warn(
                 f"At {self._load} = {found:.8g} an eigenvalue changes its sign through infinity, not zero: the motion "
                 "there has no inertia; give the rod a mass along it."
             )
-        return found
+        return nan if pole else found
 
     def _divergence(self, a: Side, loads: list[float], bounds: list[float], sign: int) -> Critical:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero.
