@@ -31,8 +31,8 @@ from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_f
 from rodfem.diagram.plan import Plan
 from rodfem.errors import Argument, ConvergenceError, Remedy, SceneError, many
 from rodfem.fem.fields import Discretization
-from rodfem.fem.system import System
 from rodfem.fem.shape import Transfer, halved, richer_system
+from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, without
 from rodfem.stability.cluster import Cluster, as_vectors
