@@ -1,4 +1,4 @@
-"""The programs of docs/trades assert the numbers of others that they print."""
+"""The programs of docs/trades and docs/how-to.md assert the numbers of others that they print."""
 
 from __future__ import annotations
 
@@ -9,17 +9,19 @@ import pytest
 
 from rodfem import Diagram
 
-PAGES = sorted((Path(__file__).parents[2] / "docs" / "trades").glob("[a-z]*.md"))
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = [DOCS / "how-to.md", *sorted((DOCS / "trades").glob("[a-z]*.md"))]
 
 pytestmark = pytest.mark.alone
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_trade(page: Path) -> None:
+def test_a_page(page: Path) -> None:
     blocks, names = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL), dict[str, object]()
     assert blocks
+    assert all("assert " in block or block is blocks[0] for block in blocks)
     for block in blocks:
-        assert "assert " in block and len(block.splitlines()) < 60
+        assert len(block.splitlines()) < 60
         exec(block, names)
     diagram = names.get("diagram")
     assert diagram is None or (isinstance(diagram, Diagram) and not diagram.warnings)
