@@ -1,38 +1,235 @@
-"""Supports and loads of a rod as glyphs of a picture.
+"""A rod, its supports and its loads as surfaces of triangles: bodies that pictures place by affine maps.
 
-The directors decide the body at the place (block where they are held, axle where they turn about an axis, ball on a
+A picture has few bodies (a box, a ball, a coil, an arrow) at many places.  A glyph is a body, a colour and the map that
+places it.  So a support that moves with its state is the same body elsewhere, and a spring that is stretched is a coil
+whose map is stretched along its axis.  All bodies are lofts through closed rings of points.
+
+The directors decide the body of a support (block where they are held, axle where they turn about an axis, ball on a
 point where they turn freely), free components of the position the rails on which it slides, stiffnesses the springs.
-So a slide is a block on rails, a pin that slides a ball on a wedge on rails; a free end is nothing.
-
-A constraint that keeps the distance of two points is a string between them, one that keeps a point on a surface a ball
-in a frame tangent to it; an elastic foundation is a row of coils.
-
-In a motion the rod has left a place: rails, what springs and strings are fixed to, and frames stay there.
+So a slide is a block on rails, a pin that slides a ball on a wedge on rails; a free end is nothing.  A constraint that
+keeps the distance of two points is a string between them, one that keeps a point on a surface a ball in a frame tangent
+to it; an elastic foundation is a row of coils.  In a motion rails, what springs and strings are fixed to, and frames
+stay where the rod was.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rodfem.output.solids import COILS, Glyph, across, ball, between, glyph, profile_of, turn
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
 from rodfem.output.view import POINT, sign_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
-from rodfem.tolerances import TINY
+from rodfem.tolerances import NEGLIGIBLE, TINY
 
 Floats = NDArray[np.float64]
+Surface = tuple[Floats, NDArray[np.int64]]
+"""Corners (n, 3), and the numbers (k, 3) of those of each triangle."""
 
+FLATTEST = 7.0
+"""Greatest proportion of the sides of a rod's cross-section that is drawn."""
+SIDES = 24
+"""Corners of a round cross-section."""
+COILS = {"coil": (6, 1.5, 11.0), "small coil": (4, 0.9, 7.0)}
+"""Turns of a spring, their radius, and its length at rest, in radii of the rod."""
 BLOCK, ARROW = 2.4, 13.0
 """Half the size of a block, and the length of an arrow, in radii of the rod."""
 
 
-@dataclass(frozen=True)
-class Look:
+# --- bodies
+
+
+class Solid(NamedTuple):
+    """A surface in a colour."""
+
+    points: Floats
+    triangles: NDArray[np.int64]
+    color: str
+
+
+class Glyph(NamedTuple):
+    """A ``body`` of :func:`body_of` in a colour, where the ``map`` (4, 3) places it: ``(x, 1) @ map``."""
+
+    body: str
+    color: str
+    map: Floats
+
+    @property
+    def points(self) -> Floats:
+        """Corners (n, 3)."""
+        return body_of(self.body)[0] @ self.map[:3] + self.map[3]
+
+    @property
+    def triangles(self) -> NDArray[np.int64]:
+        """Numbers of the corners of each triangle (k, 3)."""
+        return body_of(self.body)[1]
+
+
+@cache
+def body_of(name: str) -> Surface:
+    """Surface of a body.
+
+    ``box`` and ``wedge`` have half sides of one, ``ball`` the radius one.  ``bar`` and ``arrow`` go from zero to one
+    along z, with radii of one for the bar and the arrow's shaft.  ``coil`` and ``small coil`` go so, too, with x and y
+    in radii of the rod.  ``spiral`` lies in the plane of x and y, and ``turn`` is an arrow three quarters of the way
+    about z, whose radius is one, and whose head is at x.
+    """
+    if name in ("box", "wedge"):
+        top = 0.22 if name == "wedge" else 1.0
+        corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+        return _loft(np.array([np.column_stack([size * corners, np.full(4, z)]) for size, z in ((1, -1), (top, 1))]))
+    if name == "ball":
+        angle = np.linspace(0, np.pi, 13)
+        return _swept(np.outer(-np.cos(angle), (0, 0, 1)), np.sin(angle))
+    if name == "bar":
+        return _swept(np.outer((0.0, 1.0), (0, 0, 1)), 1.0)
+    if name == "arrow":
+        return _swept(np.outer((0, 0.76, 0.76, 1), (0, 0, 1)), np.array([1, 1, 2.6, 0]))
+    if name == "spiral":
+        angle = np.linspace(0, 5 * np.pi, 120)
+        return _swept(_ring(np.linspace(1.6, 3.4, 120), angle, 0 * angle), 0.22)
+    if name == "turn":
+        angle = np.append(np.linspace(-1.6 * np.pi, -0.585, 40), 0.0) + 0.29
+        path, radii = _ring(1.0, angle, 0.5 + 0.6 * angle / np.pi), np.full(42, 0.09)
+        radii[-2:] = 2.6 * 0.09, 0.0
+        return _swept(np.insert(path, 40, path[39], axis=0), radii)
+    turns, wide, length = COILS[name]
+    t = np.linspace(0, 1, 24 * turns + 1)
+    winding = _ring(wide * np.minimum(1, 8 * np.minimum(t, 1 - t)), 2 * np.pi * turns * t, length * (0.1 + 0.8 * t))
+    points, triangles = _swept(np.vstack([np.zeros(3), winding, (0, 0, length)]), 0.22, sides=10)
+    return points / (1, 1, length), triangles
+
+
+def _ring(radius: ArrayLike, angle: Floats, height: Floats) -> Floats:
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+
+
+def _swept(path: Floats, radii: ArrayLike, sides: int = SIDES) -> Surface:
+    """Round solid along a ``path`` (n, 3) of ``radii`` (n,); a point may be repeated, with another radius."""
+    tangents = np.gradient(path.astype(float), axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    normal, angles, rings = across(tangents[0]), 2 * np.pi * np.arange(sides) / sides, []
+    for point, tangent, radius in zip(path, tangents, np.broadcast_to(radii, len(path)), strict=True):
+        normal = normal - (normal @ tangent) * tangent  # carried along without twist
+        normal = normal / np.linalg.norm(normal)
+        around = np.outer(np.cos(angles), normal) + np.outer(np.sin(angles), np.cross(tangent, normal))
+        rings.append(point + radius * around)
+    return _loft(np.array(rings))
+
+
+def _loft(rings: Floats) -> Surface:
+    """Surface through n closed rings of k points, (n, k, 3), with flat lids."""
+    n, k = rings.shape[:2]
+    i, j = (x.ravel() for x in np.indices((n - 1, k)))
+    a, b, c, d = i * k + j, i * k + (j + 1) % k, (i + 1) * k + (j + 1) % k, (i + 1) * k + j
+    around, last = np.arange(k), (n - 1) * k
+    first = np.column_stack([np.full(k, n * k), np.roll(around, -1), around])
+    second = np.column_stack([np.full(k, n * k + 1), last + around, last + np.roll(around, -1)])
+    points = np.concatenate([rings.reshape(-1, 3), rings[[0, -1]].mean(axis=1)])
+    triangles = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d]), first, second])
+    corners = points[triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return points, triangles[area > NEGLIGIBLE * max(area.max(), TINY)]
+
+
+def glyph(body: str, color: str, at: Floats, axes: ArrayLike) -> Glyph:
+    """A ``body`` of a ``color`` ``at`` a place (3,), whose directions x, y, z become the rows of ``axes`` (3, 3)."""
+    return Glyph(body, color, np.vstack([axes, at]))
+
+
+def _ball(at: Floats, radius: float) -> Glyph:
+    return glyph("ball", DARK, at, radius * np.eye(3))
+
+
+def between(body: str, start: Floats, end: Floats, radius: float, color: str) -> Glyph:
+    """A ``body`` of a ``color`` along z, from ``start`` (3,) to ``end`` (3,), with this ``radius``."""
+    a = across(end - start)
+    b = np.cross(end - start, a)
+    return glyph(body, color, start, [radius * a, radius * b / np.linalg.norm(b), end - start])
+
+
+def turn(centre: Floats, axis: Floats, size: float, front: Floats, color: str) -> Glyph:
+    """Arrow of a ``color`` about an ``axis`` (3,) through ``centre``, in the sense of a moment along it.
+
+    It winds along the axis a little, so that it is seen from all sides.  Its head is in the direction ``front``, its
+    radius is ``size``.
+    """
+    return glyph("turn", color, centre, size * _triad(axis / np.linalg.norm(axis), front))
+
+
+def _triad(axis: Floats, wanted: Floats) -> Floats:
+    """Unit vectors as rows (3, 3), the third one along a unit vector ``axis``, the first as ``wanted`` across it."""
+    side = across(axis, wanted)
+    return np.array([side, np.cross(axis, side), axis])
+
+
+def across(direction: Floats, wanted: Floats | None = None) -> Floats:
+    """Unit vector (3,) across a direction, which is a unit vector if one is ``wanted``: near that where possible."""
+    if wanted is not None:
+        out = wanted - (wanted @ direction) * direction
+        if np.linalg.norm(out) > 0.1:
+            return np.asarray(out / np.linalg.norm(out))
+    out = np.cross(direction, np.eye(3)[int(np.argmin(abs(direction)))])
+    return np.asarray(out / np.linalg.norm(out))
+
+
+# --- the rod
+
+
+def striped(
+    pose: tuple[Floats, Floats, Floats],
+    section: tuple[Floats, Floats] | None,
+    radius: float,
+    colors: Sequence[str],
+    sides: int = 2 * SIDES,
+) -> list[Solid]:
+    """A rod of a mean ``radius`` and so many ``sides`` with a stripe along d1, in two ``colors``.
+
+    Its ``pose`` has arclengths (n,), centreline (n, 3) and directors (n, 3, 3), in whose planes of d1 and d2 are the
+    cross-sections of :func:`profile_of`, by the ``section`` that it takes.
+    """
+    s, centres, frames = pose
+    around = (1.0, np.linspace(-np.pi, np.pi, sides + 1)[:-1]), (1.02, np.linspace(-0.3, 0.3, sides // 6 + 1))
+    outlines = [size * radius * profile_of(s, section, angles) for size, angles in around]
+    rings = [centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], outline) for outline in outlines]
+    return [Solid(*_loft(ring), color) for ring, color in zip(rings, colors, strict=True)]
+
+
+def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats) -> Floats:
+    """Outline of a rod's cross-sections at arclengths (n,), at angles (k,) from d1: (n, k, 2), of mean radius 1.
+
+    ``section`` has second moments of area (m, 2, 2) at arclengths (m,), up to a factor; round without it.  The outline
+    has their principal axes and their proportion, ``sqrt(J1 / J2)``, as far as it is not flatter than :data:`FLATTEST`;
+    it is an ellipse where it is nearly round, and tends to a rectangle where it is flat.  Its area is proportional to
+    the fourth root of their determinant.
+    """
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    if section is None:
+        return np.tile(circle, (len(s), 1, 1))
+    at, moments = section
+    moments = np.maximum(np.linalg.eigvalsh(moments).max(), TINY) * NEGLIGIBLE * np.eye(2) + moments
+    J = np.stack([[np.interp(s, at, moments[:, i, j]) for j in range(2)] for i in range(2)]).transpose(2, 0, 1)
+    values, axes = np.linalg.eigh(J)  # ascending
+    ratio = np.minimum(np.sqrt(values[:, 1] / values[:, 0]), FLATTEST)
+    size = (values[:, 0] * values[:, 1]) ** 0.125
+    size = size / size.max()
+    power = 2.0 / np.clip(1.0 + ratio, 2.0, 5.0)  # of a superellipse |x|^(2/power) + |y|^(2/power) = 1
+    half = np.stack([size / np.sqrt(ratio), size * np.sqrt(ratio)], axis=1)
+    local = np.einsum("kj,nji->nki", circle, axes)  # along the principal axes
+    rounded = np.sign(local) * abs(local) ** power[:, None, None]
+    return np.asarray(np.einsum("nki,nji->nkj", rounded * half[:, None, :], axes))
+
+
+# --- supports and loads
+
+
+class Look(NamedTuple):
     """How a picture shows a rod: its mean ``radius``, and the ``axes`` of :func:`rodfem.output.view.view_of`."""
 
     radius: float
@@ -41,12 +238,14 @@ class Look:
     @property
     def up(self) -> Floats:
         """Upwards (3,)."""
-        return self.axes[1]
+        return np.asarray(self.axes[1])
 
 
-@dataclass(frozen=True)
-class _Place:
-    """A point of the rod: where it is, ``at``, and was at ``home``, its directors, and the way out of the rod's end."""
+class _Place(NamedTuple):
+    """A point of the rod ``at`` a place, before a motion at ``home``, its directors, and the way out of the rod's end.
+
+    That is ``outward`` along the rod, ``away`` along its chord; both are zero inside the rod.
+    """
 
     at: Floats
     home: Floats
@@ -80,8 +279,7 @@ def glyphs_of(
     for support, place, load, share in zip(setting.supports, places, loads, shares, strict=True):
         body = _body(support, place, size, look)
         out += body + _springs(support, place, look)
-        if support.mass:
-            out.append(ball(place.at, 2.2 * look.radius, DARK))
+        out += [_ball(place.at, 2.2 * look.radius)] * bool(support.mass)
         out += _loads(load, share, place, 2.2 * size if body else 0.5 * BLOCK * look.radius, look)
     for tie in setting.ties:
         out += _tie(tie, s, centres, home, look)
@@ -91,22 +289,21 @@ def glyphs_of(
 def _body(support: Support, place: _Place, size: float, look: Look) -> list[Glyph]:
     """Body by the freedom of the directors, and rails by that of the position; ``size`` is half that of a block."""
     free, frame = support.slides, directors(support.frame)
+    along = frame[:, 2] * sign_of(frame[:, 2] @ place.away)
     if support.turning == HELD:
-        middle = place.at + 0.5 * size * frame[:, 2] * sign_of(frame[:, 2] @ place.away)
+        middle = place.at + 0.5 * size * along
         block = glyph("box", GREY, middle, size * np.array([1.0, 1.0, 0.5])[:, None] * frame.T)
         return [block, *_rails(free, middle + place.home - place.at, frame[:, 0], 1.2 * size, size)]
     if len(free) == 3:
         return []
     axes = [place.frame @ support.axis / np.linalg.norm(support.axis)] if support.turning == AXIS else []
-    along = frame[:, 2] * sign_of(frame[:, 2] @ place.away)
-    body = ball(place.at, 0.68 * size, DARK)
+    body = _ball(place.at, 0.68 * size)
     if axes:
         body = between("bar", place.at - 1.25 * size * axes[0], place.at + 1.25 * size * axes[0], 0.5 * size, DARK)
     elif place.away.any():
         along = place.away / np.linalg.norm(place.away)
     below = _foot(along, [*free, *axes], look.up)
-    side = _other(below, [*axes, *free, look.up][0])
-    stand = np.array([side, np.cross(below, side), below])  # the third one from the body to its base
+    stand = _triad(below, [*axes, *free, look.up][0])  # the third one from the body to its base
     wedge = glyph("wedge", GREY, place.at + 1.05 * size * below, size * np.diag([1.0, -1.0, -0.95]) @ stand)
     plate = glyph("box", DARK, place.at + 2.2 * size * below, size * np.diag([1.4, 1.4, 0.2]) @ stand)
     return [body, wedge, plate, *_rails(free, place.home + 2.6 * size * below, below, 0.8 * size, size)]
@@ -114,31 +311,18 @@ def _body(support: Support, place: _Place, size: float, look: Look) -> list[Glyp
 
 def _rails(free: list[Floats], middle: Floats, normal: Floats, apart: float, size: float) -> list[Glyph]:
     """Two rails for each direction in which a body moves freely, across ``normal`` where that is possible."""
-    ways = [(way, apart * sign * _across(way, normal)) for way in free for sign in (-1.0, 1.0)]
-    ends = [[middle + aside + sign * 3.4 * size * way for sign in (-1.0, 1.0)] for way, aside in ways]
-    return [between("bar", start, end, 0.12 * size, STEEL) for start, end in ends]
-
-
-def _across(direction: Floats, other: Floats) -> Floats:
-    """Unit vector across a direction, and across another where the two differ."""
-    out = np.cross(direction, other)
-    return across(direction) if np.linalg.norm(out) < 0.1 else np.asarray(out / np.linalg.norm(out))
+    places = [(way, middle + sign * apart * np.cross(way, across(way, normal))) for way in free for sign in (-1.0, 1.0)]
+    return [between("bar", at - 3.4 * size * way, at + 3.4 * size * way, 0.12 * size, STEEL) for way, at in places]
 
 
 def _foot(along: Floats, free: list[Floats], up: Floats) -> Floats:
     """Direction from a pin to its base: along the rod where nothing moves or turns about that, else downwards."""
     left = np.eye(3) - sum((np.outer(e, e) for e in free), np.zeros((3, 3)))
-    for wanted in (along, -up, _other(up, up), np.cross(up, _other(up, up))):
+    for wanted in (along, -up, across(up), np.cross(up, across(up))):
         found = left @ wanted
         if np.linalg.norm(found) > 0.7:
             return np.asarray(found / np.linalg.norm(found))
     return along
-
-
-def _other(direction: Floats, wanted: Floats) -> Floats:
-    """Unit vector across a direction, as wanted where that is possible."""
-    out = wanted - (wanted @ direction) * direction
-    return across(direction) if np.linalg.norm(out) < 0.3 else np.asarray(out / np.linalg.norm(out))
 
 
 def _springs(support: Support, place: _Place, look: Look) -> list[Glyph]:
@@ -147,21 +331,19 @@ def _springs(support: Support, place: _Place, look: Look) -> list[Glyph]:
     towards = place.outward - 0.3 * look.up - 0.2 * look.axes[2]
     for way in _stiff(support.translation_stiffness):
         out += _spring("coil", place.at, place.home, way * sign_of(way @ towards), look)
-    for way in _stiff(support.rotation_stiffness):
-        a = _other(way, look.up)
-        out.append(glyph("spiral", STEEL, place.at, look.radius * np.array([a, np.cross(way, a), way])))
-    return out
+    spirals = [look.radius * _triad(way, look.up) for way in _stiff(support.rotation_stiffness)]
+    return out + [glyph("spiral", STEEL, place.at, axes) for axes in spirals]
 
 
 def _spring(body: str, at: Floats, home: Floats, way: Floats, look: Look) -> list[Glyph]:
     """Coil from a point of the rod to a plate, which does not move with the rod from its ``home``."""
     _, wide, length = COILS[body]
     end = home + length * look.radius * way
-    along, side = (end - at) / np.linalg.norm(end - at), _other(way, look.up)
-    stand = np.array([side, np.cross(way, side), way]) * np.array([wide, wide, 0.2])[:, None]
+    along = (end - at) / np.linalg.norm(end - at)
+    plate = 0.8 * BLOCK * look.radius * np.diag([wide, wide, 0.2]) @ _triad(way, look.up)
     return [
         between(body, at + 0.8 * look.radius * along, end, look.radius, STEEL),
-        glyph("box", GREY, end, 0.8 * BLOCK * look.radius * stand),
+        glyph("box", GREY, end, plate),
     ]
 
 
@@ -194,14 +376,13 @@ def _tie(tie: Tie, s: Floats, centres: Floats, home: Floats, look: Look) -> list
         if np.linalg.norm(ends[1] - ends[0]) < look.radius:
             return []
         string = between("bar", ends[0], ends[1], 0.3 * look.radius, DARK)
-        return [string, *(ball(end, 1.4 * look.radius, DARK) for end in ends)]
+        return [string, *(_ball(end, 1.4 * look.radius) for end in ends)]
     if not np.isfinite(tie.normal).all():
         return []
-    side = _other(tie.normal, look.axes[0])
-    other, half = np.cross(tie.normal, side), 7.0 * look.radius
-    corners = [home[nodes[0]] + half * (a * side + b * other) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
+    side, other, _ = 7.0 * look.radius * _triad(tie.normal, look.axes[0])
+    corners = [home[nodes[0]] + a * side + b * other for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
     bars = [between("bar", a, b, 0.3 * look.radius, STEEL) for a, b in pairwise(corners)]
-    return [ball(centres[nodes[0]], 1.7 * look.radius, DARK), *bars]
+    return [_ball(centres[nodes[0]], 1.7 * look.radius), *bars]
 
 
 def _loads(load: tuple[Floats, Floats], share: Floats, place: _Place, clear: float, look: Look) -> list[Glyph]:
@@ -238,6 +419,6 @@ def _distributed(setting: Setting, s: Floats, pose: tuple[Floats, Floats], look:
             way = force / np.linalg.norm(force)
             tip = centres[node] - 1.6 * look.radius * way
             if along:
-                tip = centres[node] + size / 2 * way + 5.5 * look.radius * _across(way, look.axes[2])
+                tip = centres[node] + size / 2 * way + 5.5 * look.radius * np.cross(way, across(way, look.axes[2]))
             out.append(between("arrow", tip - size * way, tip, 0.3 * look.radius, LOAD))
     return out

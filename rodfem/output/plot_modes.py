@@ -23,8 +23,7 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
-from rodfem.output.glyphs import Look, glyphs_of
-from rodfem.output.solids import Glyph, Solid, between, striped
+from rodfem.output.glyphs import Glyph, Look, Solid, between, glyphs_of, striped
 from rodfem.output.states import curve_of
 from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS, status_of
 from rodfem.output.view import POINT, axes_of, axis_of
@@ -68,22 +67,18 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         words, top = f"{heading(path)}{branch}, load {modes.load:.6g}", 1 - 0.1 / figure.get_figheight()
         figure.suptitle(words, fontsize=14, y=top, va="top")
         panels = [_Panel(figure.add_subplot(rows, columns, i), modes, setting, n) for i, n in enumerate(numbers, 1)]
-        if moving:
-            _animate(figure, panels, draft)
-        else:
+        if not moving:
             for panel in panels:
                 panel.draw()
             figure.savefig(draft)
+            return output
+        writer = PillowWriter(fps=20)
+        with writer.saving(figure, str(draft), figure.dpi):
+            for frame in range(FRAMES):
+                for panel in panels:
+                    panel.draw(frame / FRAMES)
+                writer.grab_frame()
     return output
-
-
-def _animate(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
-    writer = PillowWriter(fps=20)
-    with writer.saving(figure, str(path), figure.dpi):
-        for frame in range(FRAMES):
-            for panel in panels:
-                panel.draw(frame / FRAMES)
-            writer.grab_frame()
 
 
 def amplitude(root: complex, grows: bool, time: float) -> complex:
@@ -116,11 +111,14 @@ class _Panel:
         self.r, turned = curve_of(modes.s, modes.r, modes.q, s)
         self.frames = directors(turned)
         u, w = (CubicSpline(modes.s, part[number].astype(complex))(s) for part in (modes.displacement, modes.rotation))
-        span, mu = float(np.linalg.norm(np.ptp(self.r, axis=0))), complex(modes.value[number])
-        error = modes.error[number]
-        size = drawn_size(u, w, span)
-        self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / 65
-        self.combed = size * np.linalg.norm(abs(u), axis=1).max() < 0.5 * LARGEST[0] * span
+        span, mu, error = (
+            float(np.linalg.norm(np.ptp(self.r, axis=0))),
+            complex(modes.value[number]),
+            modes.error[number],
+        )
+        size, self.radius = drawn_size(u, w, span), min(span, s[-1] - s[0]) / 65
+        self.u, self.w = size * u, size * w
+        self.combed = np.linalg.norm(abs(self.u), axis=1).max() < 0.5 * LARGEST[0] * span
         self.root = np.sqrt(-mu)
         free = modes.motion[number] == SYMMETRY or abs(mu) <= (error if np.isfinite(error) else 0.0)
         self.color = FREE if free else GROWS if self.root.real > GROWTH * abs(self.root) else SWINGS
@@ -135,10 +133,7 @@ class _Panel:
         axes.set_axis_off()
 
     def _look(self, span: float) -> None:
-        """Choose the axes (see :func:`rodfem.output.view.axes_of`), the limits, and the sign of the mode.
-
-        It goes upwards at its greatest amplitude.
-        """
+        """Choose the axes of the picture, the limits, and the sign of the mode: upwards at its greatest amplitude."""
         moved = self.u.imag if np.linalg.norm(self.u.imag) > np.linalg.norm(self.u.real) else self.u.real
         axis, off = axis_of(self.setting, self.r), self.r - self.r[0]
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
@@ -157,12 +152,9 @@ class _Panel:
         grown = (shape * ((high - low) / shape).max() - (high - low)) / 2
         low, high = low - grown, high + grown
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        self._triad(low, 0.07 * (high - low)[0])
-
-    def _triad(self, corner: Floats, size: float) -> None:
-        """The directions e1, e2, e3, near a corner; directions that look alike share a label."""
-        corner, names = corner + 1.6 * size, dict[tuple[float, ...], list[str]]()
-        for i, way in enumerate(self.look.axes[:2].T):
+        size, names = 0.07 * (high - low)[0], dict[tuple[float, ...], list[str]]()
+        corner = low + 1.6 * size
+        for i, way in enumerate(view[:2].T):  # the triad; directions that look alike share a label
             self.axes.plot(*np.stack([corner, corner + size * way], axis=1), color="0.45", lw=1.2)
             if np.linalg.norm(way) > 0.5:
                 names.setdefault(tuple(np.round(way, 0)), []).append(f"e{i + 1}")

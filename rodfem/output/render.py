@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from rodfem.errors import InputError
 from rodfem.file_format import STATES
-from rodfem.output.glyphs import Look, glyphs_of
-from rodfem.output.solids import Glyph, Solid, striped
+from rodfem.output.glyphs import Glyph, Look, Solid, glyphs_of, striped
 from rodfem.output.states import curve_at
 from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE, status_of
 from rodfem.output.view import axes_of, thickness
@@ -39,8 +38,7 @@ __all__ = ["draw_shape", "draw_shape_safely", "main"]
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the caption
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-HOME = Path(__file__).resolve().parents[2]
-MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
+SHINE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
 
 
@@ -52,7 +50,7 @@ def draw_shape(
     """Draw one equilibrium: the rod with a stripe along d1, arrows along d1 and d2, what holds it and what loads it.
 
     Cross-sections lie in the plane of d1 and d2, so that shear shows, and have the proportion of the bending
-    stiffnesses (:func:`rodfem.output.solids.profile_of`).  What a file does not record is not drawn: of one without
+    stiffnesses (:func:`rodfem.output.glyphs.profile_of`).  What a file does not record is not drawn: of one without
     supports the rod alone, round.  See :func:`rodfem.output.view.view_of` for the direction of view.
 
     The state is in a ``row``, from 0 on, of a ``branch`` of the file ``states``; the suffix of ``path`` decides the
@@ -76,31 +74,18 @@ def draw_shape(
     solids = state.solids(look)
     for solid in solids:
         surface = pyvista.PolyData.from_regular_faces(solid.points, solid.triangles)
-        plotter.add_mesh(surface, color=solid.color, split_sharp_edges=True, feature_angle=40.0, **STYLE)
-    _add_directors(pyvista, plotter, state, look.radius)
-    points = np.concatenate([solid.points for solid in solids])
-    _look_at(plotter, points, look, size)
+        plotter.add_mesh(surface, color=solid.color, split_sharp_edges=True, feature_angle=40.0, **SHINE)
+    stations = np.linspace(0, len(state.s) - 1, 27).round().astype(int)[1:-1]
+    arrow = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
+    for index, colour in ((0, FIRST), (1, SECOND)):
+        points = pyvista.PolyData(state.centres[stations])
+        points["director"] = state.directors[stations, :, index]
+        arrows = points.glyph(orient="director", scale=False, factor=4.5 * look.radius, geom=arrow)
+        plotter.add_mesh(arrows, color=colour, **SHINE)
+    _look_at(plotter, np.concatenate([solid.points for solid in solids]), look, size[0] / size[1])
     plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", color=DARK, x_color=DARK, y_color=DARK, z_color=DARK)
     loaded = any(solid.color == LOAD for solid in solids)
     _write(plotter, state.caption if caption is None else caption, state.setting.notes, loaded)
-    return _shoot(plotter, path)
-
-
-def _write(plotter: Any, caption: str, notes: Sequence[str], loaded: bool) -> None:
-    """Write the line at the foot, what is not drawn above it, and the names of what has its colour."""
-    font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
-    width, height = plotter.window_size
-    labels = [(caption, 0.5, 0.03, "black"), (f"not drawn: {', '.join(notes)}" if notes else "", 0.5, 0.095, DARK)]
-    names = [("load" if loaded else "", 184, LOAD), ("d₁", 104, FIRST), ("d₂", 48, SECOND)]
-    labels += [(name, 1.0 - right / width, 1.0 - 70.0 / height, colour) for name, right, colour in names]
-    for label, x, y, colour in (label for label in labels if label[0]):
-        style = {"font_size": min(20, int(0.875 * width) // len(label)), "color": colour, "font_file": font}
-        actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
-        actor.GetTextProperty().SetJustificationToCentered()
-
-
-def _shoot(plotter: Any, path: Path) -> Path:
-    """Write the picture, and close the plotter; raises RuntimeError for a blank one."""
     plotter.enable_anti_aliasing("ssaa")
     with draft_of(path) as draft:
         picture = plotter.screenshot(str(draft), return_img=True)
@@ -117,11 +102,9 @@ def view_in(states: Path, branch: str, row: int) -> Floats:
 
 @dataclass(frozen=True)
 class State:
-    """A state as a picture needs it, at n places along the rod.
+    """A state at n places along the rod: arclengths ``s``, ``centres`` (n, 3), and ``directors`` (n, 3, 3) as columns.
 
-    Arclengths ``s`` (n,), centreline ``centres`` (n, 3), and ``directors`` (n, 3, 3) as columns; ``reference`` is the
-    centreline (n, 3) of the state that it has left, of the first branch at the nearest load, ``setting`` what holds and
-    loads the rod, and ``caption`` has scene, branch and load.
+    ``reference`` is the centreline (n, 3) of the state that it has left, of the first branch at the nearest load.
     """
 
     s: Floats
@@ -146,24 +129,19 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
     """Read a state of a file, interpolated at ``count`` places; raises ValueError where there is none."""
     unfit = f"cannot read {states} ({{}}): try the states.h5 of a scene"
     with STATES.opened(states, ("branches", "parameter", "scene"), unfit) as file:
-        group = _group(file["branches"], branch, row, states)
+        branches = file["branches"]
+        if branch not in branches:
+            raise InputError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
+        group, first = branches[branch], branches[file.attrs.get("first", branch)]
+        if not 0 <= row <= (last := len(group["r"]) - 1):
+            raise InputError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
         load = float(group["load"][row])
         symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
-        first = file["branches"][file.attrs.get("first", branch)]
         left = 0 if first == group else int(np.argmin(abs(first["load"][:] - load)))
         s, centres, turned = curve_at(group, row, count)
         reference, setting = curve_at(first, left, count)[1], read_setting(group, row)
         caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
         return State(s, centres, directors(turned), reference, setting, caption)
-
-
-def _group(branches: Any, branch: str, row: int, states: Path) -> Any:
-    """Group of a branch that has this row."""
-    if branch not in branches:
-        raise InputError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
-    if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
-        raise InputError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
-    return branches[branch]
 
 
 def _import_pyvista() -> Any:
@@ -179,32 +157,34 @@ def _import_pyvista() -> Any:
     return pyvista
 
 
-STYLE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
-
-
-def _add_directors(pyvista: Any, plotter: Any, state: State, radius: float) -> None:
-    """Add arrows along d1 and d2."""
-    stations = np.linspace(0, len(state.s) - 1, 27).round().astype(int)[1:-1]
-    geometry = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
-    for index, colour in ((0, FIRST), (1, SECOND)):
-        points = pyvista.PolyData(state.centres[stations])
-        points["director"] = state.directors[stations, :, index]
-        arrows = points.glyph(orient="director", scale=False, factor=4.5 * radius, geom=geometry)
-        plotter.add_mesh(arrows, color=colour, **STYLE)
-
-
-def _look_at(plotter: Any, points: Floats, look: Look, size: tuple[int, int]) -> None:
-    """Set a camera without perspective that sees all points (n, 3), above the caption, in a picture of a ``size``."""
-    axes, aspect = look.axes, size[0] / size[1]
-    seen = points @ axes.T
+def _look_at(plotter: Any, points: Floats, look: Look, aspect: float) -> None:
+    """Set a camera without perspective that sees all points (n, 3), above the caption."""
+    seen = points @ look.axes.T
     low, high = seen.min(axis=0) - 5.0 * look.radius, seen.max(axis=0) + 5.0 * look.radius
-    middle, half = (low + high) / 2, (high - low) / 2
+    half = (high - low) / 2
     scale = max(half[1] / ROOM, half[0] / aspect)
-    focus = (middle - (0.0, (1.0 - ROOM) / 2 * scale, 0.0)) @ axes  # the caption's line is below
-    plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * axes[2]), tuple(focus), tuple(axes[1])]
+    focus = ((low + high) / 2 - (0.0, (1.0 - ROOM) / 2 * scale, 0.0)) @ look.axes  # the caption's line is below
+    camera = focus + 4 * (half[2] + scale) * look.axes[2]
+    plotter.camera_position = [tuple(camera), tuple(focus), tuple(look.axes[1])]
     plotter.camera.enable_parallel_projection()
     plotter.camera.parallel_scale = scale
     plotter.renderer.ResetCameraClippingRange()
+
+
+def _write(plotter: Any, caption: str, notes: Sequence[str], loaded: bool) -> None:
+    """Write the line at the foot, what is not drawn above it, and the names of what has its colour."""
+    font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
+    width, height = plotter.window_size
+    labels = [(caption, 0.5, 0.03, "black"), (f"not drawn: {', '.join(notes)}" if notes else "", 0.5, 0.095, DARK)]
+    names = [("load" if loaded else "", 184, LOAD), ("d₁", 104, FIRST), ("d₂", 48, SECOND)]
+    labels += [(name, 1.0 - right / width, 1.0 - 70.0 / height, colour) for name, right, colour in names]
+    for label, x, y, colour in (label for label in labels if label[0]):
+        style = {"font_size": min(20, int(0.875 * width) // len(label)), "color": colour, "font_file": font}
+        actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
+        actor.GetTextProperty().SetJustificationToCentered()
+
+
+# --- in notebooks
 
 
 @dataclass(frozen=True)
@@ -254,27 +234,29 @@ def snapshot(
             save_states(Branch(name, None, 0, [point]), solvers, states, first=False)
             row = 0
         if comm.rank == 0:
-            draw_shape(states, name, row, picture, caption=caption)
-            png = picture.read_bytes()
+            png = draw_shape(states, name, row, picture, caption=caption).read_bytes()
     found = Snapshot(png)
     if path is not None and comm.rank == 0:
         found.save(path)
     return found
 
 
+# --- in processes
+
+
 def draw_shape_safely(
     states: Path, branch: str, row: int, path: Path, *, limit: float = 120.0, **options: str | float | None
 ) -> str | None:
-    """Draw as `draw_shape` does, but in a process of its own, which may crash without harm.
+    """Draw as `draw_shape` does, but in a process of its own, which may crash without harm, within ``limit`` seconds.
 
-    ``states``, ``branch``, ``row`` and ``path`` are as there, ``options`` are caption and radius, ``limit`` is the time
-    in seconds that it may take.  Returns None where the picture was written, else a sentence that says what failed and
-    what to do.
+    Returns None where the picture was written, else a sentence that says what failed and what to do.
     """
     command = [sys.executable, "-P", "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
     command += [f"--{key}={value}" for key, value in {"output": path, **options}.items() if value is not None]
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(MPI_VARIABLES)}
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(HOME), os.environ.get("PYTHONPATH")]))
+    mpi = ("OMPI_", "PMI", "MPI_LOCAL")  # beginnings of names, PMI_ and PMIX_ alike
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(mpi)}
+    home = str(Path(__file__).resolve().parents[2])
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH")]))
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -28,6 +28,33 @@ POINT = 1e-9
 """A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
 
 
+def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
+    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``.
+
+    ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to show, by default of dead forces.
+    """
+    load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
+    along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}
+    return view_of(reference, moved, load=load, feet=feet, **along)
+
+
+def axis_of(setting: Setting, reference: Floats) -> Floats:
+    """Direction (3,) of the axis of a rod in the state ``reference`` (n, 3): from one end to the other.
+
+    Of a rod that is held at one end alone it is that of its support, from which load bends the chord away, unless the
+    rod leaves it sideways, as a coil does.
+    """
+    chord, holding = reference[-1] - reference[0], [x for x in setting.supports if x.held.any() or x.turning != TURNS]
+    stem = directors(holding[0].frame)[:, 2] if len(holding) == 1 and holding[0].turning == HELD else chord
+    return np.asarray(stem if stem @ chord > 0.3 * np.linalg.norm(chord) else chord)
+
+
+def thickness(centres: Floats) -> float:
+    """Mean radius with which a rod of this centreline (n, 3) is drawn: by its length, and by its extent if it coils."""
+    length = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
+    return float(min(length / 90.0, np.linalg.norm(np.ptp(centres, axis=0)) / 40.0))
+
+
 def view_of(
     reference: Floats,
     moved: Floats,
@@ -53,7 +80,11 @@ def view_of(
     chord = reference[-1] - reference[0] if axis is None else axis
     shape, tilt = moved.T @ moved / len(moved), TILT
     if np.linalg.norm(chord) < UNSEEN * size and down is None:
-        (right, up), tilt = _plane(reference + moved), np.radians(55.0)  # what is across the plane is seen
+        spread = np.cov((reference + moved).T)
+        scale = float(np.linalg.norm(np.ptp(reference + moved, axis=0)))
+        vectors = np.linalg.eigh(spread + np.diag(scale * np.array([3e-3, 2e-3, 1e-3])) ** 2)[1]
+        right, up = upwards(vectors[:, 2]), upwards(vectors[:, 1])
+        tilt = np.radians(55.0)  # what is across the plane is seen
     elif down is not None:
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
@@ -87,36 +118,6 @@ def _loaded(right: Floats, up: Floats, load: Floats, arch: Floats | None) -> tup
     return turned, up, np.radians(35.0)  # the rod goes away, so upwards
 
 
-def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
-    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``.
-
-    ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to show, by default of dead forces.
-    """
-    load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
-    along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}
-    return view_of(reference, moved, load=load, feet=feet, **along)
-
-
-def thickness(centres: Floats) -> float:
-    """Mean radius with which a rod of this centreline (n, 3) is drawn: by its length, and by its extent if it coils."""
-    length = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
-    return float(min(length / 90.0, np.linalg.norm(np.ptp(centres, axis=0)) / 40.0))
-
-
-def axis_of(setting: Setting, reference: Floats) -> Floats:
-    """Direction (3,) of the axis of a rod in the state ``reference`` (n, 3): from one end to the other.
-
-    Of a rod that is held at one end alone it is that of its support, from which load bends the chord away, unless the
-    rod leaves it sideways, as a coil does.
-    """
-    chord, holding = reference[-1] - reference[0], [x for x in setting.supports if x.held.any() or x.turning != TURNS]
-    if len(holding) == 1 and holding[0].turning == HELD:
-        stem = directors(holding[0].frame)[:, 2]
-        if stem @ chord > 0.3 * np.linalg.norm(chord):
-            return np.asarray(stem)
-    return np.asarray(chord)
-
-
 def _standing(up: Floats, rod: Floats | None, load: Floats) -> float:
     """-1 where an arch, the ``rod`` (n, 3), would hang from ``up`` though the ``load`` presses on its crown; else 1."""
     if rod is None:
@@ -137,14 +138,6 @@ def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None
             found = np.eye(3)[int(np.argmin(abs(axis)))]
     found = out @ _snapped(found / np.linalg.norm(found))
     return np.asarray(found / np.linalg.norm(found))
-
-
-def _plane(points: Floats) -> tuple[Floats, Floats]:
-    """Directions of the greatest two second moments of points (n, 3) about their mean."""
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    vectors = np.linalg.eigh(np.cov(points.T) + np.diag(size * np.array([3e-3, 2e-3, 1e-3])) ** 2)[1]
-    right, up = vectors[:, 2], vectors[:, 1]
-    return upwards(right), upwards(up)
 
 
 def upwards(direction: Floats) -> Floats:

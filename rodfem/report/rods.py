@@ -15,11 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID, SYMMETRY, Few, load_modes, rows_with_modes, typical_of
-from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.glyphs import Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
 from rodfem.output.plot_modes import GROWTH, drawn_size
-from rodfem.output.solids import body_of, profile_of
 from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
 from rodfem.output.view import axes_of, thickness

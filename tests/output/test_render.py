@@ -17,10 +17,9 @@ from matplotlib.image import imread
 from rodfem.errors import InputError
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.glyphs import FLATTEST, SIDES, Look, glyphs_of, profile_of, turn
 from rodfem.output.pieces import typical_state
 from rodfem.output.render import _read, draw_shape_safely
-from rodfem.output.solids import FLATTEST, SIDES, profile_of, turn
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
 from rodfem.output.view import view_of
 from rodfem.problem.ends import (
