@@ -62,7 +62,6 @@ class Job:
     """``work`` in a copy of this process, whose own end awaits it."""
 
     def __init__(self, work: Callable[[], object]) -> None:
-        """Start it."""
         with warnings.catch_warnings():  # MPI's threads are no part of the copy, and it does not need them
             warnings.simplefilter("ignore", DeprecationWarning)
             self._copy = os.fork()

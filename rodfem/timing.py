@@ -18,7 +18,6 @@ class Clock:
     """
 
     def __init__(self) -> None:
-        """Start with nothing measured."""
         self.seconds: dict[str, float] = {}
         self.started = perf_counter()
         self._running: list[str] = []
@@ -38,12 +37,10 @@ class Clock:
         return self
 
     def __enter__(self) -> None:
-        """Begin a block."""
         self._charge()
         self._running.append(self._scope or self._next)
 
     def __exit__(self, *trouble: object) -> None:
-        """End a block, however it ends."""
         self._charge()
         self._running.pop()
 

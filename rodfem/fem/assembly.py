@@ -23,16 +23,11 @@ if TYPE_CHECKING:
     from rodfem.fem.known import Known
 
 
-def _code() -> Any:
-    return module("fem/assembly")
-
-
 class Places:
     """Where the entries of element tensors are in a vector, or among the values of a sparse matrix; -1 for none."""
 
     def __init__(self, rows: np.ndarray, kinds: np.ndarray | None = None, columns: np.ndarray | None = None) -> None:
-        """Keep what :func:`vector_places` and :func:`matrix_places` found."""
-        ffi = _code().ffi
+        ffi = module("fem/assembly").ffi
         self._memory = Memory(ffi)
         self.pointer = ffi.new("Places *", {"kinds": 0 if columns is None else columns.shape[1]})
         given = {"row": rows, "kind": kinds, "column": columns}
@@ -51,7 +46,7 @@ def matrix_places(dofs: np.ndarray, rows: np.ndarray, columns: np.ndarray, patte
     ``rows`` and ``columns`` (local size,) are the numbers of its rows and columns at the degrees of freedom, -1 for
     none; ``dofs`` (cells, n) are those of each cell.  Entries that the pattern does not have are left out: they are 0.
     """
-    code = _code()
+    code = module("fem/assembly")
     row, free = rows[dofs], rows[dofs] >= 0
     # rows with the same pattern have the same sum of random numbers, which differ
     sums = np.where(free, (pattern @ np.random.default_rng(1).random(pattern.shape[1]))[row], -1.0)
@@ -88,19 +83,13 @@ class Cells:
 class Assembler:
     """A compiled ``form`` whose coefficients, where it has some, are the unknown and what is ``known`` otherwise.
 
-    It is assembled on the cells of this rank.
-
-    ``constants`` are those of the form, as :meth:`pack_constants` found them; ``pointer`` and ``function`` are the
-    form, and the address of what assembles it, for other compiled code.
+    It is assembled on the ``cells`` of this rank, or with ``inside`` its integrals over any ``cells``; ``load`` is the
+    local degree of freedom of the load.  ``constants`` are those of the form, as :meth:`pack_constants` found them;
+    ``pointer`` and ``function`` are the form, and the address of what assembles it, for other compiled code.
     """
 
     def __init__(self, form: Any, cells: Cells, known: Known, load: int, *, inside: bool = False) -> None:
-        """Take the kernels of a dolfinx form; ``inside`` those of its integrals over cells alone, for all ``cells``.
-
-        Otherwise ``cells`` are those of this rank.  ``known`` is what else the form reads, and ``load``
-        the local degree of freedom of the load.
-        """
-        self.form, self._code = form, _code()
+        self.form, self._code = form, module("fem/assembly")
         ffi, size = self._code.ffi, cells.dofs.shape[1]
         integrals = compat.integrals(form)
         if inside:
@@ -148,12 +137,11 @@ class Assembler:
 
 
 def bordered_pattern(fields: Fields) -> sp.csr_matrix:
-    """Nonzero pattern of this rank's rows: couplings inside the cells, dense rows and columns of the scalars.
+    """Nonzero pattern (local_unknowns, unknowns) of this rank's rows, with ones, and the diagonal.
 
-    Returns a matrix of ones, (local_unknowns, unknowns), that has the diagonal too.
+    Couplings inside the cells, dense rows and columns of the scalars.
     """
-    comm, n = fields.comm, fields.unknowns
-    own = len(fields.free_owned)
+    comm, n, own = fields.comm, fields.unknowns, len(fields.free_owned)
     rows = _own_rows(fields, list(fields.dofs))
     scalars = np.array(list(fields.scalars.values()), dtype=np.int32)  # beyond all fields: the last columns of each row
     size = len(scalars)
@@ -171,10 +159,7 @@ def bordered_pattern(fields: Fields) -> sp.csr_matrix:
 
 
 def metric_pattern(fields: Fields) -> sp.csr_matrix:
-    """Nonzero pattern of a metric: rotations couple to rotations, centreline or strains to themselves; the diagonal.
-
-    A part of :func:`bordered_pattern`.
-    """
+    """The part of it for a metric: rotations couple to rotations, centreline or strains to themselves; the diagonal."""
     names = [name for name in (fields.turning.name, "r" if "r" in fields.dofs else "v") if name in fields.dofs]
     rows = sum(_own_rows(fields, [name]) for name in names)
     size = (fields.local_unknowns, fields.unknowns)
@@ -186,10 +171,7 @@ def metric_pattern(fields: Fields) -> sp.csr_matrix:
 
 
 def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
-    """Couplings of this rank's unknowns of some fields inside all cells of which they are.
-
-    Returns (free_owned, unknowns), sorted.
-    """
+    """Couplings (free_owned, unknowns) of this rank's unknowns of some fields inside all their cells, sorted."""
     comm, n = fields.comm, fields.unknowns
     first, own, cells = fields.offset, len(fields.free_owned), fields.owned_cells
     numbers = np.hstack([fields.number[fields.dofs[name][:cells]].reshape(cells, -1) for name in names])
@@ -210,10 +192,9 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
 
 
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
-    """Zero PETSc AIJ matrix with ``pattern``, on the ranks of ``fields``.
+    """Zero PETSc AIJ matrix with a pattern, and maps from local degrees of freedom to its rows and columns.
 
-    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.  Its values are shared
-    with numpy where compiled code assembles it.
+    Its values are shared with numpy where compiled code assembles it.
     """
     if fields.compiled:
         matrix = shared_matrix(fields.comm, pattern)

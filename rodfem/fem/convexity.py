@@ -46,14 +46,10 @@ class Convexity:
     A material that varies along the rod may be too soft between them: it is looked at on a grid as well, and at the
     vertices of parabolas through the values there.
 
-    Attributes
-    ----------
-    alters, varies
-        Whether the second derivative depends on the state or the load, and on the arclength.
+    It ``alters`` with the state or the load, of the parameters with these ``names``, and ``varies`` along the rod.
     """
 
     def __init__(self, system: System, *names: str) -> None:
-        """Compile the second derivative; the parameters with these ``names`` change, and no other one."""
         self.system, e, f = system, system.equations, system.fields
         self.size = len(system.scene.free_strains) + 3
         vector, of_state, known = derived(e, "second derivative", lambda: second_derivative(e))

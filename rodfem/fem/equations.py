@@ -6,7 +6,7 @@ other number would be compiled anew.  As a constant it is a value that the compi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable
 from copy import copy
 from functools import cached_property
 from types import SimpleNamespace
@@ -51,17 +51,13 @@ def with_constants(form: Any, mesh: Any) -> Any:
     """
     if not isinstance(form, (ufl.Form, Expr)):
         return form
-    if not any(number not in KEPT for number in _numbers(form)):
+    wholes = [x.integrand() for x in form.integrals()] if isinstance(form, ufl.Form) else [form]
+    # to look for numbers takes a third of the time of a map
+    if all(float(x) in KEPT for whole in wholes for x in parts(whole) if isinstance(x, FloatValue)):
         return form
     constants = _Constants(mesh)
     mapped = map_integrand_dags(constants, form, compress=False)
     return mapped if constants.of else form
-
-
-def _numbers(form: Any) -> Iterator[float]:
-    """Numbers in a form, or in an expression: to look for them takes a third of the time of a map."""
-    for whole in [x.integrand() for x in form.integrals()] if isinstance(form, ufl.Form) else [form]:
-        yield from (float(x) for x in parts(whole) if isinstance(x, FloatValue))
 
 
 class _Constants(MultiFunction):
@@ -108,20 +104,15 @@ class Equations:
     """
 
     def __init__(self, fields: Fields) -> None:
-        """Derive and compile the forms."""
         forms = self._derive(fields)
         self.register = SimpleNamespace(line=None, values=None)
         self.derived: dict[Hashable, Any] = {}  # shared, as the forms are
         self.cells = Cells.of(fields)
-        load = int(fields.copies[0, -1])
         compiled = form_compiler.compile_forms(list(forms.values()), fields.mesh.comm)
-        assemblers = {
-            name: Assembler(form, self.cells, self.known, load) for name, form in zip(forms, compiled, strict=True)
-        }
-        self._assemblers = list(assemblers.values())
+        self._assemblers = [Assembler(form, self.cells, self.known, int(fields.copies[0, -1])) for form in compiled]
         self.jacobian, self.residual, self.energy, self.metric, self.kinetic = self._assemblers[:5]
-        self.potential, self.ordinate = assemblers.get("potential"), assemblers.get("ordinate")
-        self.loads = assemblers.get("loads")
+        others = dict(zip(forms, self._assemblers, strict=True)).get
+        self.potential, self.loads, self.ordinate = others("potential"), others("loads"), others("ordinate")
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
 
     @classmethod
@@ -129,7 +120,6 @@ class Equations:
         """Equations of a ``scene``, with mesh and forms of another one that has the same functions, where there are.
 
         What depends on the constants is each scene's own.  Of a small system the forms live as long as the functions.
-        ``discretization`` and ``comm`` are as for :class:`~rodfem.fem.fields.Fields`.
         """
         recent = derived(scene.energy, "equations", list[Equations])
         for known in recent:
@@ -165,7 +155,9 @@ class Equations:
         W = scene.energy(along.v, along.k, c)
         a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
         sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
-        loads = self._loads(sites, dx)
+        acting = [x for x in sites if not x[0].nodal]
+        acting.sort(key=lambda x: x[2] is not None)  # first along the rod, then at points
+        loads = [term * (measure or dx) for of, site, measure in acting for term in of.lagrangian(site)]
         potential = fields.formulation.integrand(self, W, along) * dx + sum(loads)
         L = potential + self._nodal(sites)
         work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
@@ -181,15 +173,6 @@ class Equations:
             others["ordinate"] = (0.0 * c.s + scene.ordinate.of(along, c)) * dx
         derivatives = {"jacobian": ufl.derivative(first, u, trial), "residual": first}
         return derivatives | {name: self.compilable(x) for name, x in others.items()}
-
-    @staticmethod
-    def _loads(sites: list[Any], dx: Any) -> list[Any]:
-        """Terms of what acts on the rod, first along it, then at points; without constraints at nodes."""
-        inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
-        at_points = [x for x in sites if x[2] is not None and not x[0].nodal]
-        return [term * dx for of, site in inside for term in of.lagrangian(site)] + [
-            term * measure for of, site, measure in at_points for term in of.lagrangian(site)
-        ]
 
     def _nodal(self, sites: list[Any]) -> Any:
         """Constraints at nodes, zero at an equilibrium.
@@ -246,15 +229,14 @@ class Equations:
         fields = self.fields
         return form_compiler.expression(self.compilable(vector), points[:, None], fields.mesh, fields.owned_cells)
 
-    # --- the functional --------------------------------------------------------------------------------------------
-
     def along(self, wrap: Callable[[Any], Any] = lambda x: x) -> Place:
         """Place of the functions that hold all along the rod; slope and curvatures pass through ``wrap``."""
-        f, c, free = self.unknowns, self.constants, self.fields.scene.free_strains
-        v, k = strain(free, self.components(f.v, len(free))), wrap(curvature(f.q, f.q.dx(0)))
+        f, c, scene = self.unknowns, self.constants, self.fields.scene
+        v = strain(scene.free_strains, self.components(f.v, len(scene.free_strains)))
+        k = wrap(curvature(f.q, f.q.dx(0)))
         r = self.fields.formulation.position(self, c, lambda field: field, None)
         slope = {} if r is None else {"dr": wrap(r.dx(0))}
-        return place(f.q, rotation(f.q), c.s, r, v=v, k=k, length=self.fields.scene.length, **slope)
+        return place(f.q, rotation(f.q), c.s, r, v=v, k=k, length=scene.length, **slope)
 
     def site(self, part: Part, f: Any, variations: Any, along: Place) -> tuple[Site, Any]:
         """State where a ``part`` of the scene is, and the measure of its terms, None along the rod.
@@ -294,8 +276,6 @@ class Equations:
         side = None if inside else int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))
         r = self.fields.formulation.position(self, c, at, side)
         return place(q, rotation(q), s, r, length=scene.length), c, at, measure
-
-    # --- names -----------------------------------------------------------------------------------------------------
 
     @staticmethod
     def quadrature_degree(degree: int) -> int:
@@ -341,10 +321,7 @@ class Equations:
 
 
 def point_measures(mesh: Any, points: list[float]) -> Any:
-    """Measures of points: ``measures(s)`` gives that of the vertex at ``s`` and whether it is inside the rod.
-
-    The first two points are the ends.
-    """
+    """``measures(s)``, that of the vertex at ``s`` and whether it is inside the rod; the first points are the ends."""
     length = abs(points[1] - points[0])
     mesh.topology.create_connectivity(0, 1)
 

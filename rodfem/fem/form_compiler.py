@@ -87,6 +87,11 @@ def _compile_aloud(*arguments: Any, **options: Any) -> Any:
     return _compile(*arguments, **options)
 
 
+def _say() -> None:
+    for listener in _LISTENERS:
+        listener()
+
+
 jit.get_cached_module = _cached
 jit._compile_objects = _compile_aloud
 
@@ -119,10 +124,7 @@ def _from_cache(comm: MPI.Comm) -> Iterator[None]:
 
 
 def compile_forms(forms: Sequence[Any], comm: MPI.Comm = MPI.COMM_SELF) -> list[Any]:
-    """Compile UFL ``forms`` on meshes of ``comm``: the first, which takes the longest, and all others, at once.
-
-    Raises :class:`SetupError` if the cache cannot be written.
-    """
+    """Compile UFL ``forms`` on meshes of ``comm``: the first, which takes the longest, and all others, at once."""
     with _from_cache(comm):
         compiled = compile_ahead(forms)
         _wait()
@@ -131,22 +133,16 @@ def compile_forms(forms: Sequence[Any], comm: MPI.Comm = MPI.COMM_SELF) -> list[
 
 
 def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable[[], np.ndarray]:
-    """Compile a UFL vector to be evaluated at reference ``points`` (m, 1) of the first cells: (cells, m * size).
-
-    ``form`` is the vector, on cells of ``mesh``, of which the first ``cells`` are evaluated.  Raises as
-    :func:`compile_forms` does.
-    """
+    """Compile a UFL vector to be evaluated at reference ``points`` (m, 1) of the first cells: (cells, m * size)."""
     # dolfinx packs the constants of what it is given; FFCx numbers those that differentiation leaves
     derived = differentiated(form)
     with _from_cache(mesh.comm), compat.compilation():
         compiled = fem.Expression(derived, points, dtype=compat.REAL)
     chosen = np.arange(cells, dtype=np.int32)
-    takes_mesh = "mesh" in inspect.signature(compiled.eval).parameters
-    takes_entities = "entities" in inspect.signature(compiled.eval).parameters
+    takes_mesh = not {"mesh", "entities"}.isdisjoint(inspect.signature(compiled.eval).parameters)
 
     def evaluate() -> np.ndarray:
-        values = compiled.eval(mesh, chosen) if takes_mesh or takes_entities else compiled.eval(chosen)
-        return np.asarray(values).reshape(cells, -1)
+        return np.asarray(compiled.eval(mesh, chosen) if takes_mesh else compiled.eval(chosen)).reshape(cells, -1)
 
     return evaluate
 
@@ -197,14 +193,12 @@ def _compiled(group: Sequence[Any]) -> list[Any]:
 
 
 def _wait() -> None:
-    """Await all that is compiled in the background."""
     while _JOBS:
         _JOBS.pop().wait()
 
 
 @contextmanager
 def _instead(name: str, function: Callable[..., Any]) -> Iterator[None]:
-    """Have ``function`` in the place of one of FFCx's."""
     usual = getattr(jit, name)
     setattr(jit, name, function)
     try:
@@ -228,9 +222,3 @@ def announce_compilation(say: Callable[[], None]) -> Iterator[list[bool]]:
         yield said
     finally:
         _LISTENERS.remove(once)
-
-
-def _say() -> None:
-    """Say that something is compiled."""
-    for listener in _LISTENERS:
-        listener()

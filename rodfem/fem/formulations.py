@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
@@ -35,46 +33,21 @@ Start = Callable[[np.ndarray], np.ndarray] | None
 # --- rotation ------------------------------------------------------------------------------------------------------
 
 
-class Turning(ABC):
-    """A field of rotations: values (..., ``size``) that stand for quaternions (..., 4).
+class QuaternionField:
+    """Rotation as a quaternion ``q`` of four components, whose unit norm is a constraint.
 
-    ``expression`` and ``variation`` are the quaternion and its change in UFL, ``quaternion`` and ``change`` the same in
-    numbers, and ``functional`` the weights (..., 4) of changes of quaternions, of weights of changes of the field.
-    ``turned`` are values turned by rotation vectors (..., 3) along the directors.
+    Values (..., ``size``) of a field of rotations stand for quaternions (..., 4); here they are these.
     """
-
-    name: ClassVar[str]
-    size: ClassVar[int]
-
-    def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
-        """Values (m, size) at arclengths (m,) of a scene's ``start``, a straight rod without one.
-
-        The signs that the start gives its quaternions are a matter of choice: values are made to be continuous along
-        the rod from its left end.
-        """
-        if start is None:
-            return np.tile(IDENTITY[: self.size] if self.size > 1 else np.zeros(1), (s.size, 1))
-        every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
-        return self._continuous(np.asarray(start(every), dtype=float))[place.ravel()[PLACES:]]
-
-    @abstractmethod
-    def _continuous(self, q: np.ndarray) -> np.ndarray:
-        """Values (m, size) of quaternions (m, 4) along the rod."""
-
-
-@dataclass(frozen=True)
-class QuaternionField(Turning):
-    """Rotation as a quaternion ``q`` of four components, whose unit norm is a constraint."""
 
     name = "q"
     size = 4
 
     def expression(self, value: Any) -> Any:
-        """Quaternion of the field."""
+        """Quaternion of a value in UFL."""
         return value
 
     def variation(self, value: Any, change: Any) -> Any:
-        """Change of the quaternion."""
+        """Change of the quaternion in UFL."""
         return change
 
     def quaternion(self, values: np.ndarray) -> np.ndarray:
@@ -86,45 +59,56 @@ class QuaternionField(Turning):
         return change
 
     def functional(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Weights of changes of quaternions."""
+        """Weights (..., 4) of changes of quaternions, of ``weights`` of changes of values."""
         return weights
 
     def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
-        """Values turned by rotation vectors."""
+        """Values turned by rotation vectors (..., 3) along the directors."""
         return product(values, of_vector(vector))
 
     def normalised(self, values: np.ndarray) -> np.ndarray:
         """Values of unit quaternions."""
         return np.asarray(values / np.linalg.norm(values, axis=-1, keepdims=True))
 
-    def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
-        """Quaternion ``rotation`` of a clamped end at ``s``, or its negative: next to the ``start`` of the rod."""
-        value = np.array(rotation)
-        return np.asarray(-value if value @ self.start(start, np.array([s]), interval)[0] < 0 else value)
+    def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
+        """Values (m, size) at arclengths (m,) of a scene's ``start``, a straight rod without one.
+
+        The signs that the start gives its quaternions are a matter of choice: values are made to be continuous along
+        the rod from its left end.
+        """
+        every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
+        q = np.tile(IDENTITY, (len(every), 1)) if start is None else np.asarray(start(every), dtype=float)
+        return self._continuous(q)[place.ravel()[PLACES:]]
 
     def _continuous(self, q: np.ndarray) -> np.ndarray:
         signs = np.cumprod(np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1.0, 1.0))
         return np.asarray(q * np.append(1.0, signs)[:, None])
 
+    def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
+        """Value of the quaternion ``rotation``, or its negative, of a clamped end at ``s``: that next to the start."""
+        value = np.array(rotation)
+        return np.asarray(-value if value @ self.start(start, np.array([s]), interval)[0] < 0 else value)
 
-@dataclass(frozen=True)
-class AngleField(Turning):
+
+class AngleField(QuaternionField):
     """The angle about the normal of the plane, e1 or e2 (``normal`` 0 or 1), from the undeformed state.
 
     It is not confined to one turn: rotations tell angles apart up to ``2 pi``, and the number of whole turns is that of
     the scene's start.
     """
 
-    normal: int
     name = "angle"
     size = 1
 
+    def __init__(self, normal: int) -> None:
+        self.normal = normal
+
     def expression(self, value: Any) -> Any:
-        """Quaternion of the field."""
+        """Quaternion of a value in UFL."""
         return turn(value, self.normal)
 
     def variation(self, value: Any, change: Any) -> Any:
-        """Change of the quaternion."""
+        """Change of the quaternion in UFL."""
         return turn_change(value, change, self.normal)
 
     def quaternion(self, values: np.ndarray) -> np.ndarray:
@@ -150,7 +134,7 @@ class AngleField(Turning):
         return values
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
-        """Angle (1,) of the quaternion ``rotation`` of a clamped end at ``s``: next to the ``start`` of the rod."""
+        """Angle of the quaternion ``rotation`` of a clamped end at ``s``: the one next to the start."""
         angle = self._angle(np.array(rotation))
         near = self.start(start, np.array([s]), interval)[0]
         return np.asarray(angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi)))
@@ -162,7 +146,7 @@ class AngleField(Turning):
         return np.asarray(2 * np.arctan2(q[..., self.normal + 1], q[..., 0]))
 
 
-def turning_of(scene: Scene) -> QuaternionField | AngleField:
+def turning_of(scene: Scene) -> QuaternionField:
     """How the rotation of a scene's rod is described."""
     return QuaternionField() if scene.normal is None else AngleField(scene.normal)
 
@@ -170,16 +154,15 @@ def turning_of(scene: Scene) -> QuaternionField | AngleField:
 # --- centreline ----------------------------------------------------------------------------------------------------
 
 
-class Formulation(ABC):
+class Formulation:
     """Which unknowns a rod has in addition to rotations and strains, its Lagrangian in them, and where they say it is.
 
     ``name`` is that in files and options, ``words`` are what is unknown, and ``centreline`` says whether that is a
-    field, ``r``.
+    field, ``r``.  Here centreline and contact force are fields, ``r`` measured from the lift of the ends' positions:
+    that applies to all scenes.
     """
 
-    name: ClassVar[str]
-    words: ClassVar[str]
-    centreline: ClassVar[bool]
+    name, words, centreline = "pointwise", "all fields", True
 
     def refusal(self, scene: Scene) -> str:
         """Why it does not apply to a scene, in words that follow its name; empty if it does."""
@@ -187,7 +170,7 @@ class Formulation(ABC):
 
     def blocks(self, degree: int) -> list[Block]:
         """Fields in addition to rotations and strains, for a rotation of this degree."""
-        return []
+        return [Block("r", 3, degree, True, False), Block(CONTACT_FORCE, 3, degree - 1, False, True)]
 
     def unknowns(self, scene: Scene) -> list[Unknown]:
         """Scalar unknowns in addition to those of the parts of the scene."""
@@ -197,86 +180,41 @@ class Formulation(ABC):
         """What is no unknown, each with the reason."""
         return []
 
-    @abstractmethod
     def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
         """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`rodfem.forms.lagrangian`."""
+        return lagrangian.pointwise(W, along.R, along.v, along.dr, equations.unknowns.n)
 
-    @abstractmethod
     def contact_force(self, equations: Equations) -> list[Any]:
         """Components of the contact force in space (3,)."""
+        return [equations.unknowns.n[i] for i in range(3)]
 
-    @abstractmethod
     def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Position (3,) where ``at`` restricts a field to, at an end that of its ``side`` 0 or 1; None without one."""
+        return at(equations.unknowns.r) + equations.lift(c)
 
-    @abstractmethod
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Share of this rank in the position at a place without its offset (3,), or in that and the chord (2, 3).
 
         ``integral`` are weights (2, points) of slopes in their integrals to the place and over the rod, ``value``
         (nodes,) of nodal values in the value there.
         """
-
-    @abstractmethod
-    def nodal(self, shape: Shape, state: NodalValues) -> tuple[np.ndarray, np.ndarray]:
-        """Positions of the nodes (m, 3) without their offset, and the chord (3,)."""
-
-    @abstractmethod
-    def offset(self, fields: Fields, state: NodalValues, s: np.ndarray, chord: np.ndarray) -> np.ndarray:
-        """Offset (..., 3) or (3,) of the positions at arclengths ``s`` (...,); ``chord`` (3,) is that of the ends."""
-
-    @abstractmethod
-    def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
-        """Write positions ``r`` (cells, nodes, 3) above the lift, and those of the ends, into local values ``out``."""
-
-    @abstractmethod
-    def displacement(self, motions: Motions, state: NodalValues, change: NodalValues) -> np.ndarray:
-        """Displacement of the nodes (m, 3) in a change of the state."""
-
-
-class Pointwise(Formulation):
-    """Centreline and contact force are fields: it applies to all scenes.
-
-    The field ``r`` is measured from the lift of the ends' positions.
-    """
-
-    name, words, centreline = "pointwise", "all fields", True
-
-    def blocks(self, degree: int) -> list[Block]:
-        """Centreline and contact force."""
-        return [Block("r", 3, degree, True, False), Block(CONTACT_FORCE, 3, degree - 1, False, True)]
-
-    def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
-        """With ``r' = R v`` at each point."""
-        return lagrangian.pointwise(W, along.R, along.v, along.dr, equations.unknowns.n)
-
-    def contact_force(self, equations: Equations) -> list[Any]:
-        """A field."""
-        return [equations.unknowns.n[i] for i in range(3)]
-
-    def position(self, equations: Equations, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
-        """Known everywhere."""
-        return at(equations.unknowns.r) + equations.lift(c)
-
-    def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """No chord is needed."""
         return value @ state.values("r")[shape.cells].reshape(-1, 3)
 
     def nodal(self, shape: Shape, state: NodalValues) -> tuple[np.ndarray, np.ndarray]:
-        """Values of the field."""
+        """Positions of the nodes (m, 3) without their offset, and the chord (3,)."""
         r = shape.nodal(state.values("r")[shape.cells])
         return r, r[-1] - r[0]
 
     def offset(self, fields: Fields, state: NodalValues, s: np.ndarray, chord: np.ndarray) -> np.ndarray:
-        """The lift."""
+        """Offset (..., 3) or (3,) of the positions at arclengths ``s`` (...,); ``chord`` (3,) is that of the ends."""
         return fields.lift(s, state.constants())
 
     def store(self, shape: Shape, out: np.ndarray, r: np.ndarray, ends: tuple[Any, Any]) -> None:
-        """In the field."""
+        """Write positions ``r`` (cells, nodes, 3) above the lift, and those of the ends, into local values ``out``."""
         out[shape.system.fields.dofs["r"][shape.cells][:, shape.order]] = r
 
     def displacement(self, motions: Motions, state: NodalValues, change: NodalValues) -> np.ndarray:
-        """Values of the field."""
+        """Displacement of the nodes (m, 3) in a change of the state."""
         return motions.nodal(change.values("r")[motions.cells])
 
 
@@ -295,6 +233,10 @@ class Reduced(Formulation):
         """What needs the centreline."""
         reason = needs_centreline(scene)
         return reason and f"has no centreline, which {reason} needs"
+
+    def blocks(self, degree: int) -> list[Block]:
+        """None."""
+        return []
 
     def unknowns(self, scene: Scene) -> list[Unknown]:
         """Components ``n1``.. of a constant contact force, and positions of ends."""
@@ -396,7 +338,7 @@ def _left_end(
 
 AUTO = "auto"
 """Not a formulation: the first that applies is chosen."""
-FORMULATIONS: dict[str, Formulation] = {made.name: made for made in (Reduced(), Pointwise())}
+FORMULATIONS: dict[str, Formulation] = {made.name: made for made in (Reduced(), Formulation())}
 
 
 def names() -> tuple[str, ...]:

@@ -32,11 +32,6 @@ if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
     from rodfem.fem.state import Line
 
-PLACES, BEYOND = 50, 0.1
-"""Places of an element at which a polynomial stays in the range of a table, and how far beyond a bound it may be."""
-UNSEEN = 1e-11
-"""Part of the square of a table that elements need not see."""
-
 
 class Known:
     """Tables of a scene as a dolfinx Function, None if it has no table.
@@ -51,7 +46,6 @@ class Known:
     """Name of the function, by which compiled forms have it."""
 
     def __init__(self, fields: Fields, degree: int) -> None:
-        """Make the function on the mesh of ``fields``, of which tables have a ``degree`` on each element."""
         found, self._fields, cells = fields.scene.tables, fields, len(fields.vertices)
         self._degree = degree
         self.tables = list(dict.fromkeys(table for table, name in found if name == "s"))
@@ -83,7 +77,7 @@ class Known:
             size = np.ptp(vertices) * (table.rows**2).mean()
             meshes = (vertices, k - 1), (halves, k)
             own, left = (sum(_moments(table, a, b, p)[1] for a, b in pairwise(x)) / size for x, p in meshes)
-            if left > max(own / 4, UNSEEN):
+            if left > max(own / 4, 1e-11):  # of the square of the table: less need not be seen
                 return (
                     f"The {table.what} varies by {left**0.5:.1g} of its size within the elements of the error bar: a "
                     f"stiffness that does so changes loads by about {left:.0e} of themselves, which no bar holds; give "
@@ -141,7 +135,7 @@ class Known:
 
 
 def _knots(table: Table, a: float, b: float) -> np.ndarray:
-    """Knots of a table on an element, with its ends."""
+    """Knots of a table on an element, and its ends."""
     return np.array([a, *table.knots[(table.knots > a) & (table.knots < b)], b])
 
 
@@ -152,10 +146,10 @@ def _bounded(table: Table, a: float, b: float, p: int) -> np.ndarray:
     """
     coefficients, _ = _moments(table, a, b, p)
     rows = table.at(_knots(table, a, b))
-    off = legendre.legvander(np.linspace(-1.0, 1.0, PLACES), p)[:, 1:] @ coefficients[1:]
+    off = legendre.legvander(np.linspace(-1.0, 1.0, 50), p)[:, 1:] @ coefficients[1:]
     for sign in (-1.0, 1.0):
         most, bound = (sign * off).max(axis=0, initial=TINY), (sign * rows).max(axis=0)
-        room = bound + BEYOND * abs(bound) - sign * coefficients[0]
+        room = bound + 0.1 * abs(bound) - sign * coefficients[0]  # a tenth beyond a bound
         coefficients[1:] *= np.clip(room / most, 0.0, 1.0)
     return coefficients
 

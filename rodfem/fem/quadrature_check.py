@@ -28,23 +28,14 @@ from rodfem.fem.assembly import Assembler, Cells, Places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.state import Evaluation
 from rodfem.fem.system import System
+from rodfem.linalg.matrices import EPS
 from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
 
 POINTS, LEAST = 4096, 4
 """Points of the composite rule along the rod, about, and least number of pieces of an element."""
-SEEN = 1e-8
-"""Error relative to the residual that is none: equilibria are solved for to 1e-10."""
-NOISE = 100 * float(np.finfo(float).eps)
-"""The same relative to the residual in a strain of one, for each piece of the rod: round-off of curvatures."""
 MOTION = 1e-3 * np.array([1.0, 0.7, 0.45])
 """Sizes of the components of the motion: rotations in radian, strains, displacements over the length."""
-LITTLE, FELT = 1e-3, 1e-6
-"""Part of it in which a kink shows, and least difference of the changes in two opposite motions, over their size."""
-TURN, SHIFT = 0.382, 0.618
-"""Where, over the length, the motion has no curvature, and where no strain and no displacement."""
-REMEDY = "no error is estimated; use breaks=(...) where a function jumps or has a kink, and shorter elements elsewhere."
-"""End of a sentence on what is not integrated."""
 
 
 class Pieces:
@@ -55,7 +46,6 @@ class Pieces:
     """
 
     def __init__(self, equations: Equations) -> None:
-        """Keep the cells of this rank."""
         self.fields, self.equations = equations.fields, equations
         own = slice(0, self.fields.owned_cells)
         self.dofs, self._x = self.equations.cells.dofs[own], self.equations.cells.x[own]
@@ -113,7 +103,6 @@ class QuadratureCheck:
     """Tells where the quadrature of a ``system`` does not integrate the equations in a state; collective."""
 
     def __init__(self, system: System) -> None:
-        """Choose the rows that are compared: of rotations, strains and positions."""
         self.system, self._pieces = system, derived(system.equations, Pieces, lambda: Pieces(system.equations))
         names = (system.fields.turning.name, "v", "r")
         self._rows = {name: self._pieces.rows[name].ravel() for name in names if name in system.fields.dofs}
@@ -130,8 +119,9 @@ class QuadratureCheck:
         for rows in self._rows.values():
             first, second, third, sizes = (abs(y[..., rows]).max(axis=2) for y in (*off, size))
             largest = self._largest(sizes)
-            least = SEEN * largest + TINY
-            least[:2] += NOISE * number * elements * largest[1] / MOTION[0]
+            least = 1e-8 * largest + TINY  # is no error: equilibria are solved for to 1e-10
+            # round-off of curvatures, relative to the residual in a strain of one, for each piece of the rod
+            least[:2] += 100 * EPS * number * elements * largest[1] / MOTION[0]
             allowed = np.maximum(0.5**self._pieces.points * self._largest(first), least)
             for term, errors in enumerate(np.maximum(second, third) / allowed[:, None]):
                 cell = int(errors.argmax())
@@ -143,7 +133,8 @@ class QuadratureCheck:
         _, (a, b, low, high) = max(every)
         return (
             f"the quadrature of the element from {a:.6g} to {b:.6g} does not integrate the equations about s = "
-            f"{(low + high) / 2:.6g}, within {high - low:.1g}: {REMEDY}"
+            f"{(low + high) / 2:.6g}, within {high - low:.1g}: no error is estimated; use breaks=(...) where a "
+            "function jumps or has a kink, and shorter elements elsewhere."
         )
 
     def kink(self, x: PETSc.Vec) -> str:
@@ -152,12 +143,13 @@ class QuadratureCheck:
         The changes of the residual in two opposite motions add up to what is proportional to the motion at a kink, and
         to its square elsewhere.  Where the residual jumps its changes are not proportional to the motion.
         """
+        little, felt = 1e-3, 1e-6  # part of the motion in which a kink shows, least difference over the changes
         state, dofs = self.system.at(x), [self.system.fields.dofs[name] for name in self._rows]
         dofs += [copies for _, copies in self._positions()]
         here, motion = state.covector(), self._moved(state.local) - state.local
 
         def changes(size: float) -> tuple[np.ndarray, np.ndarray]:
-            """Largest sum of the changes in two opposite motions, and largest change, by kind of row."""
+            # largest sum of the changes in two opposite motions, and largest change, by kind of row
             ahead, back = (
                 Evaluation(state.equations, state.local + sign * size * motion, state.line).covector() - here
                 for sign in (1.0, -1.0)
@@ -166,8 +158,8 @@ class QuadratureCheck:
                 [ahead[rows] for rows in dofs]
             )
 
-        (uneven, change), (more, larger) = changes(LITTLE), changes(4 * LITTLE)
-        bent = (uneven > FELT * change) & (abs(more - 4 * uneven) < uneven)
+        (uneven, change), (more, larger) = changes(little), changes(4 * little)
+        bent = (uneven > felt * change) & (abs(more - 4 * uneven) < uneven)
         return "equations" if (bent | (larger < 2 * change)).any() else ""
 
     def _positions(self) -> Iterator[tuple[int, np.ndarray]]:
@@ -195,10 +187,10 @@ class QuadratureCheck:
         for block in fields.blocks:
             dofs, t = fields.dofs[block.name], (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
             if block.name == fields.turning.name:
-                out[dofs] = fields.turning.turned(local[dofs], (t[..., None] - TURN) ** 2 * MOTION)
+                out[dofs] = fields.turning.turned(local[dofs], (t[..., None] - 0.382) ** 2 * MOTION)
             elif block.name in ("v", "r"):
                 unit = scene.length if block.name == "r" else 1.0
-                out[dofs] += unit * (t[..., None] - SHIFT) * MOTION[: block.size]
+                out[dofs] += unit * (t[..., None] - 0.618) * MOTION[: block.size]
         for component, copies in self._positions():
             out[copies] += scene.length * MOTION[component]
         for dofs in fields.out_of_plane(scene.normal).values():

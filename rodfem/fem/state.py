@@ -67,7 +67,6 @@ class NodalValues:
     """
 
     def __init__(self, fields: Fields, local: np.ndarray, line: Line) -> None:
-        """Own the array from now on."""
         local.setflags(write=False)
         self.fields, self.local, self.line = fields, local, line
 
@@ -118,7 +117,6 @@ class Evaluation(NodalValues):
     """Values with the equations that are evaluated there."""
 
     def __init__(self, equations: Equations, local: np.ndarray, line: Line) -> None:
-        """Own the values from now on."""
         super().__init__(equations.fields, local, line)
         self.equations = equations
 
@@ -184,11 +182,6 @@ class State(Evaluation):
     """
 
     def __init__(self, system: System, local: np.ndarray, drifts: np.ndarray, line: Line) -> None:
-        """Own the values from now on.
-
-        ``local`` are the nodal values of this rank with its ghosts, ``line`` the parameters that the load stands for,
-        and the state belongs to the ``system``.
-        """
         super().__init__(system.equations, local, line)
         self.system, self.drifts = system, drifts
         self.phases: dict[frozenset[int], Phase] = {}
@@ -223,14 +216,13 @@ class State(Evaluation):
 
     def jacobian(self, row: PETSc.Vec) -> PETSc.Mat:
         """Jacobian into the system's matrix, with ``row`` as the row of the load."""
-        system = self.system
+        system, matrix = self.system, self.system.matrix
         with system.clock("assembly"):
-            matrix = system.matrix
             matrix.zeroEntries()
             self.assemble_into(matrix, self.equations.jacobian, load=True)
             system.add_drifts(matrix)
-            begin, end = row.getOwnershipRange()
-            matrix.setValues([system.load_index], np.arange(begin, end, dtype=PETSc.IntType), row.array_r, addv=True)
+            columns = np.arange(*row.getOwnershipRange(), dtype=PETSc.IntType)
+            matrix.setValues([system.load_index], columns, row.array_r, addv=True)
             matrix.assemble()
         return matrix
 

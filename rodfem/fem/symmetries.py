@@ -105,7 +105,6 @@ class Symmetry:
         return linear + self.along * fields.derivative if self.along else linear
 
     def __str__(self) -> str:
-        """In words what moves: the names of the parts, the rotations and translations of other fields left out."""
         least = 1e-3 * abs(self.weights).max()  # less of a part is not named
         parts = [p for p, w in zip(self.parts, self.weights, strict=True) if abs(w) > least]
         names = list(dict.fromkeys(p.name for p in parts if p.name))

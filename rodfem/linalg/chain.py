@@ -182,11 +182,6 @@ class Chain:
     """
 
     def __init__(self, kind: str, border: int, resort: Mumps | None = None, sizes: Sizes | None = None) -> None:
-        """Keep the number of scalars, and the last ``resort``, for when there is a matrix of this ``kind``.
-
-        Without a ``resort`` :class:`GaveUpError` is raised instead.  ``sizes`` returns the natural sizes of the
-        unknowns, None where they are one.
-        """
         self.kind, self.border, self.resort, self.sizes = kind, border, resort, sizes
         self.resorted, self.times, self.regular = False, 0, False
         self._matrix: PETSc.Mat | None = None

@@ -54,7 +54,6 @@ class Memory:
     """
 
     def __init__(self, ffi: Any) -> None:
-        """Keep nothing yet; ``ffi`` is that of the module."""
         self._ffi = ffi
         self._kept: dict[Hashable, Any] = {}
 

@@ -87,10 +87,6 @@ class Mumps:
     """
 
     def __init__(self, kind: str, sizes: Sizes | None = None) -> None:
-        """Keep the kind, ``lu`` or ``cholesky`` (LDL^t), for when there is a matrix.
-
-        ``sizes`` returns the natural sizes of the unknowns when a matrix is factored; None where they are one.
-        """
         self.kind, self.sizes, self.prefix = kind, sizes, f"rodfem_{kind}_"
         self._scaled: PETSc.Mat | None = None
         self._scaled_from = 0

@@ -122,7 +122,6 @@ class Entries:
     """
 
     def __init__(self, matrix: PETSc.Mat) -> None:
-        """Learn the pattern of ``matrix``."""
         self.matrix = matrix
         if (known := shared(matrix)) is not None:
             self.starts, self.columns = known.pattern.indptr, known.pattern.indices

@@ -36,7 +36,6 @@ class Basis:
     """Orthonormal vectors, one by one, with their ``duals``: the ``metric`` times each."""
 
     def __init__(self, metric: PETSc.Mat) -> None:
-        """Begin with none."""
         self.metric = metric
         self.vectors: list[PETSc.Vec] = []
         self.duals: list[PETSc.Vec] = []

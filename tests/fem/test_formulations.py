@@ -11,7 +11,7 @@ from problem.test_remedies import parser
 
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, Fields
-from rodfem.fem.formulations import AUTO, FORMULATIONS, Pointwise, names
+from rodfem.fem.formulations import AUTO, FORMULATIONS, Formulation, names
 from rodfem.problem.scene import Scene
 
 pytestmark = pytest.mark.alone
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.alone
 HOME = Path(__file__).parents[2]
 
 
-class Third(Pointwise):
+class Third(Formulation):
     """The pointwise one, by another name and for rods in space alone."""
 
     name, words = "third", "all fields once more"
