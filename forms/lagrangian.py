@@ -2,21 +2,22 @@
 
 The equilibria of a hyperelastic rod are the stationary points of the three-field (Hu-Washizu) functional ::
 
-    L = int_0^l [ W(v, k) + n . (r' - R v) + eta/2 (|q|^2 - 1) ] ds - (potential of the loads)
+    L = int_0^l [ W(v, k) + n . (r' - R v) + eta/2 (|q|^2 - 1) ] ds + V
 
-with the strains ``v``, the contact force ``n`` and the unit-norm multiplier ``eta`` as fields of their own:
-stationarity in ``v`` is the constitutive law ``n_i = dW/dv_i`` (body components), in ``r`` the balance of forces
-``n' = 0``, in ``q`` the balance of moments, in ``n`` the kinematics ``r' = R v``.  Only the strains that a rod leaves
-free are unknowns: all of a flexible rod, the stretch of an unshearable one, none of one that is inextensible too.  Its
-first variation is the weak form (11)-(12) of Kumar & Healey (2010), which they linearise for each of the three in (17),
-(18) and (19); see :mod:`rodfem.forms.paper`.
+with the potential ``V`` of the loads (``-F . r(l)`` of a dead force), and with the strains ``v``, the contact force
+``n`` and the unit-norm multiplier ``eta`` as fields of their own: stationarity in ``v`` is the constitutive law
+``n_i = dW/dv_i`` (body components), in ``r`` the balance of forces ``n' = 0``, in ``q`` the balance of moments, in
+``n`` the kinematics ``r' = R v``.  Only the strains that a rod leaves free are unknowns: all of a flexible rod, the
+stretch of an unshearable one, none of one that is inextensible too.  Its first variation is the weak form (11)-(12) of
+Kumar & Healey (2010), which they linearise for each of the three in (17), (18) and (19); see
+:mod:`rodfem.forms.paper`.
 
 Where no force acts along the rod, ``n`` is constant and ``r`` drops out: with ``chord = r(l) - r(0)`` ::
 
-    L_reduced = int_0^l [ W(v, k) - n . R v + eta/2 (|q|^2 - 1) ] ds + n . chord
+    L_reduced = int_0^l [ W(v, k) - n . R v + eta/2 (|q|^2 - 1) ] ds + n . chord + V
 
 in which a component of ``n`` is a known dead force or *one scalar* unknown, whose equation is the integral
-constraint ``int (R v)_i ds = chord_i``: their mixed formulation, with the functionals (37) and (44).
+constraint ``int (R v)_i ds = chord_i``, their (36): their mixed formulation, with the functionals (37) and (44).
 """
 
 from __future__ import annotations

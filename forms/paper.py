@@ -29,8 +29,9 @@ Kumar & Healey (2010) do not take this second variation.  They linearise the wea
 (11)-(12), in test fields that stay as they are, among them a *fixed* test spin ``tau``: (17) with ``dv`` free
 (flexible), (18) with ``dv = dv3 e3`` (unshearable), (19) with ``dv = 0`` (unshearable and inextensible); (16) is the
 mass, (20) the terms of the ends.  :func:`linearized_balance` is that form for all rods at once, with
-``dm = theta x m + R (W_kv dv + W_kk dk)``.  For the mixed formulation, whose functionals are (37) and (44), ``dr`` is
-gone, ``dn`` is constant and its equation is ``int theta x R v + R dv = 0``.  The two differ in
+``dm = theta x m + R (W_kv dv + W_kk dk)``.  Theirs have ``dr`` and no ``dv``, which follows by (41)-(43) from
+``dr' = theta x R v + R dv``.  For the mixed formulation, (40), whose functionals are (37) and (44), ``dr`` is gone,
+``dn`` is constant and its equation is ``int theta x R v + R dv = 0``.  The two differ in
 
 * symmetry: :func:`second_variation` is symmetric, :func:`linearized_balance` is not.  Because spins do not commute,
   they differ by a multiple of the equations ::

@@ -143,6 +143,74 @@ def test_linearized_balance_is_the_linearisation_of_the_weak_form(rod: str, form
         assert abs(second - linearised) > 1e-3
 
 
+class Literal:
+    """A random state of a rod, with test fields ``eta'``, ``psi``, and perturbations that fulfil its constraints."""
+
+    def __init__(self, rod: str, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        free = list(RODS[rod])
+        stiff = [i for i in range(3) if i not in free]
+        self.kept = [*free, 3, 4, 5]
+        R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        self.R = R * np.linalg.det(R)
+        self.v, A = np.array(UNDEFORMED), rng.normal(size=(6, 6))
+        self.v[free], self.H = rng.normal(size=len(free)), A + A.T
+        self.n, self.m, self.eta_s, self.psi, self.psi_s, self.theta, self.theta_s = rng.normal(size=(7, 3))
+        self.r_s = self.R @ self.v
+        self.dv, self.test_dv = rng.normal(size=3), self.R.T @ (self.eta_s - np.cross(self.psi, self.r_s))
+        self.dv[stiff] = self.test_dv[stiff] = 0.0
+        self.dr_s = np.cross(self.theta, self.r_s) + self.R @ self.dv
+        self.dn_body = np.where(np.isin(np.arange(3), stiff), rng.normal(size=3), 0.0)  # of the reactions
+
+    def balance(self, one: list[np.ndarray], other: list[np.ndarray]) -> float:
+        """``linearized_balance`` of perturbations ``theta, theta_s, dv, dn, dr_s``."""
+        H = self.H[:3, :3], self.H[:3, 3:], self.H[3:, 3:]
+        state = paper.State(*map(constant, (self.R, self.v, self.n, self.m, self.R.T @ self.n, *H)))
+        tests, fields = (paper.Perturbation(*map(constant, each)) for each in (one, other))
+        return float(value(paper.linearized_balance(state, tests, fields)))
+
+    def geometry(self) -> np.ndarray:
+        """``(0 -n x; 0 -m x) (dr, theta)``."""
+        return np.concatenate([-np.cross(self.n, self.theta), -np.cross(self.m, self.theta)])
+
+
+def constant(numbers: np.ndarray) -> Any:
+    return ufl.as_tensor(numbers.tolist())
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("rod", RODS)
+def test_17_to_19_to_the_letter(rod: str, seed: int) -> None:
+    """``[Pi H Pi^t E^t + (0 -n x; 0 -m x)](dr, theta) . E^t (eta, psi) + (n x dr') . psi``, and reactions."""
+    x = Literal(rod, seed)
+    E, E_test = (  # E^t (dr, theta) = (dr' - theta x r', theta')
+        np.concatenate([r - np.cross(spin, x.r_s), spin_s])
+        for r, spin, spin_s in ((x.dr_s, x.theta, x.theta_s), (x.eta_s, x.psi, x.psi_s))
+    )
+    Pi = np.kron(np.eye(2), x.R)[:, x.kept]
+    stress = Pi @ x.H[np.ix_(x.kept, x.kept)] @ Pi.T @ E + x.geometry()
+    literal = stress @ E_test + np.cross(x.n, x.dr_s) @ x.psi + x.R @ x.dn_body @ E_test[:3]
+    dn = np.cross(x.theta, x.n) + x.R @ x.dn_body
+    tests, fields = [x.psi, x.psi_s, x.test_dv, 0 * x.n, x.eta_s], [x.theta, x.theta_s, x.dv, dn, x.dr_s]
+    assert x.balance(tests, fields) == pytest.approx(literal, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_40_to_the_letter(seed: int) -> None:
+    """The mixed formulation: ``beta`` and ``lambda`` test the stretch ``v3`` and the constant force."""
+    x, (dn, lam) = Literal("unshearable", seed), np.random.default_rng(seed).normal(size=(2, 3))
+    d3, dv3, beta = x.R[:, 2], x.dv[2], x.test_dv[2]
+    H = x.H[np.ix_(x.kept, x.kept)]
+    strain, test = (np.append(v, x.R.T @ spin_s) for v, spin_s in ((dv3, x.theta_s), (beta, x.psi_s)))
+    change = dv3 * d3 + x.v[2] * np.cross(x.theta, d3)  # (41)-(42): dr'
+    literal = test @ H @ strain + x.geometry() @ np.append(beta * d3, x.psi_s) - np.cross(change, x.n) @ x.psi
+    literal -= dn @ (beta * d3 + np.cross(x.psi, x.v[2] * d3)) + lam @ change
+    tests, fields = [x.psi, x.psi_s, x.test_dv, lam, 0 * dn], [x.theta, x.theta_s, x.dv, dn, 0 * dn]
+    assert x.balance(tests, fields) == pytest.approx(literal, rel=1e-12)
+    np.testing.assert_allclose(change, x.dr_s, rtol=1e-12)
+    assert d3 @ (x.eta_s - np.cross(x.psi, x.r_s)) == pytest.approx(beta)  # (43)
+
+
 @pytest.mark.long
 def test_they_agree_at_an_equilibrium_and_only_there() -> None:
     """A straight rod under tension and twist; a rotation of the moment, which breaks its balance, tells them apart."""
