@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import reference_values
 from classics import SUPPORTS, column
-from hemitropic_cases import DEFAULT, Constants, explored, specials, user_points
+from hemitropic_cases import DEFAULT, Constants, explored, follower, specials, user_points
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipk
 
 from rodfem.continuation.branch import Branch
@@ -127,6 +128,19 @@ def test_symmetry_leaves_no_drift(constants: Constants) -> None:
         assert max(p.drift for p in branch.points) < 1e-12
         if branch.depth:
             assert min(p.zero for p in branch.points[1:]) == 1  # the circle of states that each belongs to
+
+
+def test_states_have_the_flip_symmetry_of_the_paper() -> None:
+    """A half turn about the axis through the middle, across e3: ``r(-s) = F r(s)``, ``R(-s) = F R(s) F``."""
+    shape = follower("reduced", *RICH).shape
+    for branch in branches()[1:]:
+        for p in branch.points[1:-1:5]:
+            sample = shape.sample(p.x)
+            r, R = sample["r"], Rotation.from_quat(np.roll(sample["q"], -1, axis=1)).as_matrix()
+            axis = r[len(r) // 2] / np.linalg.norm(r[len(r) // 2])
+            F = 2 * np.outer(axis, axis) - np.eye(3)
+            np.testing.assert_allclose(r[::-1], r @ F, atol=1e-9)
+            np.testing.assert_allclose(R[::-1], F @ R @ F, atol=1e-9)
 
 
 def test_coupling_tells_folds_from_branch_points() -> None:
