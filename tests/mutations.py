@@ -740,21 +740,23 @@ FAULTS = {
         "tests/continuation/test_row_checks.py",
     ),
     "a-defect-by-one-tangent": Fault(
-        f"{CONTINUATION}row_checks.py",
+        f"{CONTINUATION}follow.py",
         "known = [p for p in rows[-ROWS:] if",
         "known = [p for p in rows[-1:] if",
         "tests/continuation/test_row_checks.py",
     ),
     "rows-are-no-equilibria": Fault(
-        f"{CONTINUATION}row_checks.py",
+        f"{CONTINUATION}follow.py",
         "if not worst <= VIOLATED and",
         "if not worst <= 1e9 * VIOLATED and",
         "tests/continuation/test_row_checks.py",
     ),
     # location
-    "location-is-blunt": Fault(f"{CONTINUATION}flutter.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
+    "location-is-blunt": Fault(
+        f"{CONTINUATION}eigenvalue_curves.py", "SHARP, ENOUGH = 1e-11,", "SHARP, ENOUGH = 1e-4,", LOCATE
+    ),
     "location-at-another-zero": Fault(
-        f"{CONTINUATION}flutter.py", "np.argmin(abs(real))", "np.argmax(abs(real))", LOCATE
+        f"{CONTINUATION}eigenvalue_curves.py", "np.argmin(abs(real))", "np.argmax(abs(real))", LOCATE
     ),
     "unresolved-points-are-merged-with-others": Fault(
         f"{CONTINUATION}branch.py",
@@ -935,7 +937,7 @@ FAULTS = {
         "tests/literature/test_postbuckling.py",
     ),
     "flutter-beside-the-collision": Fault(
-        f"{CONTINUATION}flutter.py",
+        f"{CONTINUATION}eigenvalue_curves.py",
         "abs(root) < 1 and uncertainty < best.uncertainty",
         "uncertainty < 10 * best.uncertainty",
         LOCATE,
@@ -1159,7 +1161,7 @@ FAULTS = {
         "tests/diagram/test_sharp_in_state.py",
     ),
     "branches-that-attract-alone": Fault(
-        "rodfem/continuation/reduced.py",
+        "rodfem/continuation/switching.py",
         "        if max(abs(values[i : i + 2])) > felt\n",
         "        if False\n",
         "tests/continuation/test_reduced.py",

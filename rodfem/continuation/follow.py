@@ -1,9 +1,20 @@
-"""Pseudo-arclength continuation: following a curve of equilibria with control of the step.
+"""Pseudo-arclength continuation: following a curve of equilibria with control of the step, and checks of its rows.
 
-The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector
-is Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The
-step is chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large
-where it does not.  A step that has ended on another branch is halved (:mod:`rodfem.continuation.row_checks`).
+The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector is
+Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The step is
+chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large where it does
+not.
+
+A branch is the integral of its unit tangent in arclength, ``x_b - x_a = int_a^b t ds``.  With the tangents at the last
+rows interpolated (Adams-Moulton weights) what is left of that equation, the *defect*, is of a higher order in the step
+than the correction of a prediction.  Between rows of two branches it is at least their distance (Allgower & Georg,
+Introduction to Numerical Continuation Methods, 2003, 6.1, on path jumping): a step that has ended on another branch is
+halved.
+
+Newton's method ends with a small correction.  At the state of a row the equations themselves are evaluated: balance of
+forces and moments, tested with every shape function, the constraints, and the phase conditions.  What is left must be
+round-off: below :data:`VIOLATED` in units of the rod's own energy, or below the round-off of the product of the second
+variation with the state.  Quaternions have unit norm.
 """
 
 from __future__ import annotations
@@ -12,25 +23,30 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import copysign
 
+import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver, Step, predict
-from rodfem.continuation.row_checks import defect
+from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver, Step, lagrange, predict
 from rodfem.continuation.step_control import StepControl
+from rodfem.errors import ConvergenceError
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import EPS
+from rodfem.linalg.orthogonal import combine
 from rodfem.tolerances import SAME_LOAD
 
 FAILURES = 2
 """Failures after each other from which a step follows the tangent of the last point alone."""
-PILE = 64
-"""Points of a branch after which the vectors that are not used any more are destroyed."""
 ON_BOUND = 1e-8
 """Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
 UNEXPLAINED = 0.25
 """Defect of a step, relative to the correction that is aimed at, from which on it has ended on another branch."""
 END_OF_RANGE, MOST_REACHED = "end of range", "points reached"
 """Why a branch ends at a bound of the range, and with as many points as its steps may have."""
+VIOLATED = 1e-8
+"""Residual of an equilibrium, in units of the rod's own energy, and difference of a squared norm from one."""
 
 
 def follow(
@@ -45,12 +61,12 @@ def follow(
     ``bounds`` are the least and the greatest load; the branch ends exactly on them, and has a point exactly at each
     stop of the scene, where the tangent of the point becomes that of the other side.  The caller appends (and may
     insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
-    point.  ``solver`` has the mesh, ``steps`` chooses the lengths of steps.
+    point.
     """
     solver.regular.restart()
     walk = _Walk(solver, points, steps, bounds)
     while len(points) < steps.most and not walk.ended:
-        if len(points) % PILE == 0:
+        if len(points) % 64 == 0:
             compat.destroy_garbage(solver.system.comm)
         point = walk.attempt(reach(points[-1]))
         if point is not None:
@@ -65,7 +81,6 @@ class _Walk:
     def __init__(
         self, solver: BranchSolver, points: list[Point], steps: StepControl, bounds: tuple[float, float]
     ) -> None:
-        """Begin with the first step."""
         scene = solver.system.scene
         self.solver, self.points, self.steps, self.ends = solver, points, steps, bounds
         self.stops, self.span = scene.stops, abs(scene.span[1] - scene.span[0])
@@ -79,8 +94,10 @@ class _Walk:
         known, bounds = self._predicting(last), self._around(last.load)
         low, high = (bound + sign * ON_BOUND * self.span for bound, sign in zip(bounds, (-1, 1), strict=True))
         made = self.solver.step(known, last.arclength + self._step, (low, high), 0.5 * self._step)
-        if not low <= made.load <= high or _on_bound(made.load, last, bounds, self.span):
-            point = self._at_bound(known, made.load, min(bounds, key=lambda bound: abs(bound - made.load)))
+        bound = min(bounds, key=lambda bound: abs(bound - made.load))
+        moved = abs(last.load - made.load) > 2 * ON_BOUND * self.span
+        if not low <= made.load <= high or (moved and abs(bound - made.load) < ON_BOUND * self.span):
+            point = self._at_bound(known, made.load, bound)
         else:
             point = self._along(known, made)
         if point is None and not self.ended:
@@ -102,11 +119,9 @@ class _Walk:
 
     def _predicting(self, last: Point) -> list[Point]:
         """Rows that the next one is predicted from."""
+        stop = max((i for i, point in enumerate(self.points) if point.load in self.stops), default=0)
         # beyond a sharp bend the polynomial through the last points has another tangent than the branch
-        if self._failures >= FAILURES and last.tangent is not None:
-            known = [last]
-        else:
-            known = since_stop(self.points, self.stops)
+        known = [last] if self._failures >= FAILURES and last.tangent is not None else self.points[stop:]
         if self.solver.system.damping and last.tangent is not None:
             # across a family, along which the path is not determined
             known = [replace(last, tangent=self.solver.tangent(self.solver.row(last.tangent), at=last.x))]
@@ -136,10 +151,8 @@ class _Walk:
             self.ended = END_OF_RANGE  # the row is there, and the branch goes on out of the range
             return None
         end = bound in self.ends
-        self._next, self._offset = (
-            self.steps.begin(),
-            0.0 if end else copysign(ON_BOUND * self.span, beyond - last.load),
-        )
+        self._next = self.steps.begin()
+        self._offset = 0.0 if end else copysign(ON_BOUND * self.span, beyond - last.load)
         point = self._to_load(known, beyond, bound)
         if point is None or not self._stays(known, point):
             self._missed = f"; no state is found at {bound:.6g}: let the range end elsewhere if that is a bifurcation"
@@ -178,13 +191,6 @@ class _Walk:
             self.ended = f"no convergence at {system.scene.load} = {last.load:.6g} ({why}{self._missed})"
 
 
-def since_stop(points: list[Point], stops: Sequence[float]) -> list[Point]:
-    """The points of a branch since it was at one of the loads ``stops``, that one included."""
-    if not stops:
-        return points
-    return points[max((i for i, point in enumerate(points) if point.load in stops), default=0) :]
-
-
 def _moved(solver: BranchSolver, x: PETSc.Vec, by: float) -> PETSc.Vec:
     """The state ``x`` at a load that differs ``by`` so much."""
     out = x.copy()
@@ -192,7 +198,74 @@ def _moved(solver: BranchSolver, x: PETSc.Vec, by: float) -> PETSc.Vec:
     return out
 
 
-def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float) -> bool:
-    """Whether a step from ``last`` that changes the load ends on a bound of the range, but for round-off."""
-    near = min(abs(bound - load) for bound in bounds)
-    return near < ON_BOUND * span and abs(last.load - load) > 2 * ON_BOUND * span
+def defect(system: System, rows: Sequence[Point]) -> float:
+    """Size, in the metric, of ``x_b - x_a - int_a^b t ds`` across the chord of the last two of the ``rows``.
+
+    Lengths are those of chords, so that the component along the chord is left out.
+    """
+    a, b = rows[-2:]
+    known = [p for p in rows[-ROWS:] if p.tangent is not None]
+    nodes, length = np.array([p.arclength for p in known]), b.arclength - a.arclength
+    gauss = 0.5 / np.sqrt(3.0)  # distance of the two points of the rule from the middle: exact for cubics
+    first, second = (lagrange(nodes, a.arclength + (0.5 + sign * gauss) * length)[0] for sign in (-1, 1))
+    rest, chord = combine([p.tangent for p in known], first + second), b.x - a.x
+    rest.aypx(-length / 2, chord)
+    image = system.metric * chord
+    rest.axpy(-image.dot(rest) / image.dot(chord), chord)
+    return float(system.norm(rest))
+
+
+class RowCheck:
+    """Checks that points of one solver are equilibria of unit quaternions; collective over its ranks."""
+
+    def __init__(self, solver: BranchSolver) -> None:
+        self.solver, self.system = solver, solver.system
+        self._equations = solver.system.new_vector()
+
+    def __call__(self, point: Point) -> None:
+        """Check a point; raises :class:`ConvergenceError` that names the equation, or the norm, that is violated."""
+        where = f"At {self.system.scene.load} = {point.load:.8g}"
+        stretched = self._stretched(point.x)
+        if not stretched <= VIOLATED:
+            raise ConvergenceError(
+                f"{where} a quaternion has a squared norm that differs from one by {stretched:.1e}: use more elements "
+                "or smaller steps."
+            )
+        number, worst = self._residual(point.x)
+        if not worst <= VIOLATED and not worst <= self._round_off(point.x):
+            raise ConvergenceError(
+                f"{where} the state is no equilibrium: the equation of {self._equation(number)} is violated by "
+                f"{worst:.1e}; use smaller steps."
+            )
+
+    def _residual(self, x: PETSc.Vec) -> tuple[int, float]:
+        """Number and size, in natural units, of the largest residual."""
+        self.system.set_phase(x)
+        self.system.at(x).residual(self._equations)
+        sizes = self.system.in_units(self._equations, 1)
+        sizes.abs()
+        return sizes.max()
+
+    def _round_off(self, x: PETSc.Vec) -> float:
+        """Round-off of the product of the second variation with the state, in natural units."""
+        system, matrix = self.system, self.system.state_matrix()
+        system.at(x).assemble_into(matrix, system.equations.jacobian)
+        matrix.assemble()
+        sizes = system.matrix_in_units(matrix), system.in_units(x, -1)
+        return 1e3 * EPS * float(np.prod([size.norm(PETSc.NormType.INFINITY) for size in sizes]))
+
+    def _stretched(self, x: PETSc.Vec) -> float:
+        """Largest difference of the squared norm of a quaternion from one."""
+        fields = self.system.fields
+        if "q" not in fields.dofs:
+            return 0.0
+        norms = np.sum(self.system.at(x).values("q") ** 2, axis=-1)
+        worst = float(abs(norms - 1.0).max(initial=0.0))
+        return worst if fields.comm.size == 1 else float(fields.comm.allreduce(worst, op=MPI.MAX))
+
+    def _equation(self, number: int) -> str:
+        """Name of the unknown with a ``number``, whose equation is that of the same row."""
+        fields = self.system.fields
+        found = [name for name, i in fields.scalars.items() if i == number]
+        found += [name for name, dofs in fields.dofs.items() if (fields.number[dofs] == number).any()]
+        return str(next(name for names in fields.comm.allgather(found) for name in names))

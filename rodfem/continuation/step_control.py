@@ -10,33 +10,16 @@ from rodfem.errors import InputError
 from rodfem.problem.arguments import finite, real, whole
 from rodfem.tolerances import NEGLIGIBLE
 
-SHRINK, GROW = 0.4, 1.6
-"""Least and greatest ratio of a step to the one before."""
-
 
 @dataclass(frozen=True)
 class StepControl:
-    """Steps by the size of the correction, in the metric (root mean square rotation in radian, load over its span).
+    """Steps by the size of the correction, in the metric (root mean square rotation in radian, load over its span)."""
 
-    Attributes
-    ----------
-    first
-        Length of the first step.
-    largest
-        Bound of the step, which is also how coarse a branch is drawn.
-    smallest
-        Length of a step at which a branch is given up.
-    aim
-        Distance from prediction to correction that is aimed at.
-    most
-        Number of points at which a branch is given up.
-    """
-
-    first: float = 0.02
-    largest: float = 0.1
-    smallest: float = 1e-5
-    aim: float = 1e-2
-    most: int = 2000
+    first: float = 0.02  #: length of the first step
+    largest: float = 0.1  #: bound of the step, which is also how coarse a branch is drawn
+    smallest: float = 1e-5  #: length of a step at which a branch is given up
+    aim: float = 1e-2  #: distance from prediction to correction that is aimed at
+    most: int = 2000  #: number of points at which a branch is given up
 
     def __post_init__(self) -> None:
         """Check kinds and the largest step; raises :class:`InputError`."""
@@ -61,7 +44,7 @@ class StepControl:
     def after(self, step: float, moved: float, order: int) -> float:
         """Length of the next step; the correction ``moved`` the prediction, that of a predictor of an ``order``."""
         factor = (self.aim / max(moved, NEGLIGIBLE)) ** (1 / order)
-        return min(step * min(max(factor, SHRINK), GROW), self.largest)
+        return min(step * min(max(factor, 0.4), 1.6), self.largest)
 
     def accepts(self, before: Point, after: Point) -> bool:
         """Whether a step that has converged is kept; else half of it is tried."""
@@ -70,18 +53,10 @@ class StepControl:
 
 @dataclass(frozen=True)
 class IndexStepControl(StepControl):
-    """Steps over which the index changes by no more than a bound, so that there is a row between nearly equal points.
+    """Steps over which the index changes by no more than a bound: there is a row between nearly equal points."""
 
-    Attributes
-    ----------
-    change
-        Greatest change of the index from row to row.
-    resolved
-        Length of a step that is kept nevertheless: eigenvalues may be multiple.
-    """
-
-    change: int = 1
-    resolved: float = 1e-4
+    change: int = 1  #: greatest change of the index from row to row
+    resolved: float = 1e-4  #: length of a step that is kept nevertheless: eigenvalues may be multiple
 
     def __post_init__(self) -> None:
         """Check the bound, too; raises :class:`InputError`."""

@@ -1,7 +1,18 @@
-"""Branch switching: the directions in which branches leave a branch point, and their first points (Keller 1977)."""
+r"""Branch switching: the directions in which branches leave a branch point, and their first points (Keller 1977).
+
+With null vectors ``a_1 ... a_n`` the reduced equations of Lyapunov and Schmidt select a few lines, and a null vector of
+the eigensolver is on one by chance only.  At a distance ``A`` in the direction ``d(t) = cos t a_1 + sin t a_2`` of two
+of them the state ``x`` and the load of ::
+
+    F(x) + g M d'(t) = 0,        <d(t), x - x_0> = A,        <d'(t), x - x_0> = 0
+
+are those of the rod held in that direction by a force ``g(t)`` across it: branches leave where it is zero, stable or
+not.  Its zeros are bracketed around the circle, and each is a state on a branch, seen from the branch point.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,27 +22,24 @@ from rodfem.continuation.branch import PITCHFORK, TRANSCRITICAL, VERTICAL_BRANCH
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.first_equilibrium import STILL
 from rodfem.continuation.singular_points import LEVEL
-from rodfem.fem.newton import correct
-from rodfem.linalg.orthogonal import project_out
+from rodfem.fem.newton import Correction, Limits, correct, linear_step, newton
+from rodfem.linalg.orthogonal import combine, project_out
+from rodfem.roots import zero_between
 from rodfem.tolerances import TINY
 
-NEAREST = 1e-3
-"""Least distance of the first point of a branch: nearer to the branch point eigenvalues are zero to round-off."""
-FIRST = 0.05
-"""Distance of the first point of a branch from the branch point that it leaves."""
-SHORTEST = 1e-4
-"""Amplitude, in the metric, below which no further one is tried from a branch point."""
+NEAREST, FIRST = 1e-3, 0.05
+"""Least distance of the first point of a branch from the branch point that it leaves, and the usual one: nearer to that
+eigenvalues are zero to round-off."""
 CLOSE, STEEP = 2.0, 50.0
 """How far from its prediction the first point of a branch may lie, in amplitudes: usually, and at most."""
-FIXED = 1e-6
-"""Norm of a unit direction's image by a symmetry below which it moves nothing."""
+CIRCLE = 48
+"""Directions of half a circle in which the force is computed: on no axis of a symmetry."""
 
 
 def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
-    """Unit directions in which branches may leave a branch point, one for each circle of equivalent ones.
+    """Unit directions in which branches may leave a branch point, orthogonal to the branch's own tangent.
 
-    In the plane of the null vectors and the branch's own tangent, what is orthogonal to the tangent; of the null
-    vectors that a continuous symmetry carries into each other one is kept.
+    Of the null vectors that a continuous symmetry carries into each other one is kept.
     """
     system, tangent = solver.system, special.point.tangent
     known = [] if tangent is None else [tangent.copy()]
@@ -49,7 +57,7 @@ def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
         out.append(d)
         known.append(d)
         for image in system.equivalent_directions(special.point.x, d):
-            if (size := system.norm(image)) > FIXED:
+            if (size := system.norm(image)) > 1e-6:  # else the symmetry leaves it where it is
                 known.append(image / size)
     return out
 
@@ -73,18 +81,17 @@ def _load_response(solver: BranchSolver, special: SpecialPoint) -> PETSc.Vec:
 def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, first: float) -> Point | None:
     """First point of the branch that leaves ``special`` along ``direction``, about ``first`` away, or None.
 
-    The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
-    fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
-    meet turns as a rigid body about any axis): then Newton's method is damped along the family.  ``solver`` has the
-    mesh, ``first`` is a length in the metric.  A transcritical branch whose load changes much faster than its state is
-    farther away: it is tried last.
+    The amplitude is halved until the point lies where the direction says.  Where that fails, a family of equilibria may
+    leave at once, at each of which the Jacobian is singular (an elastica whose ends meet turns as a rigid body about
+    any axis): then Newton's method is damped along the family.  A transcritical branch whose load changes much faster
+    than its state is farther away: it is tried last.
     """
     system = solver.system
     row, before = solver.row(direction), system.damping
     dampings = dict.fromkeys((before, before or solver.inertia.tolerance))
     for damping, reach in (*((damping, CLOSE) for damping in dampings), (before, STEEP)):
         system.damping, amplitude = damping, first
-        while amplitude > SHORTEST:
+        while amplitude > 1e-4:  # in the metric
             x = special.point.x + direction * amplitude
             outcome = correct(system, x, row, reach=reach * amplitude)
             if outcome.converged:
@@ -106,11 +113,10 @@ def start_branch(
     """First two points, and first index, of the branch that leaves ``special`` along ``direction``, one of ``ways``.
 
     The first one is the special point, and the index that right after it, None where it is not known: eigenvalues that
-    stay zero on the trunk without a symmetry need not on the branch.  The second one is nearer where the load has
-    turned back before it, or its index is not that with which the branch begins: the fold, or the branch point, that
-    says why is on the branch.  So it is where its load is out of the ``bounds``.  Nor is it farther away than the
-    branch that it leaves began, from a ``depth`` of 2 on: next to a nearly double point branches are short.  ``solver``
-    has the mesh.  None where no point is found.
+    stay zero on the trunk without a symmetry need not on the branch.  The second one is nearer where its load is out of
+    the ``bounds`` or has turned back before it, or its index is not that with which the branch begins: the fold, or the
+    branch point, that says why is on the branch.  Nor is it farther away than the branch that it leaves began, from a
+    ``depth`` of 2 on: next to a nearly double point branches are short.  None where no point is found.
     """
     amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
     first, load = leave(solver, special, direction, amplitude), special.point.load
@@ -172,3 +178,71 @@ def _early(special: SpecialPoint, side: float, begins: int | None, first: Point,
     if begins is not None and not first.negative <= begins <= first.negative + first.zero:
         return True
     return min((first.load - special.point.load) * side, first.slope * side) < 0
+
+
+def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
+    """Unit directions in which branches do leave a branch point with several null vectors of different motions.
+
+    Of two null vectors they are the zeros of the force that holds the rod in a direction.  Of more, Newton's method is
+    started in random directions.  Each is taken once more as that in which what Newton's method finds is seen from the
+    branch point.  The null vectors are ``ways``, orthonormal, which are returned where nothing is found.  Of motions
+    that a continuous symmetry turns, each in its own circle, only the relative phase that the ways have is tried.
+    """
+    n, found = len(ways), list[np.ndarray]()
+    if n == 2:
+        zeros = np.array(_zeros(lambda angle: _force(solver, special.point.x, ways, angle)))
+        tried = np.stack([np.cos(zeros), np.sin(zeros)], axis=1)
+    else:
+        tried = np.concatenate([np.eye(n), np.random.default_rng(n).normal(size=(12 * (n - 1), n))])
+    for weights in tried:
+        seen = _seen(solver, special.point.x, ways, weights / np.linalg.norm(weights))
+        seen = seen if seen is None else _seen(solver, special.point.x, ways, seen)
+        if seen is not None and all(abs(seen @ known) < 0.999 for known in found):
+            found.append(seen)
+    return [combine(list(ways), weights) for weights in found] or list(ways)
+
+
+def _seen(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], weights: np.ndarray) -> np.ndarray | None:
+    """Weights (n,) of the direction in which an equilibrium is, that is found in that of others; None without one."""
+    direction = combine(list(ways), weights)
+    x = origin + direction * FIRST
+    if not correct(solver.system, x, solver.row(direction), reach=CLOSE * FIRST).converged:
+        return None
+    away = solver.system.metric * (x - origin)
+    seen = np.array([away.dot(way) for way in ways])
+    return np.asarray(seen / np.linalg.norm(seen))
+
+
+def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], angle: float) -> float:
+    """Force that holds the rod at an ``angle`` from the first of two ``ways``; nan where there is no such state."""
+    system = solver.system
+    along, across = (combine(list(ways), np.array([np.cos(t), np.sin(t)])) for t in (angle, angle + np.pi / 2))
+    row, held, answer = solver.row(along), system.metric * across, system.new_vector()
+    begin, force = origin + along * FIRST, 0.0
+    x = begin.copy()
+
+    def iteration(fresh: bool) -> Correction | None:
+        nonlocal force
+        system.set_phase(x)
+        step = linear_step(system, x, row)
+        if step is None or not system.solve(held, answer):
+            return None
+        # (J  M d'; d'^t M  0) by its Schur complement, of one row
+        force = held.dot(x - origin - step) / held.dot(answer)
+        step.axpy(force, answer)
+        x.axpy(-1.0, step)
+        return Correction(system.distance(x, begin), system.norm(step))
+
+    return force if newton(iteration, Limits(reach=CLOSE * FIRST)).converged else float("nan")
+
+
+def _zeros(force: Callable[[float], float]) -> list[float]:
+    """Angles in half a circle at which a force is zero."""
+    angles = np.pi * (np.arange(CIRCLE + 1) + (np.sqrt(5) - 1) / 2) / CIRCLE
+    values = np.array([force(angle) for angle in angles])
+    felt = 1e-6 * np.nanmax(abs(values), initial=0.0)  # round-off: a symmetry turns the direction
+    return [
+        zero_between(force, float(angles[i]), float(angles[i + 1]), 1e-4)  # in radian
+        for i in np.flatnonzero(values[1:] * values[:-1] < 0)
+        if max(abs(values[i : i + 2])) > felt
+    ]

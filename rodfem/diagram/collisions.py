@@ -14,11 +14,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.eigenvalue_curves import assignment
-from rodfem.continuation.flutter import (
+from rodfem.continuation.eigenvalue_curves import (
     ENOUGH,
     NODES,
     Located,
+    assignment,
     in_doubt,
     interpolant,
     locate_flutter,
@@ -225,7 +225,7 @@ class Collisions:
 def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:
     """Collision of a ``measured`` ``cluster``, from about a ``load`` on, in pieces of the half ``width`` at first.
 
-    Round-off of the matrix counts (see :func:`~rodfem.continuation.flutter.locate_flutter`).  So does that pairs that
+    Round-off of the matrix counts (see :func:`locate_flutter`).  So does that pairs that
     are taken for one may meet at loads, and at eigenvalues, of their own.  Raises :class:`ConvergenceError`.
     """
     found = locate_flutter(measured, cluster, load, width)

@@ -31,8 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.eigenvalue_curves import assignment
-from rodfem.continuation.flutter import SHARP
+from rodfem.continuation.eigenvalue_curves import SHARP, assignment
 from rodfem.continuation.kinds import DIVERGENCE
 from rodfem.diagram.collisions import (
     Collisions,

@@ -15,9 +15,8 @@ from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.observer import Remark
-from rodfem.continuation.reduced import lines
 from rodfem.continuation.singular_points import COUPLED, coupling_of
-from rodfem.continuation.switching import directions, start_branch
+from rodfem.continuation.switching import directions, lines, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import Deflation, equilibria_at
 from rodfem.diagram.equilibria import ahead, first_state, name_of_first

@@ -21,9 +21,9 @@ from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import Curves
+from rodfem.continuation.follow import RowCheck
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer, Remark
-from rodfem.continuation.row_checks import RowCheck
 from rodfem.diagram.collisions import Critical, Mean, Measuring, Side, located_flutter, zero_near
 from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.doubts import Quadrature

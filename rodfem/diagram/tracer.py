@@ -14,10 +14,9 @@ from rodfem.adaptivity.zero_stretch import before_the_end, end_at_zero_stretch, 
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, follow
+from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, RowCheck, follow
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer, Remark
-from rodfem.continuation.row_checks import RowCheck
 from rodfem.continuation.switching import FIRST
 from rodfem.diagram.doubts import PersistentZeros, Quadrature
 from rodfem.diagram.equivalence import connection, equivalent, image_of, loop_end

@@ -11,7 +11,7 @@ from hemitropic_cases import explored
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
 
-from rodfem.continuation.flutter import in_doubt, locate_flutter, real_root
+from rodfem.continuation.eigenvalue_curves import in_doubt, locate_flutter, real_root
 from rodfem.continuation.kinds import FOLD
 from rodfem.stability.cluster import Cluster, Measured
 

@@ -16,8 +16,7 @@ from petsc4py import PETSc
 from rodfem import Discretization, Plan, Solver, StepControl, clamped, free, trace
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver, Step
-from rodfem.continuation.follow import UNEXPLAINED
-from rodfem.continuation.row_checks import RowCheck, defect
+from rodfem.continuation.follow import UNEXPLAINED, RowCheck, defect
 from rodfem.errors import ConvergenceError
 from rodfem.fem.symmetries import add_change
 from rodfem.fem.system import System
