@@ -6,6 +6,10 @@ difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |
 vertices.  How smooth it is the last Legendre coefficients of the strains on the two meshes tell, whose ratio bounds
 that of loads and positions amply.  To that comes what location and arithmetic leave open of the richer result.
 
+The end of a branch at which the smallest stretch vanishes is sharpened on finer meshes: a strain converges like
+``h^k`` only.  It is computed on meshes two and four times as fine, one degree richer, of which the finer one is kept.
+Its error is a quarter of their difference at most, all of it for linear elements.
+
 All of this is asymptotic, and a single value may agree on two meshes by accident; norms do not.  If the strains of the
 state, or of its null vector, differ between the two meshes by more than :data:`RESOLVED_TO` of themselves, the first
 mesh does not resolve the state, and ``d`` is no bound.  Of an event ``rho`` is at least what a sum over nodes has: half
@@ -18,26 +22,30 @@ Of an ordinate that is taken inside of an element ``rho`` is therefore of the la
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
-from rodfem.continuation.arc import STEADY, stepped
+from rodfem.continuation.arc import STEADY, Arc, stepped
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_piece import nearest
-from rodfem.continuation.kinds import FOLD
+from rodfem.continuation.kinds import END, FOLD
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
 from rodfem.errors import ConvergenceError
+from rodfem.fem.fields import HIGHEST
 from rodfem.fem.newton import correct
 from rodfem.fem.shape import Shape, Transfer, halved, richer_system
+from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event
-from rodfem.tolerances import ROUND_OFF, round_off, same_place
+from rodfem.roots import zero_between
+from rodfem.tolerances import INSIDE, ROUND_OFF, round_off, same_place, unit
 
 RESOLVED_TO = 0.1
 """Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
@@ -46,6 +54,12 @@ RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
 LEFT = 0.5
 """Part of an error of an event that is left at most: that of a number of the nodes falls with their distance."""
+LOCATED, ALONG = 1e-10, 1e-11
+"""Uncertainty of the load at which the stretch vanishes on one mesh, relative to it or to one, and of the arclength."""
+ASIDE = 1e-4
+"""Distance before an end at which the stretch vanishes, relative to the step, at which the index is counted."""
+FIRST = 2e-4
+"""First step, in spans, to where the stretch vanishes on a richer mesh."""
 
 
 def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
@@ -73,10 +87,7 @@ class OrdinateBound:
         self._tried = [(float(s), coarse.weights(float(s)), richer.weights(float(s))) for s in tried]
 
     def __call__(self, x: PETSc.Vec, again: PETSc.Vec, left: float, rho: float) -> float:
-        """Return a bound of the error of the ordinate of a state, ``x`` on the first mesh and ``again`` on the richer.
-
-        The ordinate of the latter is uncertain by ``left``, and has ``rho`` of the error.
-        """
+        """Bound of the error of the ordinate of a state, ``x`` on the first mesh and ``again`` on the richer."""
         return bound(self.coarse.ordinate(x), self.richer.ordinate(again), left, rho, self._change(x, again))
 
     def _change(self, x: PETSc.Vec, again: PETSc.Vec) -> float:
@@ -100,7 +111,7 @@ class OrdinateBound:
 
 @dataclass(frozen=True)
 class Again:
-    """A point computed again: ``x``, ``load``, ``ordinate``, and ``load_left``, ``ordinate_left``, their uncertainties.
+    """A point computed again on a richer mesh, its load and ordinate uncertain by ``load_left`` and ``ordinate_left``.
 
     ``ordinate_error`` bounds the error of the first ordinate, ``rho`` is the part of the first errors that is left, and
     ``changed`` the relative change of the strains of the state or of its null vector, the larger one.
@@ -117,7 +128,7 @@ class Again:
 
     @property
     def resolved(self) -> bool:
-        """Whether the first discretisation resolves the state: otherwise the errors may exceed their bounds."""
+        """Whether the first mesh resolves the state: otherwise the errors may exceed their bounds."""
         return self.changed <= RESOLVED_TO
 
     def unlike(self, load: float) -> str:
@@ -133,10 +144,10 @@ class Again:
 
 
 class Enriched:
-    """A second, richer discretisation of the system of a solver, and its estimates.
+    """A second, richer mesh of the system of a solver, and its estimates.
 
-    ``origins`` are branch points that were located there, each with the special point of the first discretisation, and
-    the part of the error that is left.
+    ``origins`` are branch points that were located there, each with the special point of the first mesh, and the part
+    of the error that is left.
     """
 
     def __init__(self, solver: BranchSolver) -> None:
@@ -150,7 +161,7 @@ class Enriched:
         self._coarse, self.indicator = (SmoothnessIndicator(each, weights) for each in (solver, self.solver))
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
-        """Ratio of the errors of a state (and its null vector) on the richer discretisation and on the first."""
+        """Ratio of the errors of a state (and its null vector) on the richer mesh and on the first."""
         degree = self.coarse.system.fields.discretization.degree
         first, last = self._coarse.unresolved(before[0], before[1:]), self.indicator.unresolved(after[0], after[1:])
         if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
@@ -159,13 +170,9 @@ class Enriched:
         return max(halved(degree), min(2 * last / max(first, RESOLVED), 0.75))
 
     def estimate(self, special: SpecialPoint) -> None:
-        """Set ``error_estimate`` and ``ordinate_error`` of a special point, and whether it is ``resolved``.
-
-        They are infinite if the richer discretisation does not find the point, and no bounds if the point is not
-        resolved.
-        """
+        """Set the errors of a special point, infinite if the richer mesh has none, and whether it is ``resolved``."""
         if special.test_function == "stretch":
-            return  # it has its own estimate: see :mod:`rodfem.adaptivity.zero_stretch`
+            return  # it has its own estimate: see :func:`end_at_zero_stretch`
         point, at_a_load = special.point, not special.kind.solved
         self.system.damping = self.coarse.system.damping
         try:
@@ -183,10 +190,9 @@ class Enriched:
         special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
 
     def again(self, point: Point, *, fixed_load: bool) -> Again:
-        """Solve for a point on the richer discretisation, at its load, once, or across its tangent.
+        """Solve for a point on the richer mesh, at its load, once, or across its tangent; or ConvergenceError.
 
-        One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` if there
-        is none.
+        One more step of Newton's method tells what arithmetic leaves open.
         """
         key = id(point), self.system.damping
         if fixed_load and key in self._at_loads:
@@ -218,19 +224,18 @@ class Enriched:
         return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
-        """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
+        """Set the uncertainty of a law of the first mesh: that of the rod's law, infinite without another."""
         self.system.damping = self.coarse.system.damping
         way, again, rho = self.transfer(direction, state=False), None, 0.0
         for known, origin, left in self.origins:
             if known is special:
                 again, rho = normal_form_of(self.solver, origin, way), left
-        if again is None or not alike(again, law):
-            law.uncertainty = float("inf")
-        else:
+        law.uncertainty = float("inf")
+        if again is not None and alike(again, law):
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
 
     def _at_event(self, point: Point, event: Event) -> Again:
-        """The point of the richer discretisation at which an event happens: the nearest one, of several."""
+        """The point of the richer mesh at which an event happens: the nearest one, of several."""
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
         node, along = nearest(self.solver, event, x, tangent)
         found, units = node.kept.x, self.solver.units
@@ -244,7 +249,7 @@ class Enriched:
         return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed)
 
     def _located(self, special: SpecialPoint) -> Again:
-        """The fold or branch point on the richer discretisation, and its ordinate: the same singular system."""
+        """The fold or branch point on the richer mesh, and its ordinate: the same singular system."""
         solver, point, metric = self.solver, special.point, self.solver.inertia.metric
         x, k = self.transfer(point.x, state=True), special.multiplicity
         modes = [self.transfer(v, state=False) for v in (*special.null_vectors, *special.nearby)]
@@ -266,3 +271,84 @@ class Enriched:
         self.origins.append((special, Origin(found.x, found.load, ordinate, load_left, left), rho))
         ordinate_error = self._ordinate(point.x, found.x, left, rho)
         return Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed)
+
+
+def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
+    """The point between ``a`` and ``b`` at which the smallest stretch vanishes."""
+    arc, first = Arc(solver, a, b), a.arclength + INSIDE * (b.arclength - a.arclength)
+    return arc.point(zero_between(lambda s: solver.shape.stretch(arc.state(s)), first, b.arclength, ALONG))
+
+
+def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
+    """A point right before the ``last`` admissible one after the row ``a``; None if it is not found.
+
+    At the end a rod that is squeezed to nothing has no stiffness against some motions, whose eigenvalues are zero.
+    """
+    try:
+        return Arc(solver, a, last).point(last.arclength - ASIDE * (last.arclength - a.arclength))
+    except ConvergenceError:
+        return None
+
+
+def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) -> SpecialPoint:
+    """The end at the ``last`` admissible point, sharpened where ``error_bars`` are asked for, or a note why not."""
+    located = LOCATED * unit(last.load, one=solver.units.load)
+    end = SpecialPoint(END, last, last.negative, last.negative, located, test_function="stretch")
+    if error_bars:
+        try:
+            with solver.system.clock.scope("error bars"):
+                _sharpen(solver, end)
+        except ConvergenceError as trouble:
+            end.note = f"no error estimate: {trouble}"
+    return end
+
+
+def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
+    """Sharpen an end at which the smallest stretch vanishes; raises :class:`ConvergenceError` if that fails."""
+    system, d = solver.system, solver.system.fields.discretization
+    sample, found = solver.shape.sample(end.point.x), list[Point]()
+    for factor in (2, 4):
+        mesh = d.finer(factor, richer=int(d.degree < HIGHEST))  # the forms of :class:`Enriched` serve
+        fine = BranchSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
+        x = _vanishing(fine, fine.shape.restore(sample), end.point)
+        point = replace(end.point, x=x, tangent=None, load=fine.system.scalar(x), energy=fine.energy(x))
+        found.append(replace(point, ordinate=fine.shape.ordinate(x), stretch=fine.shape.stretch(x)))
+        sample = fine.shape.sample(x)
+    before, point = found
+    end.point = replace(point, x=solver.shape.restore(sample))
+    end.located_to = LOCATED * unit(point.load, one=solver.units.load)
+    left = 1.0 if d.degree == 1 else 0.25
+    end.error_estimate = max(left * abs(point.load - before.load), end.located_to)
+    end.ordinate_error = max(left * abs(point.ordinate - before.ordinate), end.located_to)
+    end.note = f"its load was computed with {4 * d.elements} elements of degree {d.degree + 1}"
+
+
+def _vanishing(solver: BranchSolver, x: PETSc.Vec, coarse: Point) -> PETSc.Vec:
+    """State of a mesh, near ``x``, at which the smallest stretch vanishes, to round-off."""
+    states = {coarse.load: x}
+
+    @cache
+    def stretch(load: float) -> float:
+        nearest = min(states, key=lambda known: abs(known - load))
+        states[load], outcome = solver.at_load(states[nearest], load, reach=1.0)
+        if not outcome.converged:
+            raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")
+        return solver.shape.stretch(states[load])
+
+    scene = solver.system.scene
+    load = _bracketed_zero(stretch, coarse, abs(scene.span[1] - scene.span[0]))
+    return states[load]
+
+
+def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
+    """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
+    a, value = coarse.load, stretch(coarse.load)
+    step = np.copysign(FIRST * span, coarse.slope if value > 0 else -coarse.slope)
+    for _ in range(14):
+        if abs(value) <= ROUND_OFF:  # it has no sign
+            return a
+        b, other = a + step, stretch(a + step)
+        if value * other <= 0 and abs(other) > ROUND_OFF:
+            return zero_between(stretch, a, b, ROUND_OFF * span)
+        a, value, step = b, other, 1.7 * step
+    raise ConvergenceError("the zero of the stretch was not found on the finer mesh")

@@ -1,4 +1,4 @@
-"""What the points of a locus fulfil: its defining equations, as a corrector onto the curve.
+"""Points of a locus in a plane of two parameters, and its defining equations as a corrector onto the curve.
 
 Folds, branch points and divergence loads are where the second variation is singular: the equations of one of them
 (:mod:`rodfem.continuation.singular`) on a plane across the curve.  A branch point is one as long as its symmetry lasts:
@@ -11,35 +11,34 @@ square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0
 of ``D`` vanishes (Seyranian & Mailybaev, *Multiparameter Stability Theory with Mechanical Applications*, World
 Scientific 2003, chapters 2 and 5).  A point of it is found on a line of the plane by the secant method for ``D``, its
 tangent from central differences.  Pairs that are equal by a symmetry have one ``D``; where they part, the curve ends.
-
-Other unstable eigenvalues are counted by the factors of a symmetric tangent matrix, and without a potential among all
-that the mesh has: those that are negative or complex.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.plane import Destroyed, Guess, LocusPoint, Plane
-from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.branch_solver import ROWS, BranchSolver, cubic_weights, lagrange
 from rodfem.continuation.singular import Curve, Section, SingularState, SingularSystem
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.state import Line, line
+from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
+from rodfem.problem.units import size
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure, noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
-from rodfem.tolerances import ROUND_OFF, TINY
+from rodfem.tolerances import NEGLIGIBLE, ROUND_OFF, TINY
 
 MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair has only just met: it has a square root there."""
 VANISHED = "another eigenvalue has vanished since the row before, seen from the start"
 UNSTABLE = "another frequency has become unstable, or stable, since the row before, seen from the start"
-"""What is said of a row where their number has changed, with a potential and without one."""
-NEAREST = "the index is that of the frequencies nearest zero: the mesh has too many unknowns to find all of them"
-"""What is said of a locus on a fine mesh."""
+"""Marks of a row where their number has changed, with a potential and without one."""
 SPLIT = 1.1
 """Times what eigenvalues, or the ``D`` of pairs, that are equal by a symmetry differ by that each may be off: to first
 order."""
@@ -48,123 +47,259 @@ IMPERFECT = 1e-7
 FEWER = 1e-5
 """Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
 their mean, are not equal by a symmetry."""
-FIRST = 1e-4
-"""First step of the secants, relative to the bounds."""
-SHARP, NOISE = 1e-12, 1e-4
-"""Steps of the secants that end them: by their own size, or where they no longer shrink."""
-FAR = 1e-6
-"""Step of the secants from which on they tell the slope of ``D``."""
+FIRST, FAR = 1e-4, 1e-6
+"""First step of the secants, relative to the bounds, below which they end where they no longer shrink; the least step
+that tells the slope of ``D``."""
 DIFFERENCE = 1e-3
-"""Step of the central differences of ``D``, relative to the bounds."""
+"""Step of the central differences of ``D``, and of a count next to a divergence load, relative to the bounds."""
+Interval = tuple[float, float]
+Prediction = tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]
+"""Parameters (2,) and state of a point that is expected, and their derivatives in arclength."""
+Guess = tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec | None]
+"""The same with a direction of any size, which may be one of the parameters alone."""
 Zero = tuple[float, float, Measured, PETSc.Vec]
 """Place of a zero of ``D`` on a line of parameters, its uncertainty, the cluster and the state there."""
 
 
-def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None = None) -> int:
-    """Unstable eigenvalues but for ``size`` ones: those nearest to zero, or of an invariant subspace.
-
-    Its ``basis`` (n, size) is orthonormal in the mass.
-    """
-    spectrum = pencil.spectrum
-    own = -abs(spectrum.values) if basis is None else pencil.shares(basis)
-    chosen = np.argsort(own, kind="stable")[: len(own) - size]
-    values, noise = spectrum.values[chosen], np.maximum(spectrum.zero, spectrum.noise[chosen])
-    return int(((values.real < -noise) | (abs(values.imag) > np.maximum(noise, MET * abs(values)))).sum())
+class Destroyed(ConvergenceError):
+    """The special point changes its kind, or ends, along the locus; the message says why."""
 
 
 @dataclass(frozen=True)
-class _Frame:
-    """Parameters ``origin`` (2,), and directions ``axes`` (2, 2) across a tangent and along it, in ``width`` (2,)."""
+class Sought:
+    """What marks a point along a curve: ``of`` a point is zero there, or ``stationary``."""
 
-    origin: np.ndarray
-    axes: np.ndarray
-    width: np.ndarray
-
-    def turned(self, parts: np.ndarray) -> np.ndarray:
-        """Change (2,) of the parameters of which these are the parts across and along."""
-        return np.asarray(parts @ self.axes * self.width)
+    of: Callable[[LocusPoint], float]
+    stationary: bool
 
 
-class Singular:
-    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence.
+@dataclass
+class LocusPoint:
+    """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
 
-    It is bordered with the null vectors of a point ``near`` the curve in a ``plane``; ``solver`` has the mesh.
+    ``located_to`` (2,) are the uncertainties of the parameters.  ``rest`` counts the negative (without a potential:
+    unstable) eigenvalues but for those that vanish or collide here, -1: not counted; those that collide are real on the
+    side ``lower`` of the load.  ``omega2`` is a double eigenvalue.  At folds ``coupling`` (2,) is the derivative of the
+    equations in the two parameters along the null vector, in units of the bounds, and ``curvature`` the second one
+    along it.  ``modes`` are the null vectors, as many as the ``multiplicity``, and modes near by, or a basis of the
+    double eigenvalue's invariant subspace; ``left`` are the left null vectors where they are others.  ``orientation``
+    is the side of the tangent, -1 or 1, on which the defining function grows: it changes only where two curves cross.
+    ``ended`` says why the curve ends here.  A turning point or an end is ``sought`` along the curve, and was found in
+    ``windows`` of these half widths.
     """
 
+    p: np.ndarray
+    x: PETSc.Vec
+    dp: np.ndarray
+    dx: PETSc.Vec
+    located_to: np.ndarray
+    s: float = 0.0
+    ordinate: float = float("nan")
+    rest: int = -1
+    lower: int = 0
+    omega2: float = float("nan")
+    curvature: float = 0.0
+    coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    modes: list[PETSc.Vec] = field(default_factory=list)
+    left: list[PETSc.Vec] = field(default_factory=list)
+    multiplicity: int = 0
+    orientation: int = 0
+    ended: str = ""
+    sought: Sought | None = None
+    windows: tuple[float, ...] = ()
+
+    def reversed(self) -> LocusPoint:
+        """The same point with the opposite tangent."""
+        return replace(self, dp=-self.dp, dx=-self.dx, orientation=-self.orientation)
+
+
+class Plane:
+    """Lines in the plane of two parameters of the scene of a system, the first of which is the scene's load.
+
+    The ``width`` (2,) of their ``intervals`` scales them; ``sizes`` (2,) are their natural sizes.
+    """
+
+    def __init__(self, system: System, parameter: str, intervals: tuple[Interval, Interval]) -> None:
+        """Check parameter and bounds; raises :class:`SceneError`."""
+        scene = system.scene
+        if parameter not in scene.parameters:
+            raise SceneError(
+                f"{parameter!r} is no parameter of the scene: choose one of {', '.join(scene.parameters)}."
+            )
+        if parameter == scene.load:
+            raise SceneError(f"{parameter!r} is the load itself: choose a second parameter to vary.")
+        self.system, self.names, self.intervals = system, (scene.load, parameter), intervals
+        for name, (low, high) in zip(self.names, intervals, strict=True):
+            if not low < high:
+                raise SceneError(f"The bounds {low:g}, {high:g} of {name} are empty: give the lower one first.")
+            scene.parameters[name].check(name, low)
+            scene.parameters[name].check(name, high)
+        for end in intervals[1]:  # the stored energy must be convex at both ends
+            replace(scene, parameters={**scene.parameters, parameter: replace(scene.parameters[parameter], value=end)})
+        self.low, self.high = np.array(intervals, dtype=float).T
+        self.width = self.high - self.low
+        self.sizes = np.array([size(max(map(abs, interval))) for interval in intervals])
+
+    def line(self, origin: np.ndarray, direction: np.ndarray) -> Line:
+        """Line on which the scalar unknown ``load`` stands for ``t`` in ``origin + t direction``."""
+        named = (dict(zip(self.names, map(float, pair), strict=True)) for pair in (origin, direction))
+        return line(self.system.scene, *named)
+
+    def axis(self, which: int) -> np.ndarray:
+        """Direction (2,) of parameter number ``which``, as long as its bounds are wide."""
+        return (np.arange(2) == which) * self.width
+
+    def at(self, p: np.ndarray, x: PETSc.Vec) -> PETSc.Vec:
+        """The state ``x`` with the load in ``p`` (2,), in place, which from now on is the scene's at the other one."""
+        self.system.line = self.line(np.array([0.0, p[1]]), np.array([1.0, 0.0]))
+        self.system.set_load(x, float(p[0]))
+        return x
+
+    def outside(self, p: np.ndarray) -> tuple[int, float] | None:
+        """Number of a parameter that is out of bounds and its bound, the one farthest out; None inside."""
+        over = np.maximum(p - self.high, self.low - p) / self.width
+        which = int(np.argmax(over))
+        return None if over[which] <= 0 else (which, self.intervals[which][int(p[which] > self.high[which])])
+
+    def round_off(self, p: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Uncertainties (2,) of parameters ``p`` by their last ``change``: round-off at least."""
+        return np.asarray(np.maximum(abs(change), ROUND_OFF * np.maximum(self.sizes, abs(p))))
+
+    def words(self, p: np.ndarray, digits: int = 8) -> str:
+        """Both parameters by name."""
+        return ", ".join(f"{name} = {v:.{digits}g}" for name, v in zip(self.names, p, strict=True))
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries."""
+        system, verification = self.system, self.system.verification
+        before, dropped, notices = (system.line, system.phase), {*verification.dropped}, [*verification.notices]
+        try:
+            yield
+        finally:
+            system.line, system.phase = before
+            verification.dropped, verification.notices = dropped, notices
+
+
+def predict(nodes: list[LocusPoint], s: float) -> Prediction:
+    """Extrapolate a locus to arclength ``s``."""
+    last = nodes[-1]
+    if len(nodes) < 3:
+        step = s - last.s
+        return last.p + step * last.dp, last.x + last.dx * step, last.dp, last.dx
+    recent = nodes[-ROWS:]
+    return _combined(lagrange(np.array([n.s for n in recent]), s), [n.p for n in recent], [n.x for n in recent])
+
+
+def between(a: LocusPoint, b: LocusPoint, s: float) -> Prediction:
+    """Cubic through two nodes with their tangents at arclength ``s``."""
+    return _combined(cubic_weights(b.s - a.s, s - a.s), [a.p, a.dp, b.p, b.dp], [a.x, a.dx, b.x, b.dx])
+
+
+def _combined(weights: tuple[np.ndarray, np.ndarray], p: list[np.ndarray], x: list[PETSc.Vec]) -> Prediction:
+    value, slope = weights
+    return value @ np.array(p), combine(x, value), slope @ np.array(p), combine(x, slope)
+
+
+class Criterion(ABC):
+    """Defining equations of a locus in a ``plane``, on the mesh of a ``solver``: a corrector onto it."""
+
+    others = UNSTABLE
+
+    def __init__(self, solver: BranchSolver, plane: Plane) -> None:
+        self.solver, self.plane = solver, plane
+
+    @abstractmethod
+    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Size of a step."""
+
+    @abstractmethod
+    def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
+        """Point of the locus on the plane through a ``guess`` across its direction; raises :class:`ConvergenceError`.
+
+        Across a direction of the parameters alone that is a line of theirs.  ``near`` is a point of the locus whose
+        null vectors, or invariant subspace, are close by; ``reach`` bounds how far the state may move, in the metric.
+        Raises :class:`Destroyed` where the special point changes its kind.
+        """
+
+    @abstractmethod
+    def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
+        """The same point with its parameters, state and double eigenvalue alone: no tangent, modes or counts."""
+
+
+class Singular(Criterion):
+    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
+
     def __init__(self, solver: BranchSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
-        self.solver, self.plane, self.fold = solver, plane, fold
+        """Border the matrix with the null vectors of a point ``near`` the curve."""
+        super().__init__(solver, plane)
+        self.fold = fold
         self.states = SingularSystem(solver, near.modes, near.multiplicity, fold=fold)
-        self.inertia, self.metric = self.states.inertia, self.states.inertia.metric
+        self.scale, self.metric = solver.inertia.scale, solver.inertia.metric
         self.frequencies = NonsymmetricSolver(solver.system) if near.left else None
         self.others = UNSTABLE if near.left else VANISHED
+        self.broken = (
+            f"{plane.names[1]} is an imperfection that destroys the branch point, or is one on this mesh alone"
+        )
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step: parameters over the widths of their bounds, the state in the metric."""
         return float(np.hypot(np.linalg.norm(dp / self.plane.width), np.sqrt(max((self.metric * dx).dot(dx), 0.0))))
 
     def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
-        """As :class:`~rodfem.codim2.plane.Criterion` says; raises :class:`ConvergenceError`."""
-        frame, section = self._section(guess, near, reach)
-        found = self.states.solve(self._unloaded(guess[1]), section)
+        """See :class:`Criterion`."""
+        axes, x, section = self._section(guess, near, reach)
+        found = self.states.solve(x, section)
         if found is None or found.curve is None:
             raise ConvergenceError("Newton's method does not converge")
-        self._require(found)
-        return self._node(found, found.curve, frame, guess)
+        if not self.fold and found.size > IMPERFECT * self.scale:
+            raise Destroyed(self.broken)
+        if found.spread > FEWER * self.scale:
+            raise Destroyed(f"its {len(found.vectors)} zero eigenvalues do not vanish together any more")
+        return self._node(found, found.curve, axes, guess)
 
     def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
-        """As :class:`~rodfem.codim2.plane.Criterion` says; raises :class:`ConvergenceError`."""
-        frame, section = self._section(guess, near, 1.0)
-        found = self.states.place(self._unloaded(guess[1]), section)
+        """See :class:`Criterion`."""
+        axes, x, section = self._section(guess, near, 1.0)
+        found = self.states.place(x, section)
         if found is None:
             raise ConvergenceError("Newton's method does not converge")
         x, parts, last = found
-        p = frame.origin + frame.turned(parts)
-        return LocusPoint(p, self.plane.at(p, x), near.dp, near.dx, self._located(p, frame.turned(last)))
+        p = guess[0] + self._turned(parts, axes)
+        return LocusPoint(p, self.plane.at(p, x), near.dp, near.dx, self.plane.round_off(p, self._turned(last, axes)))
 
-    def _unloaded(self, x: PETSc.Vec) -> PETSc.Vec:
-        x = x.copy()
-        self.solver.system.set_load(x, 0.0)
-        return x
-
-    def _section(self, guess: Guess, near: LocusPoint, reach: float) -> tuple[_Frame, Section]:
-        """Plane through a guess across its direction; the border is the null vectors of a point ``near`` by."""
+    def _section(self, guess: Guess, near: LocusPoint, reach: float) -> tuple[np.ndarray, PETSc.Vec, Section]:
+        """Axes (2, 2) across and along a guess's direction, its state without a load, the plane through it across."""
         self.states.border(near.modes, near.left)
-        p, _, dp, dx = guess
+        p, x, dp, dx = guess
         direction = dp / self.plane.width
-        size = float(np.linalg.norm(direction))
-        along = direction / size if size else np.array([0.0, 1.0])
-        frame = _Frame(p, np.array([[along[1], -along[0]], along]), self.plane.width)
-        across, along = frame.axes * self.plane.width
+        weight = float(np.linalg.norm(direction))
+        ahead = direction / weight if weight else np.array([0.0, 1.0])
+        axes = np.array([[ahead[1], -ahead[0]], ahead])
+        (across, along), line, x = axes * self.plane.width, self.plane.line, x.copy()
+        self.solver.system.set_load(x, 0.0)
         row = None if dx is None else self.metric * dx
-        line = self.plane.line
-        return frame, Section(
-            lambda t: line(p + t * along, across), lambda load: line(p + load * across, along), size, row, reach
+        return (
+            axes,
+            x,
+            Section(
+                lambda t: line(p + t * along, across), lambda load: line(p + load * across, along), weight, row, reach
+            ),
         )
 
-    def _located(self, p: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Uncertainties of both parameters, across the curve, by their ``last`` changes."""
-        return np.asarray(np.maximum(abs(last), ROUND_OFF * np.maximum(self.plane.sizes, abs(p))))
+    def _turned(self, parts: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """Change (2,) of the parameters of which these are the parts along the ``axes``."""
+        return np.asarray(parts @ axes * self.plane.width)
 
-    def _require(self, found: SingularState) -> None:
-        if not self.fold and found.size > IMPERFECT * self.inertia.scale:
-            raise Destroyed(self._broken)
-        if found.spread > FEWER * self.inertia.scale:
-            raise Destroyed(f"its {len(found.vectors)} zero eigenvalues do not vanish together any more")
-
-    @property
-    def _broken(self) -> str:
-        """Why a curve ends where the second parameter breaks the symmetry of its branch points."""
-        return f"{self.plane.names[1]} is an imperfection that destroys the branch point, or is one on this mesh alone"
-
-    def _node(self, found: SingularState, curve: Curve, frame: _Frame, guess: Guess) -> LocusPoint:
+    def _node(self, found: SingularState, curve: Curve, axes: np.ndarray, guess: Guess) -> LocusPoint:
         """Point of the locus with its tangent, count and records."""
-        width, (*_, before, dx_before) = frame.width, guess
-        p = frame.origin + frame.turned(np.array([found.load, found.second]))
+        width, (origin, _, before, dx_before) = self.plane.width, guess
+        p = origin + self._turned(np.array([found.load, found.second]), axes)
         x = self.plane.at(p, found.x)
-        dp, dx = frame.turned(curve.slope), curve.dx
+        dp, dx = self._turned(curve.slope, axes), curve.dx
         forward = before / width**2 @ dp + (0.0 if dx_before is None else (self.metric * dx).dot(dx_before))
         size = float(np.copysign(self.length(dp, dx), forward))
-        rates = curve.rates @ frame.axes
+        rates = curve.rates @ axes
         # each of several eigenvalues vanishes no farther across the curve than their mean by what they differ
         split = SPLIT * found.spread * abs(rates) / max(rates @ rates, TINY) * width  # none of one eigenvalue
         return LocusPoint(
@@ -172,45 +307,24 @@ class Singular:
             x,
             dp / size,
             dx * (1.0 / size),
-            self._located(p, frame.turned(curve.last)) + split,
+            self.plane.round_off(p, self._turned(curve.last, axes)) + split,
             ordinate=self.solver.shape.ordinate(x),
-            ended=self._broken if curve.part > IMPERFECT else "",
+            ended=self.broken if curve.part > IMPERFECT else "",
             orientation=curve.side * int(np.copysign(1.0, size)),
             rest=unstable(self.frequencies.at(x), len(curve.left)) if self.frequencies else curve.negative,
             curvature=curve.curvature if self.fold else 0.0,
-            coupling=curve.work[:, 0] @ frame.axes if self.fold else np.zeros(2),
+            coupling=curve.work[:, 0] @ axes if self.fold else np.zeros(2),
             modes=curve.modes,
             multiplicity=len(found.vectors),
             left=curve.left if self.frequencies else [],
         )
 
 
-def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
-    """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
-
-    By inverse iteration, of borders that are arbitrary at first.  Of several the left ones are turned to be along the
-    right ones of the same number: if a symmetry relates them ``G`` is a multiple of one.
-    """
-    states = SingularSystem(solver, [], number, fold=False)
-    metric = states.inertia.metric
-    right = left = [states.inertia.seed(i) for i in range(number)]
-    for _ in range(3):
-        states.border(right, left)
-        right, left = states.relaxed(x)
-    for side in (right, left):
-        orthonormalize(side, metric)
-    overlap = np.array([[(metric * v).dot(w) for w in left] for v in right])
-    u, _, vt = np.linalg.svd(overlap)
-    return right, [combine(left, column) for column in (vt.T @ u.T).T]
-
-
-class Collision:
-    """Corrects points of the plane to where two eigenvalues near ``omega2`` collide."""
-
-    others = UNSTABLE
+class Collision(Criterion):
+    """Corrects points of the plane to where two eigenvalues collide; the direction of the state plays no part."""
 
     def __init__(self, solver: BranchSolver, plane: Plane) -> None:
-        self.solver, self.plane = solver, plane
+        super().__init__(solver, plane)
         self.eigensolver = NonsymmetricSolver(solver.system)
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
@@ -218,19 +332,16 @@ class Collision:
         return float(np.linalg.norm(dp / self.plane.width))
 
     def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
-        """As :class:`~rodfem.codim2.plane.Criterion` says; the direction of the state plays no part.
-
-        Raises :class:`ConvergenceError`, and :class:`Destroyed` if pairs that met at once do not any more.
-        """
+        """See :class:`Criterion`; raises :class:`Destroyed` if pairs that met at once do not any more."""
         node, here = self._onto(guess, near, reach)
-        width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
-        basis, forward = _basis(near), guess[2] / width
+        plane, system, p, x, omega2 = self.plane, self.solver.system, node.p, node.x, node.omega2
+        basis, forward = _basis(near), guess[2] / plane.width
         gradient, clearest = np.zeros(2), here
-        # D has a pole at what is not admissible, as a mass of zero
-        steps = np.minimum(DIFFERENCE, self.plane.room(p) / 100 / width)
-        for which in (0, 1):
-            system.line = self.plane.line(p, self.plane.axis(which))
-            step = float(steps[which])
+        for which, name in enumerate(plane.names):
+            system.line = plane.line(p, plane.axis(which))
+            # D has a pole at what is not admissible, as a mass of zero
+            room = min(abs(end - p[which]) for end in system.scene.parameters[name].admissible)
+            step = float(min(DIFFERENCE, room / 100 / plane.width[which]))
             low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-step, step))
             gradient[which] = (high.discriminant - low.discriminant) / (2 * step)
             clearest = max((clearest, low, high), key=lambda m: m.spread)
@@ -241,19 +352,19 @@ class Collision:
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
         orientation = 1 if dq @ forward >= 0 else -1
         basis = clearest.cluster.basis
-        rest = unstable(self.eigensolver.at(self.plane.at(p, x)), basis.shape[1], basis)
+        rest = unstable(self.eigensolver.at(plane.at(p, x)), basis.shape[1], basis)
         return replace(
             node,
-            dp=orientation * dq * width,
+            dp=orientation * dq * plane.width,
             orientation=orientation,
-            located_to=node.located_to + SPLIT * here.split * abs(gradient) / (gradient @ gradient) * width,
+            located_to=node.located_to + SPLIT * here.split * abs(gradient) / (gradient @ gradient) * plane.width,
             modes=as_vectors(system, basis),
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
             lower=int(np.sign(gradient[0])),
         )
 
     def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
-        """See :class:`~rodfem.codim2.plane.Criterion`."""
+        """See :class:`Criterion`."""
         return self._onto(guess, near, 1.0)[0]
 
     def _onto(self, guess: Guess, near: LocusPoint, reach: float) -> tuple[LocusPoint, Measured]:
@@ -266,9 +377,11 @@ class Collision:
         t, last, here, x = self._collide(x, Cluster(_basis(near), near.omega2), reach)
         p = p + t * across * width
         x = self.plane.at(p, x)
-        located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
-        ordinate, still = self.solver.shape.ordinate(x), system.new_vector()
-        return LocusPoint(p, x, forward * width, still, located, ordinate=ordinate, omega2=here.cluster.mean), here
+        located, ordinate = self.plane.round_off(p, last * across * width), self.solver.shape.ordinate(x)
+        node = LocusPoint(
+            p, x, forward * width, system.new_vector(), located, ordinate=ordinate, omega2=here.cluster.mean
+        )
+        return node, here
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
         """Zero of ``D`` on the system's line of parameters, by secants.
@@ -276,16 +389,15 @@ class Collision:
         These take ``D`` from the eigenvalues, and end near the zero, or where they no longer shrink.  The last digits
         are by ``D`` of both subspaces, right and left.
         """
-        t, other = 0.0, FIRST
+        t, other, before = 0.0, FIRST, np.inf
         now, x = self._measured(t, x, cluster)
         at_other = self._measured(other, x, cluster)[0].discriminant
-        before = np.inf
         slope = (at_other - now.discriminant) / (other - t)
         for _ in range(12):
             if now.discriminant == at_other:
                 break
             step = -now.discriminant * (other - t) / (at_other - now.discriminant)
-            if abs(step) < SHARP or (abs(step) < NOISE and abs(step) > 0.3 * before):
+            if abs(step) < NEGLIGIBLE or (abs(step) < FIRST and abs(step) > 0.3 * before):
                 return self._by_both_sides((t, abs(step), now, x), slope)
             if abs(other - t) > FAR:
                 slope = (at_other - now.discriminant) / (other - t)
@@ -297,10 +409,9 @@ class Collision:
         raise ConvergenceError("two eigenvalues do not collide near by")
 
     def _by_both_sides(self, found: Zero, slope: float) -> Zero:
-        """Correct a zero of ``D`` that was ``found`` twice, by its ``slope``.
+        """Correct a zero of ``D`` twice, by its ``slope``; its uncertainty is the last change and the round-off of D.
 
-        The uncertainty is the last change and the round-off of ``D``.  If left vectors are not found, as next to a
-        double zero, the zero stays that of the eigenvalues.
+        If left vectors are not found, as next to a double zero, the zero stays that of the eigenvalues.
         """
         t, _, now, x = found
         with suppress(ConvergenceError):
@@ -318,6 +429,37 @@ class Collision:
         if not outcome.converged:
             raise ConvergenceError("no equilibrium is found there")
         return measure(self.eigensolver.at(x), cluster), x
+
+
+def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None = None) -> int:
+    """Unstable eigenvalues but for ``size`` ones: those nearest to zero, or of an invariant subspace.
+
+    Its ``basis`` (n, size) is orthonormal in the mass.
+    """
+    spectrum = pencil.spectrum
+    own = -abs(spectrum.values) if basis is None else pencil.shares(basis)
+    chosen = np.argsort(own, kind="stable")[: len(own) - size]
+    values, noise = spectrum.values[chosen], np.maximum(spectrum.zero, spectrum.noise[chosen])
+    return int(((values.real < -noise) | (abs(values.imag) > np.maximum(noise, MET * abs(values)))).sum())
+
+
+def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
+    """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
+
+    By inverse iteration, of borders that are arbitrary at first.  Of several the left ones are turned to be along the
+    right ones of the same number: if a symmetry relates them ``G`` is a multiple of one.
+    """
+    states = SingularSystem(solver, [], number, fold=False)
+    metric = solver.inertia.metric
+    right = left = [solver.inertia.seed(i) for i in range(number)]
+    for _ in range(3):
+        states.border(right, left)
+        right, left = states.relaxed(x)
+    for side in (right, left):
+        orthonormalize(side, metric)
+    overlap = np.array([[(metric * v).dot(w) for w in left] for v in right])
+    u, _, vt = np.linalg.svd(overlap)
+    return right, [combine(left, column) for column in (vt.T @ u.T).T]
 
 
 def _basis(near: LocusPoint) -> np.ndarray:

@@ -6,49 +6,56 @@ curve in the plane of both is followed by pseudo-arclength continuation of the e
 that the curve may turn back with respect to either, and goes through cusps.  Both directions are followed, to the
 bounds, exactly, or to where the special point changes its kind.  Arclength is measured with the parameters relative to
 the widths of their bounds, and the state in its metric.
-
-Errors of rows are how far the curve of a richer discretisation is away.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Iterable
+from dataclasses import replace
 from itertools import pairwise
-from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Enriched, bound
-from rodfem.codim2.criteria import NEAREST, UNSTABLE, Collision, Singular, null_vectors, unstable
-from rodfem.codim2.curve import Half, Tracer
+from rodfem.codim2.criteria import (
+    DIFFERENCE,
+    UNSTABLE,
+    Collision,
+    Criterion,
+    Destroyed,
+    Interval,
+    LocusPoint,
+    Plane,
+    Singular,
+    between,
+    null_vectors,
+    predict,
+    unstable,
+)
 from rodfem.codim2.locus import Locus, Mark, Row
-from rodfem.codim2.plane import Criterion, Interval, LocusPoint, Plane
-from rodfem.codim2.points import place
+from rodfem.codim2.points import Codim2Points, place
 from rodfem.continuation.branch import SpecialPoint
-from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, KINDS
+from rodfem.continuation.branch_solver import ALIGNED, BranchSolver
+from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, DIVERGENCE, FLUTTER, FOLD, GAP, KINDS
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.convexity import Convexity
 from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.shape import halved
 from rodfem.output.files import mesh_of
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.tolerances import same_special
+from rodfem.tolerances import INSIDE, same_special
 
-
-class Errors(NamedTuple):
-    """Bounds (n, 2) of the errors of rows, nan where they are not estimated, inf if the richer mesh finds no point.
-
-    ``unresolved`` rows are those whose state, or null vectors, the mesh does not resolve.
-    """
-
-    error: np.ndarray
-    unresolved: list[int]
+STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
+"""Steps of a locus, as shares of the bounds."""
+REACH = 1e-6
+"""Distance, in the metric, that a point on a line of parameters may move by, however short the step."""
+NEAREST = "the index is that of the frequencies nearest zero: the mesh has too many unknowns to find all of them"
+COLUMNS = "ordinate", "omega2", "located_to"
+"""Of the points of a curve what its rows have."""
 
 
 def criterion_of(solver: BranchSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
@@ -56,31 +63,168 @@ def criterion_of(solver: BranchSolver, plane: Plane, kind: str, near: LocusPoint
     return Collision(solver, plane) if kind == FLUTTER else Singular(solver, plane, near, fold=kind == FOLD)
 
 
-class RicherMesh:
-    """The same locus, of a ``kind`` of special points in a ``plane``, on a discretisation one degree richer."""
+class Half:
+    """One direction of a curve from a node: its ``nodes``, marks by their number, and why it ``ended``."""
 
-    def __init__(self, solver: BranchSolver, kind: str, plane: Plane) -> None:
-        """``solver`` has the mesh on which it was found."""
-        self.richer, self.kind = Enriched(solver), kind
-        self.plane = Plane(self.richer.system, plane.names[1], plane.intervals)
-        self.rho = halved(solver.system.fields.discretization.degree)
-        self._criterion: Criterion | None = None
+    def __init__(self, points: Codim2Points, convexity: Convexity, start: LocusPoint) -> None:
+        self.points, self.convexity = points, convexity
+        self.criterion, self.plane = points.criterion, points.plane
+        self.nodes, self.steps = [start], [start]  # these without what lies between two steps
+        self.marks, self.ended = dict[int, str](), start.ended
+        over = self.plane.outside(start.p + INSIDE * start.dp)
+        if over is not None:
+            self.ended = self.ended or self._bound(*over)
+
+    def run(self, control: StepControl) -> Half:
+        """Follow to an end."""
+        step, failures = control.first, 0
+        while not self.ended and len(self.steps) < control.most:
+            # beyond a sharp bend the polynomial through the last nodes has another tangent than the curve
+            recent = self.steps if failures < 2 else self.steps[-1:]
+            try:
+                moved = self._advance(recent, step)
+            except Destroyed as trouble:
+                self.ended = str(trouble)
+            except ConvergenceError as trouble:
+                step, failures = step / 2, failures + 1
+                if step < control.smallest:
+                    self.ended = f"no convergence with steps of {control.smallest:g}: {trouble}"
+            else:
+                step, failures = control.after(step, moved, min(len(recent), 3) + 1), 0
+        self.ended = self.ended or f"{control.most} points reached"
+        return self
+
+    def _advance(self, recent: list[LocusPoint], step: float) -> float:
+        """Add the next node, predicted by ``recent`` ones, and what is before it; how far it is from its prediction."""
+        node, moved, bound = self._next(recent, step)
+        last = self.steps[-1]
+        self.ended = node.ended or self._lost_convexity(last, node) or self._between(last, node)
+        if not self.ended:
+            self.nodes.append(node)
+            self.ended = bound or self._closed(last, node)
+        self.steps.append(node)
+        return moved
+
+    def _next(self, recent: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:
+        """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""
+        last = recent[-1]
+        guess = predict(recent, last.s + step)
+        p, x, dp, dx = guess
+        over = self.plane.outside(p)
+        if over is None:
+            node = self._after(last, self.criterion.correct(guess, last, 0.5 * step))
+            over = self.plane.outside(node.p)
+            if over is None:
+                if self._cosine(node, dp, dx) < ALIGNED or node.s - last.s > 2 * step:
+                    raise ConvergenceError("the curve bends too sharply")
+                if node.orientation != last.orientation and not self._leads_across(last, node):
+                    raise ConvergenceError("the curve turns before another one")
+                return node, self.criterion.length(p - node.p, x - node.x), ""
+            p = node.p
+        which, bound = over
+        p, x, dp, dx = predict(recent, last.s + (bound - last.p[which]) / (p[which] - last.p[which]) * step)
+        p[which] = bound
+        node = self.criterion.correct((p, x, self.plane.axis(which), None), last, max(0.5 * step, REACH))
+        node.p[which] = bound
+        node = self._after(last, node if self._cosine(node, dp, dx) >= 0 else node.reversed())
+        if self.plane.outside(node.p) is not None or node.s - last.s > 2 * step:
+            raise ConvergenceError("it leaves near a corner of the bounds")
+        return node, 0.0, self._bound(which, bound)
+
+    def _leads_across(self, a: LocusPoint, b: LocusPoint) -> bool:
+        """Whether the curve through ``a`` leads to ``b``, on another side of its tangent, across a second curve.
+
+        Two curves that nearly cross are the two sides of a gap: each turns, and a step may lead from one to the other.
+        In smaller and smaller steps towards the crossing it is seen which; next to a gap that may be taken for a
+        crossing they are one point.
+        """
+        here, step = a, (b.s - a.s) / 2
+        while step > 0.1 * GAP:
+            try:
+                guess = predict([here], here.s + step)
+                node = self._after(here, self.criterion.correct(guess, here, 0.5 * step))
+                if node.orientation != here.orientation or self._cosine(node, here.dp, here.dx) < ALIGNED:
+                    raise ConvergenceError("the curve turns, or another one crosses it")
+            except ConvergenceError:
+                step /= 2
+                continue
+            here = node
+            if here.s > b.s or self._cosine(here, a.dp, a.dx) < ALIGNED:
+                return False
+        return True
+
+    def _bound(self, which: int, bound: float) -> str:
+        return f"{self.plane.names[which]} = {bound:g}, its bound"
+
+    def _after(self, last: LocusPoint, node: LocusPoint) -> LocusPoint:
+        node.s = last.s + self.criterion.length(node.p - last.p, node.x - last.x)
+        return node
+
+    def _cosine(self, node: LocusPoint, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Cosine between a node's tangent and a direction."""
+        size = self.criterion.length(dp, dx)
+        dp, dx = dp / size, dx / size
+        a, b = self.criterion.length(node.dp + dp, node.dx + dx), self.criterion.length(node.dp - dp, node.dx - dx)
+        return (a * a - b * b) / 4
+
+    def _between(self, last: LocusPoint, node: LocusPoint) -> str:
+        """Insert what lies between the last node and the next one; a reason if the curve ends there."""
+        rows, ended = self.points.between(last, node, self.steps[-2] if len(self.steps) > 1 else None)
+        for row, kind in rows:
+            if kind:
+                self.marks[len(self.nodes)] = kind
+            self.nodes.append(row)
+        if not ended and last.rest != node.rest:
+            self.marks[len(self.nodes)] = self.criterion.others
+        elif not ended and last.orientation != node.orientation:
+            self.marks[len(self.nodes)] = CROSSES
+        return ended
+
+    def _closed(self, a: LocusPoint, b: LocusPoint) -> str:
+        """Why the curve ends if it passes its beginning again between two nodes."""
+        start = self.steps[0]
+        whole, part = (b.p - a.p) / self.plane.width, (start.p - a.p) / self.plane.width
+        size = float(np.linalg.norm(whole))
+        if len(self.steps) < 3 or not size or not 0 < part @ whole <= size**2:
+            return ""
+        p, x, dp, dx = between(a, b, a.s + (part @ whole) / size**2 * (b.s - a.s))
+        near = self.criterion.length(p - start.p, x - start.x) < 0.1 * (b.s - a.s)
+        if not near or self._cosine(start, dp, dx) < ALIGNED:
+            return ""
+        self.nodes.append(start)
+        return "closed curve"
+
+    def _lost_convexity(self, last: LocusPoint, node: LocusPoint) -> str:
+        """Why a curve ends between two nodes, if the stored energy is not convex at the second one; empty if it is."""
+        if not self.convexity.alters or self.convexity.holds(self.plane.at(node.p, node.x)):
+            return ""
+        scales = self.convexity.scales(self.plane.at(last.p, last.x))
+        lost = self.points.located(last, node, lambda n: self.convexity.margin(self.plane.at(n.p, n.x), scales))
+        return f"the stored energy is not convex any more near {self.plane.words((lost or node).p)}"
+
+
+class RicherMesh:
+    """The curve of a ``criterion`` for a ``kind`` of special points, ``near`` one, on a mesh one degree richer."""
+
+    def __init__(self, criterion: Criterion, kind: str, near: LocusPoint) -> None:
+        self.richer, plane = Enriched(criterion.solver), criterion.plane
+        plane = Plane(self.richer.system, plane.names[1], plane.intervals)
+        self.rho = halved(criterion.solver.system.fields.discretization.degree)
+        self.criterion = criterion_of(self.richer.solver, plane, kind, self._transferred(near))
 
     def compare(self, node: LocusPoint) -> tuple[list[float], bool]:
         """Bounds of the errors of both parameters, and whether the mesh resolves the state and its null vectors.
 
-        Raises :class:`ConvergenceError`.
+        Distances are across the curve, but for turning points and ends to those of the other curve.  Raises
+        :class:`ConvergenceError`.
         """
-        near = self._transferred(node)
-        if self._criterion is None:
-            self._criterion = criterion_of(self.richer.solver, self.plane, self.kind, near)
-        resolved = True
+        near, resolved = self._transferred(node), True
         if node.sought is None:
-            found = self._criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
+            found = self.criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
             there, located_to = found.p, found.located_to
             resolved = self._changed(near, found) <= RESOLVED_TO
         else:
-            sought = place(self._criterion, self.plane, near, node.sought, node.windows)
+            sought = place(self.criterion, near, node.sought, node.windows)
             there, located_to = sought.p, sought.dp
         each = zip(node.p, there, node.located_to + located_to, strict=True)
         return [bound(*pair, self.rho) for pair in each], resolved
@@ -92,56 +236,10 @@ class RicherMesh:
 
     def _changed(self, near: LocusPoint, found: LocusPoint) -> float:
         """Relative change of the strains of a state, or of one of its null vectors."""
-        norm, modes = self.richer.system.norm, near.modes[: near.multiplicity]
-        changes = [self.richer.indicator.changed(near.x, found.x, state=True)]
-        for first, last in zip(modes, found.modes, strict=False):
-            changes.append(self.richer.indicator.changed(first / norm(first), last / norm(last), state=False))
-        return max(changes)
-
-
-def errors_of(
-    solver: BranchSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: Iterable[int]
-) -> Errors:
-    """Estimate errors at some ``rows`` of ``nodes``: the distance to the curve of a richer discretisation.
-
-    It is measured across the curve, but for turning points and ends to those of the other curve.  ``solver``, ``kind``
-    and ``plane`` are those of the locus.
-    """
-    error, rows, unresolved = np.full((len(nodes), 2), np.nan), sorted(rows), set[int]()
-    if not rows:
-        return Errors(error, [])
-    richer = RicherMesh(solver, kind, plane)
-    for row in rows:
-        try:
-            error[row], resolved = richer.compare(nodes[row])
-            unresolved |= set() if resolved else {row}
-        except ConvergenceError:
-            error[row] = np.inf
-    neighbours = [{*rows[max(i - 1, 0) : i + 2]} for i in range(len(rows))]
-    doubtful = {row for row, near in zip(rows, neighbours, strict=True) if nodes[row].sought and near & unresolved}
-    return Errors(error, sorted(unresolved | doubtful))
-
-
-def not_integrated(solver: BranchSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> str:
-    """Take the errors away of ``nodes`` at which the mesh does not integrate the equations; a clause on the first.
-
-    ``solver`` has found the locus in a ``plane``; ``error`` (n, 2) is changed.
-    """
-    check, said = QuadratureCheck(solver.system), ""
-    for row in np.flatnonzero(np.isfinite(error[:, 0])):
-        node = nodes[row]
-        if words := check(plane.at(node.p, node.x)):
-            error[row] = np.nan
-            said = said or f"at {plane.words(node.p, 6)} {words}"
-    return said
-
-
-STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
-"""Steps of a locus, as shares of the bounds."""
-COUNT_OFFSET = 1e-3
-"""Distance of a load from a divergence load at which the unstable eigenvalues are counted, over the bounds."""
-COLUMNS = "p", "rest", "ordinate", "omega2", "located_to"
-"""Of the points of a curve what its rows have."""
+        norm, changed = self.richer.system.norm, self.richer.indicator.changed
+        pairs = zip(near.modes[: near.multiplicity], found.modes, strict=False)
+        of_modes = (changed(v / norm(v), w / norm(w), state=False) for v, w in pairs)
+        return max(changed(near.x, found.x, state=True), *of_modes)
 
 
 def locus(
@@ -162,98 +260,37 @@ def locus(
     :class:`InputError` for a parameter, bounds or a kind that make no sense, :class:`ConvergenceError` if the special
     point is not found again.
     """
-    system, scene = solver.system, solver.system.scene
-    plane = Plane(system, parameter, bounds)
-    p = np.array([special.point.load, scene.parameters[parameter].value])
-    if plane.outside(p) is not None:
-        raise InputError(
-            f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
-        )
-    with system.clock.scope("locus"), plane.kept():
-        of = _Followed(solver, special, plane)
-        tracer = Tracer(of.criterion, plane, steps)
-        curve = _both_sides(tracer, of.first)
+    plane = Plane(solver.system, parameter, bounds)
+    with solver.system.clock.scope("locus"), plane.kept():
+        curve = _Curve(solver, special, plane)
+        curve.follow(steps)
         rows = np.linspace(0, len(curve.nodes) - 1, error_bars).round().astype(int).tolist()
-        errors = errors_of(solver, special.kind, plane, curve.nodes, {*rows, *curve.marks} if error_bars else ())
+        error, unresolved = curve.errors({*rows, *curve.marks} if error_bars else ())
         if doubtful or special.resolved is False:
-            errors = errors._replace(unresolved=list(range(len(curve.nodes))))
-        found = of.locus(curve, errors)
-        start = of.rows(tracer, curve, 1, float(of.first.p[1]))
-        found.crossings = list(map(attrgetter("load", "ordinate"), start))
-        notes = not_integrated(solver, plane, curve.nodes, errors.error), of.nearest()
-    found.solve = partial(of.rows, tracer, curve)
+            unresolved = list(range(len(curve.nodes)))
+        found = curve.locus(error, unresolved)
+        found.crossings = [(n.load, n.ordinate) for n in curve.rows(1, float(curve.first.p[1]))]
+        notes = curve.not_integrated(error), curve.nearest()
+    found.solve = curve.rows
     found.note = " ".join(f"Locus of the {special.kind}: {words}" for words in notes if words)
     return found
 
 
-@dataclass
 class _Curve:
-    """``nodes`` of a curve, its rows with ``marks``, the row of its ``start``, and why it ``ended`` on either side."""
-
-    nodes: list[LocusPoint]
-    marks: dict[int, str]
-    start: int
-    ended: tuple[str, str]
-
-
-def _both_sides(tracer: Tracer, first: LocusPoint) -> _Curve:
-    """The curve through the ``first`` point, to both sides."""
-    onwards = tracer.run(first)
-    backwards = Half([first], ended="closed curve")
-    if onwards.ended != "closed curve":
-        backwards = tracer.run(first.reversed())
-    start = len(backwards.nodes) - 1
-    marks = {start - i: kind for i, kind in backwards.marks.items()}
-    marks |= {start + i: kind for i, kind in onwards.marks.items()}
-    return _Curve(backwards.nodes[:0:-1] + onwards.nodes, marks, start, (backwards.ended, onwards.ended))
-
-
-def _crossings(tracer: Tracer, curve: _Curve, which: int, value: float) -> list[LocusPoint]:
-    """Points at which parameter ``which`` has a ``value``, each once, the start before others."""
-    first, found = curve.nodes[curve.start], list[LocusPoint]()
-    onwards = curve.nodes[curve.start :]
-    backwards = [first.reversed(), *curve.nodes[: curve.start][::-1]]
-    for side in (onwards, backwards):
-        for a, b in pairwise([side[0], *side]):
-            if b.p[which] == value:
-                found.append(b)
-            elif (a.p[which] - value) * (b.p[which] - value) < 0 and a.s < b.s:
-                found += tracer.points.crossed(a, b, which, value)
-    other, units, plane = 1 - which, tracer.criterion.solver.units, tracer.points.plane
-    places = [(float(n.p[other]), n.ordinate) for n in found]
-
-    def known(i: int) -> bool:
-        left, sizes = float(found[i].located_to[other]), (float(plane.sizes[other]), units.ordinate)
-        return any(same_special(places[i], left, place, sizes) for place in places[:i])
-
-    return [node for i, node in enumerate(found) if not known(i)]
-
-
-def _check(solver: BranchSolver, special: SpecialPoint) -> None:
-    """Raise :class:`InputError` for a special point that has no locus."""
-    if special.kind.line is None:
-        kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)
-        raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
-    if special.kind.singular and not solver.conservative:
-        raise InputError("The locus of a fold or a branch point needs the solver that found it.")
-    if special.kind == FLUTTER and (special.cluster is None or special.note):
-        raise InputError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
-
-
-class _Followed:
-    """A special point of a diagram as the ``first`` one of its locus in a plane."""
+    """The curve of a special point of a diagram, the ``first`` one, in a plane: ``nodes`` with ``marks`` by number."""
 
     def __init__(self, solver: BranchSolver, special: SpecialPoint, plane: Plane) -> None:
-        """Find it again; raises :class:`InputError` where it has no locus and :class:`ConvergenceError`."""
-        _check(solver, special)
+        """Find the point again; raises :class:`InputError` where it has no locus and :class:`ConvergenceError`."""
+        load, parameter = plane.names
+        p = np.array([special.point.load, solver.system.scene.parameters[parameter].value])
+        _check(solver, special, plane, p)
         self.solver, self.special, self.plane = solver, special, plane
-        p = np.array([special.point.load, solver.system.scene.parameters[plane.names[1]].value])
         guess = self._guess(p)
-        self.criterion: Criterion = criterion_of(solver, plane, special.kind, guess)
+        self.criterion = criterion_of(solver, plane, special.kind, guess)
+        self.points = Codim2Points(self.criterion)
         try:
             self.first = self.criterion.correct((p, guess.x, plane.axis(1), None), guess, 0.1)
         except ConvergenceError as trouble:
-            load, parameter = plane.names
             raise ConvergenceError(
                 f"The {special.kind} at {load} = {p[0]:.8g} has no locus in {load} and {parameter}: it is not found "
                 f"again there ({trouble}); use more elements."
@@ -273,12 +310,92 @@ class _Followed:
         omega2 = special.omega2 if special.kind == FLUTTER else np.nan
         return LocusPoint(p, x, p, x, p, omega2=omega2, modes=modes, left=left, multiplicity=multiplicity)
 
-    def locus(self, curve: _Curve, errors: Errors) -> Locus:
-        """The curve that was found, with what a file of it says about the scene."""
-        scene, nodes, names = self.solver.system.scene, curve.nodes, self.plane.names
+    def follow(self, steps: StepControl) -> None:
+        """Follow the curve to both sides."""
+        convexity = Convexity(self.plane.system, *self.plane.names)
+        onwards = Half(self.points, convexity, self.first).run(steps)
+        back, ended = Half(self.points, convexity, self.first.reversed()), onwards.ended
+        if onwards.ended != "closed curve":
+            ended = back.run(steps).ended
+        self.start = len(back.nodes) - 1
+        self.nodes, self.ended = back.nodes[:0:-1] + onwards.nodes, (ended, onwards.ended)
+        self.marks = {self.start - i: kind for i, kind in back.marks.items()}
+        self.marks |= {self.start + i: kind for i, kind in onwards.marks.items()}
+
+    def errors(self, rows: Iterable[int]) -> tuple[np.ndarray, list[int]]:
+        """Bounds (n, 2) of the errors of ``rows``, nan at others, inf if a richer mesh finds no point; rows unresolved.
+
+        These are those whose state, or null vectors, the mesh does not resolve.
+        """
+        error, rows, unresolved = np.full((len(self.nodes), 2), np.nan), sorted(rows), set[int]()
+        if not rows:
+            return error, []
+        richer = RicherMesh(self.criterion, self.special.kind, self.nodes[rows[0]])
+        for row in rows:
+            try:
+                error[row], resolved = richer.compare(self.nodes[row])
+                unresolved |= set() if resolved else {row}
+            except ConvergenceError:
+                error[row] = np.inf
+        neighbours = [{*rows[max(i - 1, 0) : i + 2]} for i in range(len(rows))]
+        pairs = zip(rows, neighbours, strict=True)
+        return error, sorted(unresolved | {row for row, near in pairs if self.nodes[row].sought and near & unresolved})
+
+    def not_integrated(self, error: np.ndarray) -> str:
+        """Take the errors away of rows at which the mesh does not integrate the equations; a clause on the first."""
+        check, said = QuadratureCheck(self.solver.system), ""
+        for row in np.flatnonzero(np.isfinite(error[:, 0])):
+            node = self.nodes[row]
+            if words := check(self.plane.at(node.p, node.x)):
+                error[row] = np.nan
+                said = said or f"at {self.plane.words(node.p, 6)} {words}"
+        return said
+
+    def nearest(self) -> str:
+        """Words on the eigenvalues that the index counts, where these are not all of the mesh; or empty."""
+        if self.criterion.others != UNSTABLE:
+            return ""
+        x = self.plane.at(self.first.p, self.first.x)
+        return "" if NonsymmetricSolver(self.solver.system).at(x).spectrum.complete else f"{NEAREST}."
+
+    def rows(self, which: int, value: float) -> list[Row]:
+        """Rows at which parameter ``which`` has a ``value``, solved for on the mesh, each once, the start first."""
+        with self.plane.kept():
+            found = self._crossings(which, value)
+        other, sizes = 1 - which, (float(self.plane.sizes[1 - which]), self.solver.units.ordinate)
+        places = [(float(n.p[other]), n.ordinate) for n in found]
+        return [
+            Row(float(n.p[0]), float(n.p[1]), n.ordinate, n.omega2, self._index(n), tuple(n.located_to.tolist()))
+            for i, n in enumerate(found)
+            if not any(same_special(places[i], float(n.located_to[other]), place, sizes) for place in places[:i])
+        ]
+
+    def _crossings(self, which: int, value: float) -> list[LocusPoint]:
+        """Points at which parameter ``which`` has a ``value``, on either side of the start."""
+        found, back = list[LocusPoint](), self.nodes[: self.start][::-1]
+        for side in (self.nodes[self.start :], [self.nodes[self.start].reversed(), *back]):
+            for a, b in pairwise([side[0], *side]):
+                if b.p[which] == value:
+                    found.append(b)
+                elif (a.p[which] - value) * (b.p[which] - value) < 0 and a.s < b.s:
+                    found += self._crossed(a, b, which, value)
+        return found
+
+    def _crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
+        """Point between neighbours ``a``, ``b`` where parameter ``which`` has a ``value``; none if not located."""
+        node, axis = self.points.located(a, b, lambda n: float(n.p[which]) - value), self.plane.axis(which)
+        if node is None:
+            return []
+        try:
+            return [self.criterion.correct((np.where(axis, value, node.p), node.x, axis, None), node, REACH)]
+        except ConvergenceError:
+            return [node]
+
+    def locus(self, error: np.ndarray, unresolved: list[int]) -> Locus:
+        """The curve, with what a file of it says about the scene."""
+        scene, nodes, names = self.solver.system.scene, self.nodes, self.plane.names
         load, other = (scene.parameters[name] for name in names)
         columns: dict[str, Any] = {name: np.array([getattr(n, name) for n in nodes]) for name in COLUMNS}
-        values, rest = columns.pop("p"), columns.pop("rest")
         return Locus(
             scene=scene.name,
             title=scene.title or scene.name,
@@ -287,17 +404,17 @@ class _Followed:
             labels=(load.label or names[0], other.label or names[1]),
             ordinate_name=scene.ordinate.name,
             bounds=self.plane.intervals,
-            values=values,
+            values=np.array([n.p for n in nodes]),
             **columns,
             natural=self.solver.units.ordinate,
-            index=np.stack([rest, np.where(rest >= 0, rest + self._changing(), -1)], axis=1),
+            index=np.array([self._index(n) for n in nodes]),
             lower=self._lower_side(),
-            error=errors.error,
-            unresolved=errors.unresolved,
+            error=error,
+            unresolved=unresolved,
             planar=bool(scene.planar),
-            marks=[Mark(kind, row) for row, kind in sorted(curve.marks.items())],
-            start=curve.start,
-            ended=curve.ended,
+            marks=[Mark(kind, row) for row, kind in sorted(self.marks.items())],
+            start=self.start,
+            ended=self.ended,
             constants={name: v.value for name, v in scene.parameters.items() if name not in names},
             discretization=mesh_of(self.solver.system),
             states=[n.x for n in nodes],
@@ -305,20 +422,12 @@ class _Followed:
             units=(load.unit, other.unit),
         )
 
-    def rows(self, tracer: Tracer, curve: _Curve, which: int, value: float) -> list[Row]:
-        """Rows of a curve at which parameter ``which`` has a ``value``, solved for on the mesh of the locus."""
-        with self.plane.kept():
-            found = _crossings(tracer, curve, which, value)
-        change = self._changing()
-        sides = [(n.rest, n.rest + change if n.rest >= 0 else -1) for n in found]
-        rest = [(n.ordinate, n.omega2, i, tuple(n.located_to.tolist())) for n, i in zip(found, sides, strict=True)]
-        return [Row(float(n.p[0]), float(n.p[1]), *others) for n, others in zip(found, rest, strict=True)]
-
-    def _changing(self) -> int:
-        """By how much the index changes across the locus at the first point."""
+    def _index(self, node: LocusPoint) -> tuple[int, int]:
+        """Index on the two sides of the curve, -1 where it was not counted."""
+        change = self.first.multiplicity
         if self.special.kind == FLUTTER:  # two that have diverged are as unstable as a complex pair
-            return 0 if self.first.omega2 < 0 else len(self.first.modes)
-        return self.first.multiplicity
+            change = 0 if self.first.omega2 < 0 else len(self.first.modes)
+        return node.rest, node.rest + change if node.rest >= 0 else -1
 
     def _lower_side(self) -> int:
         """Side of the load, -1 or 1, on which the index is the lower one next to the special point; 0: unknown."""
@@ -327,7 +436,7 @@ class _Followed:
             return node.lower
         if special.kind == DIVERGENCE:
             x = self.plane.at(node.p, node.x)
-            loads = node.p[0] + COUNT_OFFSET * self.plane.width[0] * np.array([-1.0, 1.0])
+            loads = node.p[0] + DIFFERENCE * self.plane.width[0] * np.array([-1.0, 1.0])
             pencils = NonsymmetricSolver(solver.system)
             below, above = (unstable(pencils.at(solver.at_load(x, float(load))[0])) for load in loads)
             return int(np.sign(below - above))
@@ -336,9 +445,18 @@ class _Followed:
             return 0
         return int(-np.sign(change * special.point.slope))
 
-    def nearest(self) -> str:
-        """Words on the eigenvalues that the index counts, where these are not all of the mesh; or empty."""
-        if self.criterion.others != UNSTABLE:
-            return ""
-        x = self.plane.at(self.first.p, self.first.x)
-        return "" if NonsymmetricSolver(self.solver.system).at(x).spectrum.complete else f"{NEAREST}."
+
+def _check(solver: BranchSolver, special: SpecialPoint, plane: Plane, p: np.ndarray) -> None:
+    """Raise :class:`InputError` for a special point that has no locus, or is not in the ``plane``."""
+    if plane.outside(p) is not None:
+        (load, parameter), (here, value) = plane.names, p
+        raise InputError(
+            f"The special point at {load} = {here:g}, {parameter} = {value:g} is outside the bounds: widen them."
+        )
+    if special.kind.line is None:
+        kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)
+        raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
+    if special.kind.singular and not solver.conservative:
+        raise InputError("The locus of a fold or a branch point needs the solver that found it.")
+    if special.kind == FLUTTER and (special.cluster is None or special.note):
+        raise InputError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")

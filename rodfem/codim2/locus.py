@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.plane import Interval
+from rodfem.codim2.criteria import Interval
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json, refusal
@@ -26,9 +26,8 @@ AS_THEY_ARE = tuple(
     "scene title kind ordinate_name natural start lower planar unresolved constants discretization note".split()
 )
 PAIRS, WORDS = ("bounds", "crossings"), ("labels", "words", "units", "ended")
-"""Entries of a file that are attributes of a locus: as they are, pairs of numbers, and pairs of words."""
 COLUMNS = "ordinate", "index", "located_to", "error", "omega2"
-"""Tables of a file that are attributes of a locus."""
+"""Entries of a file that are attributes of a locus: as they are, pairs of numbers, pairs of words, and tables."""
 
 
 @dataclass
@@ -59,16 +58,10 @@ class Row:
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
-    ``scene`` and ``title`` name the rod, ``labels``, ``words`` and ``units`` the two parameters in mathematics, words
-    and their units, ``ordinate_name`` the ordinate.  ``constants`` holds all parameters of the scene,
-    ``discretization`` formulation, elements and degree.
-
-    Attributes ---------- kind
-        ``fold``, ``branch point``, ``flutter`` or ``divergence``.
+    Attributes
+    ----------
     names, bounds, values
         The two parameters, the scene's load first, their intervals, and both at each row, (n, 2).
-    ordinate, natural
-        The scene's ordinate, (n,), and its natural size, of which round-off is a part.
     index
         Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
         negative.  Under loads without a potential the number of unstable eigenvalues.
@@ -85,28 +78,22 @@ class Locus:
         richer one does not find the point.
     unresolved
         Rows whose state, or null vector, the discretisation does not resolve, where errors may exceed their bounds.
-    planar
-        Whether the rod is kept in a plane: the index is that of changes in it, and stability is not that in space.
     marks
         Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
         eigenvalue has passed through zero, not located.
     start, ended
         Row of the special point from which the curve was started; why it ends, at its first and at its last row.
-    states
-        State vector of each row, of the system on which the locus was computed; not saved.
     crossings
         Load and ordinate at the start, and wherever else the curve passes the second parameter's value there.
     note
         Why errors that were asked for are not estimated; empty where they are.
-    solve
-        Rows at which a parameter, 0 or 1, has a value; None in a locus that was read from a file.
     """
 
     scene: str
     title: str
-    kind: str
+    kind: str  # of its special points
     names: tuple[str, str]
-    labels: tuple[str, str]
+    labels: tuple[str, str]  # of the parameters, in mathematics
     ordinate_name: str
     bounds: tuple[Interval, Interval]
     values: np.ndarray
@@ -119,17 +106,17 @@ class Locus:
     marks: list[Mark]
     start: int
     ended: tuple[str, str]
-    constants: dict[str, float]
+    constants: dict[str, float]  # all other parameters of the scene
     discretization: dict[str, Any]
-    states: list[PETSc.Vec] = field(default_factory=list)
+    states: list[PETSc.Vec] = field(default_factory=list)  # not saved
     crossings: list[tuple[float, float]] = field(default_factory=list)
-    words: tuple[str, str] = ("", "")
+    words: tuple[str, str] = ("", "")  # for the parameters
     units: tuple[str, str] = ("", "")
     note: str = ""
-    natural: float = 1.0
-    planar: bool = False
+    natural: float = 1.0  # size of the ordinate, of which round-off is a part
+    planar: bool = False  # the index is that of changes in a plane, and stability is not that in space
     unresolved: list[int] = field(default_factory=list)
-    solve: Callable[[int, float], list[Row]] | None = None
+    solve: Callable[[int, float], list[Row]] | None = None  # rows where a parameter, 0 or 1, has a value; of no file
 
     def __repr__(self) -> str:
         """Kind, names, size and ranges."""
@@ -152,11 +139,10 @@ class Locus:
         return self.solve(self.names.index(names[0]), finite(names[0], value[names[0]], 1.0))
 
     def passes(self, special: SpecialPoint, units: Units) -> bool:
-        """Whether the curve passes the line of its start again at another special point.
-
-        The scene, that of both, has the natural sizes ``units``.
-        """
-        return self.kind == special.kind and any(_same(special, there, units) for there in self.crossings)
+        """Whether the curve passes the line of its start at a special point of a scene with these natural sizes."""
+        point, one = special.point, (units.load, units.ordinate)
+        same = (same_special((point.load, point.ordinate), special.located_to, at, one) for at in self.crossings)
+        return self.kind == special.kind and any(same)
 
     def data(self) -> dict[str, Any]:
         """Plain lists, numbers and strings for a file; what was not computed is None."""
@@ -213,12 +199,6 @@ class Locus:
             lines.append(f"  {pair[0]:<24} {pair[1]:<24} {ordinate:<14.8g} {index:<6} {note}".rstrip())
         lines.append(f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}")
         return "\n".join([*lines, *filter(None, [self.note, COARSE * bool(self.unresolved)])])
-
-
-def _same(special: SpecialPoint, place: tuple[float, float], units: Units) -> bool:
-    """Whether a special point of a scene of these natural sizes has the load and the ordinate of a ``place``."""
-    point = special.point
-    return same_special((point.load, point.ordinate), special.located_to, place, (units.load, units.ordinate))
 
 
 def _plain(table: np.ndarray) -> list:

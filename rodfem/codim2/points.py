@@ -24,7 +24,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-from rodfem.codim2.plane import REACH, Criterion, LocusPoint, Plane, Prediction, Sought, between
+from rodfem.codim2.criteria import Criterion, LocusPoint, Plane, Sought, between
 from rodfem.continuation.branch_solver import lagrange
 from rodfem.continuation.kinds import GAP
 from rodfem.errors import ConvergenceError
@@ -37,8 +37,8 @@ WINDOWS = tuple(0.064 / 2**i for i in range(11))
 """Half widths of windows, as arclengths, from wide to narrow."""
 POINTS = 8
 """Points of a window: an even number, none of them in the middle, where the end of a fold is singular."""
-INSIDE = 0.5
-"""Part of the window, about its middle, in which what is sought must be."""
+PLACES = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+"""Chebyshev's points of a window of half width one; what is sought must be in the inner half of it."""
 LOCATED = 1e-8
 """Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
 UNPLACED = 1e-5
@@ -66,10 +66,10 @@ Test = Callable[[LocusPoint], float]
 
 @dataclass(frozen=True)
 class Place:
-    """Arclength ``s`` from the middle of a window, and its uncertainty ``ds``.
+    """Arclength ``s`` from the middle of a window of this ``half`` width, and its uncertainty ``ds``.
 
-    ``through`` are the polynomials of both parameters in the arclength, and ``nodes`` the points of a window of this
-    ``half`` width.  By ``apart`` (2,) the parameters of another window differ; ``windows`` are the half widths of both.
+    ``through`` are the polynomials of both parameters in the arclength, and ``nodes`` the points of the window.  By
+    ``apart`` (2,) the parameters of another window differ; ``windows`` are the half widths of both.
     """
 
     s: float
@@ -95,25 +95,22 @@ class Place:
 
     def interpolated(self, node: LocusPoint) -> LocusPoint:
         """The point there by the polynomials alone, with what ``node``, close by, has else: nothing is solved for."""
-        value, _ = lagrange(_arclengths(self.half), self.s)
         across = np.max([n.located_to for n in self.nodes], axis=0)
-        x = combine([n.x for n in self.nodes], value)
+        x = combine([n.x for n in self.nodes], lagrange(self.half * PLACES, self.s)[0])
         return replace(node, p=self.p, x=x, located_to=across + self.dp + self.apart)
 
 
-def place(
-    criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, windows: tuple[float, ...] = WINDOWS
-) -> Place:
+def place(criterion: Criterion, node: LocusPoint, sought: Sought, windows: tuple[float, ...] = WINDOWS) -> Place:
     """Where ``sought`` is on the curve of a ``criterion`` through ``node``, close to it: the best of ``windows``.
 
-    These are half widths, as arclengths, from wide to narrow.  Windows that cannot be filled, or that leave the bounds
-    of the ``plane``, are passed over.  Raises :class:`ConvergenceError` where fewer than two can.
+    These are half widths, as arclengths, from wide to narrow.  Windows that cannot be filled, or that leave the bounds,
+    are passed over.  Raises :class:`ConvergenceError` where fewer than two can.
     """
     best: Place | None = None
     other: Place | None = None
     for half in windows:
         try:
-            here = _in_window(criterion, plane, node, sought, half)
+            here = _in_window(criterion, node, sought, half)
         except ConvergenceError:
             continue
         best, other = (here, best) if best is None or here.ds < best.ds else (best, here)
@@ -125,10 +122,10 @@ def place(
     return replace(best, ds=3 * best.ds + abs(best.s - other.s), apart=abs(best.p - other.p), windows=both)
 
 
-def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, half: float) -> Place:
+def _in_window(criterion: Criterion, node: LocusPoint, sought: Sought, half: float) -> Place:
     """Where ``sought`` is, by points of a window of this ``half`` width; raises :class:`ConvergenceError`."""
-    t = _arclengths(half)
-    nodes = [criterion.onto(ahead(plane, node, float(s)), node) for s in t]
+    t = half * PLACES
+    nodes = [_ahead(criterion, node, float(s), criterion.onto) for s in t]
     tables = [[sought.of(n) for n in nodes], *np.array([n.p for n in nodes]).T]
     f, *through = (Chebyshev.fit(t, values, POINTS - 1, domain=[-half, half]) for values in tables)
     # each coefficient may be wrong by as much as the last two: by |T_k(0)| times that the value, |T_k'(0)| the slope
@@ -138,45 +135,39 @@ def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sou
     wrong = float(abs(f.coef[-2:]).max() * moves.sum())
     slope, s = g.deriv(), 0.0
     for _ in range(POINTS):  # Newton's method
-        if not slope(s) or abs(s) > INSIDE * half:
+        if not slope(s) or abs(s) > half / 2:
             break
         s -= float(g(s) / slope(s))
     ds = wrong / max(abs(float(slope(s))), TINY)
-    if not abs(s) + ds < INSIDE * half:
+    if not abs(s) + ds < half / 2:
         raise ConvergenceError("what is sought is not in the window")
     return Place(s, ds, through, nodes, half, np.zeros(2))
 
 
-def ahead(plane: Plane, node: LocusPoint, s: float) -> Prediction:
-    """Point on the tangent of ``node``; raises :class:`ConvergenceError` out of the bounds."""
+def _ahead(criterion: Criterion, node: LocusPoint, s: float, correct: Callable[..., LocusPoint]) -> LocusPoint:
+    """Point that is at ``s`` on the tangent of ``node``, corrected; ConvergenceError out of the bounds."""
     p = node.p + s * node.dp
-    if plane.outside(p) is not None:
+    if criterion.plane.outside(p) is not None:
         raise ConvergenceError("the window leaves the bounds")
-    return p, node.x + node.dx * s, node.dp, node.dx
-
-
-def _arclengths(half: float) -> np.ndarray:
-    """Chebyshev's points of a window of this ``half`` width, (POINTS,)."""
-    return np.asarray(half * np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS))
+    return correct((p, node.x + node.dx * s, node.dp, node.dx), node)
 
 
 class Codim2Points:
-    """Finds what lies between two nodes of a locus of a ``criterion`` in a ``plane``."""
+    """Finds what lies between two nodes of a locus of a ``criterion``."""
 
-    def __init__(self, criterion: Criterion, plane: Plane) -> None:
-        self.criterion, self.plane = criterion, plane
+    def __init__(self, criterion: Criterion) -> None:
+        self.criterion, self.plane = criterion, criterion.plane
 
     def between(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> tuple[list[Row], str]:
         """Rows between two nodes, in their order, and why the curve ends there; empty where it does not.
 
         ``a`` and ``b`` are one after the other, and ``before`` is the node before them, None if there is none.
         """
-        if self._reverses(a, b):
+        if _reverses(a, b, NONE * self.plane.width):
             coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
-            if coupling is None or self._coupling_vanishes(coupling, a, b, VANISHED):
+            if coupling is None or _coupling_vanishes(coupling, a, b, VANISHED):
                 share = float(a.coupling @ a.coupling) / float((a.coupling - b.coupling) @ a.coupling)
-                end = coupling and self._end_of_fold(coupling, a, b)
-                row, where = self._end(a, b, share, end)
+                row, where = self._end(a, b, share, coupling and self._end_of_fold(coupling, a, b))
                 return [(row, ENDS)], f"{ENDS} {where}, or turns back within {GAP:g} of the bounds from one"
         if a.omega2 * b.omega2 < 0:
             zero = self.located(a, b, DOUBLE_ZERO.of)
@@ -184,15 +175,12 @@ class Codim2Points:
             return [(row, DIVERGES)], f"{DIVERGES} {where}"
         return self._rows(a, b, before, TRIES), ""
 
-    def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
-        """Point between neighbours ``a``, ``b`` where parameter ``which`` has a ``value``; none if not located."""
-        node, axis = self.located(a, b, lambda n: float(n.p[which]) - value), self.plane.axis(which)
-        if node is None:
-            return []
+    def located(self, a: LocusPoint, b: LocusPoint, f: Test) -> LocusPoint | None:
+        """Point between two others at which ``f`` vanishes; None where it cannot be located."""
         try:
-            return [self.criterion.correct((np.where(axis, value, node.p), node.x, axis, None), node, REACH)]
-        except ConvergenceError:
-            return [node]
+            return self._at(a, b, zero_between(lambda s: f(self._at(a, b, s)), a.s, b.s, LOCATED))
+        except (ConvergenceError, ValueError):
+            return None
 
     # --- rows ------------------------------------------------------------------------------------------------------
 
@@ -219,7 +207,7 @@ class Codim2Points:
         if sides and depth:
             (p, q), less = sides, depth - 1
             left, right = self._rows(a, p, q, less), self._rows(q, b, p, less)
-        if self._coupling_vanishes(cusp, a, b, PASSED):
+        if _coupling_vanishes(cusp, a, b, PASSED):
             # no solution locates it: corrections slide along the curve of branch points
             return [*left, (_within(cusp, a, b), PASSES), *right]
         return [*left, (self._placed(cusp, _reversal(self.plane, a, b)), "cusp"), *right]
@@ -231,25 +219,20 @@ class Codim2Points:
         return [self._at(a, b, s) for s in both] if a.s < both[0] and both[1] < b.s else []
 
     def _turns(self, a: LocusPoint, b: LocusPoint) -> list[Row]:
-        """Points between two nodes at which a parameter has an extremum."""
+        """Points between two nodes at which a parameter has an extremum that differs from both by more than noise."""
         found = list[Row]()
         flat = np.minimum(abs(a.dp), abs(b.dp)) <= NONE * self.plane.width
         for i in np.flatnonzero((a.dp * b.dp < 0) & ~flat & _changes(a, b)):
             turn = self.located(a, b, lambda n, i=i: float(n.dp[i]))  # type: ignore[misc]
             sought = Sought(lambda n, i=i: float(n.p[i]), stationary=True)  # type: ignore[misc]
-            if turn is not None and _moves(turn, a, b, i):
+            if turn is not None and max(abs(turn.p - a.p)[i], abs(turn.p - b.p)[i]) > CERTAIN * turn.located_to[i]:
                 found.append((self._placed(turn, sought), f"turns in {self.plane.names[i]}"))
         return sorted(found, key=lambda item: item[0].s)
 
-    # --- what has one sign at both nodes ---------------------------------------------------------------------------
-
     def _hidden(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> list[LocusPoint]:
         """A point between two nodes where something has another sign than at both, if there is one."""
-        for s, of in _extrema(a, b, before):
-            node = self._beyond_zero(a, b, s, of)
-            if node is not None:
-                return [node]
-        return []
+        found = (self._beyond_zero(a, b, s, of) for s, of in _extrema(a, b, before))
+        return next(([node] for node in found if node is not None), [])
 
     def _beyond_zero(self, a: LocusPoint, b: LocusPoint, s: float | None, of: Test) -> LocusPoint | None:
         """Point near arclength ``s`` where ``of`` has the other sign than at both nodes, by successive parabolas."""
@@ -275,40 +258,16 @@ class Codim2Points:
         """Point of the curve between two nodes at an arclength; raises :class:`ConvergenceError`."""
         return replace(self.criterion.correct(between(a, b, s), a), s=s)
 
-    def located(self, a: LocusPoint, b: LocusPoint, f: Test) -> LocusPoint | None:
-        """Point between two others at which ``f`` vanishes; None where it cannot be located."""
-        try:
-            return self._at(a, b, zero_between(lambda s: f(self._at(a, b, s)), a.s, b.s, LOCATED))
-        except (ConvergenceError, ValueError):
-            return None
-
     def _placed(self, node: LocusPoint, sought: Sought) -> LocusPoint:
         """The point near ``node`` that is ``sought``, with uncertainties of its place along the curve, too."""
         try:
-            found = place(self.criterion, self.plane, node, sought)
-            better = self.criterion.correct(ahead(self.plane, node, found.s), node)
+            found = place(self.criterion, node, sought)
+            better = _ahead(self.criterion, node, found.s, self.criterion.correct)
         except ConvergenceError:
             along = np.maximum(abs(node.dp), UNPLACED * self.plane.width)
             return replace(node, located_to=node.located_to + UNPLACED * along)
         located = better.located_to + found.dp
         return replace(better, s=node.s + found.s, located_to=located, sought=sought, windows=found.windows)
-
-    # --- ends ------------------------------------------------------------------------------------------------------
-
-    def _reverses(self, a: LocusPoint, b: LocusPoint) -> bool:
-        """Whether coupling and tangent change their signs between two nodes, in each parameter that has some.
-
-        Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.
-        """
-        coupled = _coupled(a, b)
-        moves = np.minimum(abs(a.dp), abs(b.dp)) > NONE * self.plane.width
-        turned = (a.coupling * b.coupling < 0)[coupled].all() and (a.dp * b.dp < 0)[moves].all()
-        return bool(coupled.any() and moves.any() and turned)
-
-    def _coupling_vanishes(self, node: LocusPoint, a: LocusPoint, b: LocusPoint, share: float) -> bool:
-        """Whether at most a ``share`` of the coupling at two nodes is left at ``node``, in all parameters."""
-        size = np.minimum(abs(a.coupling), abs(b.coupling))
-        return bool((abs(node.coupling) <= share * size)[_coupled(a, b)].all())
 
     def _end_of_fold(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
         """The end near ``node`` of a fold on a branch point, by interpolation between its two sides.
@@ -317,7 +276,7 @@ class Codim2Points:
         """
         node, sought = replace(self._on_cubic(a, b, node.s), p=node.p, x=node.x), _reversal(self.plane, a, b)
         try:
-            found = place(self.criterion, self.plane, node, sought)
+            found = place(self.criterion, node, sought)
         except ConvergenceError:
             return _within(node, a, b)
         end = found.interpolated(node)
@@ -344,6 +303,28 @@ class Codim2Points:
         p, x, dp, dx = between(a, b, s)
         size = self.criterion.length(dp, dx)
         return replace(a, p=p, x=x, dp=dp / size, dx=dx / size, s=s, ordinate=self.criterion.solver.shape.ordinate(x))
+
+
+def _reverses(a: LocusPoint, b: LocusPoint, least: np.ndarray) -> bool:
+    """Whether coupling and tangent, above the ``least``, change their signs between two nodes, in each parameter.
+
+    Beyond its end on a branch point a fold is its own mirror image, with the same parameters once more.
+    """
+    coupled, moves = _coupled(a, b), np.minimum(abs(a.dp), abs(b.dp)) > least
+    turned = (a.coupling * b.coupling < 0)[coupled].all() and (a.dp * b.dp < 0)[moves].all()
+    return bool(coupled.any() and moves.any() and turned)
+
+
+def _coupling_vanishes(node: LocusPoint, a: LocusPoint, b: LocusPoint, share: float) -> bool:
+    """Whether at most a ``share`` of the coupling at two nodes is left at ``node``, in all parameters."""
+    size = np.minimum(abs(a.coupling), abs(b.coupling))
+    return bool((abs(node.coupling) <= share * size)[_coupled(a, b)].all())
+
+
+def _coupled(a: LocusPoint, b: LocusPoint) -> np.ndarray:
+    """Whether the null vector is coupled with each of the parameters (2,) at two nodes, round-off apart."""
+    size = np.minimum(abs(a.coupling), abs(b.coupling))
+    return np.asarray(size > NONE * size.max())
 
 
 def _within(node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
@@ -373,24 +354,10 @@ def _extrema(a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> list[tu
 def _vertex(s: Sequence[float], values: Sequence[float]) -> float | None:
     """Argument at which the parabola through three values comes nearest to zero or passes it; None without one."""
     second, first, _ = np.polyfit(np.array(s) - s[1], values, 2)
-    if second * values[1] <= 0:
-        return None
-    return float(s[1] - first / (2 * second))
-
-
-def _coupled(a: LocusPoint, b: LocusPoint) -> np.ndarray:
-    """Whether the null vector is coupled with each of the parameters (2,) at two nodes, round-off apart."""
-    size = np.minimum(abs(a.coupling), abs(b.coupling))
-    return np.asarray(size > NONE * size.max())
+    return None if second * values[1] <= 0 else float(s[1] - first / (2 * second))
 
 
 def _changes(a: LocusPoint, b: LocusPoint) -> np.ndarray:
     """Whether each parameter (2,) may change between two nodes by more than its uncertainty: else nothing is sought."""
     most = np.maximum(abs(a.dp), abs(b.dp)) * (b.s - a.s)
     return np.asarray(most > CERTAIN * np.minimum(a.located_to, b.located_to))
-
-
-def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:
-    """Whether a parameter at its extremum differs from that at the neighbours by more than its uncertainty."""
-    moved = max(abs(turn.p[which] - a.p[which]), abs(turn.p[which] - b.p[which]))
-    return bool(moved > CERTAIN * turn.located_to[which])

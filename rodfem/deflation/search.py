@@ -15,9 +15,8 @@ is the plain one ``p = -F'^-1 F``, rescaled (Sherman & Morrison) ::
 
 The distance is that of the system's metric: at a given load the rotation determines the strains and multipliers of a
 rod with a convex energy.  What a symmetry makes of a known equilibrium is known too: ``d_i`` is the distance from the
-nearest point of its orbit (:mod:`rodfem.deflation.group_orbit`), and discrete symmetries add isolated images
-(:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
-new and admissible.
+nearest point of its orbit, and discrete symmetries add isolated images (:mod:`rodfem.deflation.symmetries`).  What
+converges is polished by the plain Newton method, and kept if it is new and admissible.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
@@ -25,7 +24,6 @@ A search can show that there are more equilibria, and never that there are no mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
@@ -35,58 +33,27 @@ from petsc4py import PETSc
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.deflation.discrete_symmetries import Mirror, mirrors
-from rodfem.deflation.group_orbit import Orbits
+from rodfem.deflation.symmetries import Orbits, mirrors
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import LARGEST, Correction, Limits, NewtonResult, correct, linear_step, newton, relative_size
 from rodfem.fem.system import System
 from rodfem.problem.ends import TURNS
-from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD, TINY
+from rodfem.tolerances import APART, DRIFT, NEGLIGIBLE, SAME_LOAD, SAME_SPECIAL, TINY
 
 NEAR = 1e-4
 """Plain Newton steps below this, in the metric and relative in natural sizes, end the deflated iteration: the plain one
 takes over."""
 FLOW = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 """Reciprocal time steps of the gradient flow, over the rod's lowest bending eigenvalue."""
-LEAST, GREATEST = 0.3, 3.0
-"""Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
-SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
-"""Equilibria that slide are one if their energies agree to the first, or to the second of their natural size."""
-
 NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not admissible"
-
-
-@dataclass
-class SearchLog:
-    """What a search did: its ``load`` in words, how its ``tries`` ended, and the ``mirrors`` (symmetries) of the scene.
-
-    ``tries`` are the outcomes above, in order.  ``nearly`` counts equilibria that are nearly mirror images of others,
-    which an imperfection makes different ones.
-    """
-
-    load: str
-    tries: list[str] = field(default_factory=list)
-    mirrors: list[str] = field(default_factory=list)
-    nearly: int = 0
-
-    def __str__(self) -> str:
-        """Return the counts, and what they do not prove, in a few lines."""
-        words = ", ".join(f"{self.tries.count(outcome)} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
-        images = "; ".join(self.mirrors) or "none"
-        nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
-        return (
-            f"Further equilibria at {self.load} by deflation, {len(self.tries)} tries: {words}\n{nearly}"
-            f"  states that a symmetry carries into each other count as one (mirror images: {images})\n"
-            "  no proof that there are no others: more tries or another seed may find some"
-        )
 
 
 class Deflation:
     """Search for equilibria at one ``load``, on the mesh of a ``solver``, other than the ``known`` ones at that load.
 
-    New ones are ``found``, one of each set that the symmetries carry into each other; the ``tally`` says how tries
-    ended, ``mirrors`` are the discrete symmetries.  ``seed`` is that of the random guesses.  Raises :class:`InputError`
-    for a known equilibrium at another load.
+    New ones are ``found``, one of each set that the symmetries carry into each other; ``tries`` are the outcomes, in
+    order.  ``nearly`` counts equilibria that are nearly mirror images of others, which an imperfection makes different
+    ones.  Raises :class:`InputError` for a known equilibrium at another load.
     """
 
     def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
@@ -102,35 +69,43 @@ class Deflation:
                 )
         self.start = solver.start(load)
         self.mirrors = mirrors(self.system, self.start)
-        self.bases: list[PETSc.Vec] = []
-        self.found: list[Point] = []
-        self.energies: list[float] = []
-        # states shifted along the rod are one, and known by their energy
-        self.slides = any(s.along for s in self.system.symmetries)
-        self.tally = SearchLog(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
+        self.bases, self.energies = list[PETSc.Vec](), list[float]()
+        self.found, self.tries, self.nearly = list[Point](), list[str](), 0
         for point in known:
             self._deflate(point.x)
+
+    def __str__(self) -> str:
+        """Return the counts, and what they do not prove, in a few lines."""
+        words = ", ".join(f"{self.tries.count(outcome)} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
+        images = "; ".join(m.in_words() for m in self.mirrors) or "none"
+        nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
+        where = f"{self.system.scene.load} = {self.load:.10g}"
+        return (
+            f"Further equilibria at {where} by deflation, {len(self.tries)} tries: {words}\n{nearly}"
+            f"  states that a symmetry carries into each other count as one (mirror images: {images})\n"
+            "  no proof that there are no others: more tries or another seed may find some"
+        )
 
     def run(self, tries: int) -> list[Point]:
         """Make ``tries`` tries, the first from the scene's start if nothing is known; all that was found so far.
 
-        Guesses start in turn from the known and the found states, and grow from ``LEAST`` to ``GREATEST``; half of them
-        flow twice as long.  The tries of a second call are others.  The first ones of a rod whose ends turn freely are
-        the first state turned over.
+        Guesses start in turn from the known and the found states, and turn by 0.3 to 3 radian (root mean square); half
+        of them flow twice as long.  The tries of a second call are others.  The first ones of a rod whose ends turn
+        freely are the first state turned over.
         """
-        before = len(self.tally.tries)
+        before = len(self.tries)
         over = turned_over(self.system, self.bases[0]) if self.bases else []
         for number in range(before, before + tries):
             x = self.start.copy()
             if number < len(over):
                 x = over[number]
             elif number or self.known.states:
-                amplitude = LEAST * (GREATEST / LEAST) ** ((number - before) / max(tries - 1, 1))
+                amplitude = 0.3 * 10.0 ** ((number - before) / max(tries - 1, 1))
                 base = self.bases[number % len(self.bases)] if self.bases else self.start
                 x = turned_state(self.system, base, amplitude, [self.seed, number])
                 self.flow(x, FLOW * (1 + number // 2 % 2))
             point, outcome = self._judge(x) if self.approach(x).converged else (None, FAILED)
-            self.tally.tries.append(outcome)
+            self.tries.append(outcome)
             if point is not None:
                 self.found.append(point)
                 self._deflate(point.x)
@@ -174,9 +149,7 @@ class Deflation:
 
     def rescaling(self, x: PETSc.Vec, step: PETSc.Vec) -> float:
         """Factor that makes a plain Newton step at ``x`` the step of the deflated equations."""
-        # grad log M . p, a sum over the known equilibria: see the module
-        image = self.system.metric * step
-        slope = 0.0
+        image, slope = self.system.metric * step, 0.0  # grad log M . p: see the module
         for d, apart in self.known.nearest(x):
             d = max(d, NEGLIGIBLE)
             slope -= 2 * apart.dot(image) / (d * d * (1 + d * d))
@@ -184,10 +157,11 @@ class Deflation:
 
     def _advance(self, x: PETSc.Vec, step: PETSc.Vec, factor: float) -> bool:
         """Add ``factor`` times a step, halved while the stored energy has no value there; False if it never has."""
-        system, equations = self.system, self.system.new_vector()
+        system, equations, f = self.system, self.system.new_vector(), self.system.fields
         for _ in range(10):
-            trial = x + step * factor
-            self._normalise(trial)
+            state = system.at(x + step * factor)
+            unit = {f.turning.name: f.turning.normalised(state.turned)}  # quaternions of unit length
+            trial = system.vector(f.filled(state.named | unit), state.drifts)
             system.at(trial).residual(equations)
             if isfinite(equations.norm()):
                 trial.copy(x)
@@ -195,43 +169,29 @@ class Deflation:
             factor /= 2
         return False
 
-    def _normalise(self, x: PETSc.Vec) -> None:
-        """Make the nodal quaternions of ``x`` of unit length."""
-        state, f = self.system.at(x), self.system.fields
-        normalised = {f.turning.name: f.turning.normalised(state.turned)}
-        self.system.vector(f.filled(state.named | normalised), state.drifts).copy(x)
-
-    def nearest_known(self, x: PETSc.Vec) -> float:
-        """Distance of a state from all that is known, images by symmetries included; infinite if that is nothing."""
-        return min((d for d, _ in self.known.nearest(x)), default=float("inf"))
-
     def _deflate(self, x: PETSc.Vec) -> None:
-        """Add a state and its images to what is known."""
+        """Add a state and its mirror images to what is known.
+
+        An imperfection below what the test of the mirrors sees makes the image another equilibrium, with another
+        energy: a pole next to its root would hide it from Newton's method.  Then the mirror goes.
+        """
         self.bases.append(x)
-        self.energies.append(self.solver.energy(x))
-        if self.nearest_known(x) > APART:
+        self.energies.append(energy := self.solver.energy(x))
+        if self.known.distance(x) > APART:
             self.known.add(x)
         for mirror in list(self.mirrors):
             image = mirror(self.system, x)
-            if mirror in self.mirrors and self.nearest_known(image) > APART:
-                self._deflate_image(image, self.energies[-1], mirror)
-
-    def _deflate_image(self, image: PETSc.Vec, energy: float, mirror: Mirror) -> None:
-        """Add the mirror image of an equilibrium to what is known; without it, if it is none, the mirror goes.
-
-        An imperfection below what the test of the mirrors sees makes the image another equilibrium, with another
-        energy: a pole next to its root would hide it from Newton's method.
-        """
-        point, _ = self._judge(image)
-        scale = max(abs(energy), self.solver.inertia.scale)
-        if point is not None and abs(point.energy - energy) > NEGLIGIBLE * scale:
+            if mirror not in self.mirrors or self.known.distance(image) <= APART:
+                continue
+            point, _ = self._judge(image)
+            scale = max(abs(energy), self.solver.inertia.scale)
+            if point is None or abs(point.energy - energy) <= NEGLIGIBLE * scale:
+                self.known.add(image)
+                continue
             self.found.append(point)
-            self.tally.nearly += 1
+            self.nearly += 1
             self.mirrors.remove(mirror)
-            self.tally.mirrors.remove(str(mirror))
             self._deflate(point.x)
-        else:
-            self.known.add(image)
 
     def _judge(self, x: PETSc.Vec) -> tuple[Point | None, str]:
         """Polish a candidate by the plain Newton method; the point, if it is a new equilibrium, and the outcome."""
@@ -240,16 +200,15 @@ class Deflation:
         system.set_load(x, self.load)  # steps at fixed load may have moved it by round-off
         if not outcome.converged:
             return None, FAILED
-        if self.nearest_known(x) < APART:
+        if self.known.distance(x) < APART:
             return None, KNOWN
         try:
             point = solver.point(x, 0.0, solver.load_tangent(x, True), outcome)
         except ConvergenceError:  # an index that cannot be counted
             return None, FAILED
-        if self.slides and any(
-            abs(point.energy - e) <= SAME_ENERGY * max(abs(e), LEAST_ENERGY * solver.units.energy)
-            for e in self.energies
-        ):
+        least = NEGLIGIBLE * solver.units.energy  # states shifted along the rod are one, and known by their energy
+        same = (abs(point.energy - e) <= SAME_SPECIAL * max(abs(e), least) for e in self.energies)
+        if any(s.along for s in system.symmetries) and any(same):
             return None, KNOWN
         if point.drift > DRIFT * solver.inertia.scale or not point.stretch > 0:
             return None, INADMISSIBLE
@@ -257,23 +216,19 @@ class Deflation:
 
 
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
-    """Known state turned by a smooth rotation that respects clamps, its vector of that root mean square size.
+    """Known state ``base`` turned by a smooth rotation that respects clamps, its vector of that root mean square size.
 
     The vector, of this ``amplitude``, is a random combination of the lowest four waves along the rod that vanish where
-    directors are clamped; it depends on the nodes and the ``seed`` only.  ``base`` is a state of the ``system``.
+    directors are clamped; it depends on the nodes and the ``seed`` only.
     """
     f = system.fields
-    rng = np.random.default_rng(seed)
-    weights = rng.normal(size=(4, 3)) / np.arange(1, 5)[:, None]
+    weights = np.random.default_rng(seed).normal(size=(4, 3)) / np.arange(1, 5)[:, None]
     a, b = system.scene.interval
     x = (f.coordinates(f.discretization.degree) - a) / (b - a)
     left, right = (end.fixed_rotation is not None for end in system.scene.sides)
-    waves = _waves(x, left, right)
     dense = _waves(np.linspace(0.0, 1.0, 401), left, right)
     size = float(np.sqrt(np.mean(np.sum((dense @ weights) ** 2, axis=-1))))
-    state = system.at(base)
-    turned = f.turning.turned(state.turned, waves @ weights * (amplitude / size))
-    return system.vector(f.filled(state.named | {f.turning.name: turned}))
+    return _turned(system, base, _waves(x, left, right) @ weights * (amplitude / size))
 
 
 def turned_over(system: System, base: PETSc.Vec) -> list[PETSc.Vec]:
@@ -283,12 +238,14 @@ def turned_over(system: System, base: PETSc.Vec) -> list[PETSc.Vec]:
     """
     if system.scene.closed or any(end.turning != TURNS for end in system.scene.sides):
         return []
+    nodes = (*system.at(base).turned.shape[:-1], 3)
+    return [_turned(system, base, np.broadcast_to(np.pi * axis, nodes)) for axis in np.eye(3)[:2]]
+
+
+def _turned(system: System, base: PETSc.Vec, vector: np.ndarray) -> PETSc.Vec:
+    """State ``base`` whose rotations are turned by a rotation ``vector`` at each node."""
     f, state = system.fields, system.at(base)
-    out = []
-    for axis in np.eye(3)[:2]:
-        vector = np.broadcast_to(np.pi * axis, (*state.turned.shape[:-1], 3))
-        out.append(system.vector(f.filled(state.named | {f.turning.name: f.turning.turned(state.turned, vector)})))
-    return out
+    return system.vector(f.filled(state.named | {f.turning.name: f.turning.turned(state.turned, vector)}))
 
 
 def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
@@ -320,7 +277,7 @@ def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
     images = [mirror(system, point.x) for mirror in mirrors(system, point.x)]
     system.phase, count = phase, 1
     for x in images:
-        if all(apart >= APART for apart, _ in known.nearest(x)):
+        if known.distance(x) >= APART:
             known.add(x)
             count += 1
     return Coexisting(point, count, system.active_drifts(point.x))
@@ -337,26 +294,22 @@ def equilibria_at(
     """
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
-        for point in _along(solver, [here(p) for p in branch.points], load, singular_states(branch)):
-            if all(apart >= APART for apart, _ in known.nearest(point.x)):
+        for point in _along(solver, branch, [here(p) for p in branch.points], load):
+            if known.distance(point.x) >= APART:
                 point.branch = branch.name
                 found.append(point)
                 known.add(point.x)
     return found
 
 
-def singular_states(branch: Branch) -> set[int]:
-    """Ids of the states of a branch that are those of folds and branch points."""
-    first = {id(branch.points[0].x)} if branch.parent else set()
-    return first | {id(s.point.x) for s in branch.special if s.kind.singular}
+def _along(solver: BranchSolver, branch: Branch, points: Sequence[Point], load: float) -> Iterator[Point]:
+    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a ``branch``, which are on its mesh.
 
-
-def _along(solver: BranchSolver, points: Sequence[Point], load: float, singular: set[int]) -> Iterator[Point]:
-    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh.
-
-    At those whose states are ``singular``, by their ids, Newton's method at the load itself has nothing to go by: they
-    are what was located.
+    At a fold or a branch point Newton's method at the load itself has nothing to go by: they are what was located.
     """
+    singular = {id(s.point.x) for s in branch.special if s.kind.singular}
+    if branch.parent:
+        singular.add(id(branch.points[0].x))
     for a, b in zip(points, [*points[1:], None], strict=True):
         if a.load == load and id(a.x) in singular:
             yield solver.point(a.x, a.arclength, a.tangent)

@@ -5,7 +5,7 @@ mirror images in their plane, and differ in what they do across it: then no symm
 other.  The eigenvalues nearest zero tell.
 
 Of the two sides of a symmetric pitchfork only one is traced.  A discrete symmetry of the equations
-(:mod:`rodfem.deflation.discrete_symmetries`) carries it to the other one, of the same energies and indices.  A diagram
+(:mod:`rodfem.deflation.symmetries`) carries it to the other one, of the same energies and indices.  A diagram
 shows that image where its ordinate has the opposite sign.
 """
 
@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
-from rodfem.deflation.discrete_symmetries import candidates, mirrors
+from rodfem.deflation.symmetries import candidates, mirrors
 from rodfem.diagram.events import Step
 from rodfem.errors import ConvergenceError
 from rodfem.problem.units import Units

@@ -17,8 +17,8 @@ from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.observer import Remark
 from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, lines, start_branch
-from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import Deflation, equilibria_at
+from rodfem.deflation.symmetries import Orbits
 from rodfem.diagram.equilibria import ahead, first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
 from rodfem.diagram.tracer import Tracer
@@ -66,7 +66,7 @@ class Explorer(Tracer):
             known = equilibria_at(self.solver, self.branches, load, self.here)
             search = Deflation(self.solver, load, known)
             found = search.run(self.plan.tries)
-            self.observer.note(Remark(f"\n{search.tally}", load))
+            self.observer.note(Remark(f"\n{search}", load))
             return found
 
     def _on_branch(self, point: Point, first: int = 0) -> bool:
@@ -75,7 +75,7 @@ class Explorer(Tracer):
         known = Orbits(self.solver.system)
         for other in equilibria_at(self.solver, self.branches[first:], point.load, self.here):
             known.add(other.x)
-        return any(apart < APART for apart, _ in known.nearest(point.x))
+        return known.distance(point.x) < APART
 
     def _convex(self, points: list[Point]) -> list[Point]:
         """Those ``points`` along which the stored energy is convex; the others are mentioned."""

@@ -20,9 +20,8 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.deflation.discrete_symmetries import mirrors
-from rodfem.deflation.group_orbit import Orbit
 from rodfem.deflation.search import NEW, Deflation, equilibria_at, turned_state
+from rodfem.deflation.symmetries import Orbit, mirrors
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
@@ -76,8 +75,8 @@ def test_cord() -> None:
         q, end = CORD.solve(guess)
         assert abs(q - guess).max() < 0.1
         assert (end[10], 1 - end[9]) == pytest.approx((p.energy, p.ordinate), abs=1e-4)
-    assert search.tally.tries.count(NEW) == len(new)
-    assert len(search.tally.tries) == 24
+    assert search.tries.count(NEW) == len(new)
+    assert len(search.tries) == 24
 
 
 @pytest.mark.alone
@@ -106,7 +105,7 @@ def test_hemitropic() -> None:
             orbit = Orbit(follower.system, match.x, 0)
             for angle in (0.7, 2.5, 4.0):  # all of the circle is known, and in equilibrium
                 x = orbit.at(angle)
-                assert search.nearest_known(x) < 1e-9
+                assert search.known.distance(x) < 1e-9
                 assert force(follower, x) < 1e-9
 
 
@@ -149,7 +148,7 @@ def test_ruler() -> None:
     image = mirror(found.follower.system, buckled.x)
     assert found.follower.system.distance(image, buckled.x) > 0.5
     assert force(found.follower, image) < 1e-9
-    assert search.nearest_known(image) < APART
+    assert search.known.distance(image) < APART
 
     explorer = Explorer(found.follower, Plan((0.0, 12.0), error_bars=False), Observer(), lambda: None)
     up, down = both_ways(buckled)
@@ -170,10 +169,10 @@ def test_nothing_to_find() -> None:
     (only_one,) = Deflation(follower, 0.2).run(1)
     search = Deflation(follower, 0.2, [only_one])
     assert search.run(10) == []
-    assert len(search.tally.tries) == 10
-    assert search.tally.tries.count(NEW) == 0
+    assert len(search.tries) == 10
+    assert search.tries.count(NEW) == 0
     report = Report(follower.system.comm, stream=out)
-    report.say(str(search.tally))
+    report.say(str(search))
     if follower.system.comm.rank == 0:
         assert "10 tries: 0 new" in out.getvalue()
         assert "no proof" in out.getvalue()

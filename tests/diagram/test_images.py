@@ -10,7 +10,7 @@ import pytest
 from problem.test_docs import scenes
 
 import rodfem
-from rodfem.deflation.discrete_symmetries import Mirror
+from rodfem.deflation.symmetries import Mirror
 from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization

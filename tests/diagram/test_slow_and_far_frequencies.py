@@ -10,7 +10,7 @@ from classics import column, push
 from hard.thrusts import THIN
 
 from rodfem import Diagram, Discretization, End, Inertia, Plan, Scene, clamped, free, trace
-from rodfem.codim2.criteria import NEAREST
+from rodfem.codim2.follow import NEAREST
 from rodfem.forms import loads
 
 pytestmark = pytest.mark.alone
