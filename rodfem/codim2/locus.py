@@ -58,6 +58,12 @@ class Row:
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
+    ``scene`` and ``title`` name the rod, ``kind`` its special points, ``labels``, ``words`` and ``units`` the parameters,
+    in mathematics and in words.  ``ordinate`` (n,) is the scene's, with ``ordinate_name`` and ``natural`` size.
+    ``constants`` are all other parameters, ``discretization`` is the mesh; ``states`` are not saved.  Of a ``planar`` rod
+    the index is that of changes in its plane, and stability is not that in space.  ``solve`` gives the rows where a
+    parameter, 0 or 1, has a value; None in a locus from a file.
+
     Attributes
     ----------
     names, bounds, values
@@ -91,9 +97,9 @@ class Locus:
 
     scene: str
     title: str
-    kind: str  # of its special points
+    kind: str
     names: tuple[str, str]
-    labels: tuple[str, str]  # of the parameters, in mathematics
+    labels: tuple[str, str]
     ordinate_name: str
     bounds: tuple[Interval, Interval]
     values: np.ndarray
@@ -106,17 +112,17 @@ class Locus:
     marks: list[Mark]
     start: int
     ended: tuple[str, str]
-    constants: dict[str, float]  # all other parameters of the scene
+    constants: dict[str, float]
     discretization: dict[str, Any]
-    states: list[PETSc.Vec] = field(default_factory=list)  # not saved
+    states: list[PETSc.Vec] = field(default_factory=list)
     crossings: list[tuple[float, float]] = field(default_factory=list)
-    words: tuple[str, str] = ("", "")  # for the parameters
+    words: tuple[str, str] = ("", "")
     units: tuple[str, str] = ("", "")
     note: str = ""
-    natural: float = 1.0  # size of the ordinate, of which round-off is a part
-    planar: bool = False  # the index is that of changes in a plane, and stability is not that in space
+    natural: float = 1.0
+    planar: bool = False
     unresolved: list[int] = field(default_factory=list)
-    solve: Callable[[int, float], list[Row]] | None = None  # rows where a parameter, 0 or 1, has a value; of no file
+    solve: Callable[[int, float], list[Row]] | None = None
 
     def __repr__(self) -> str:
         """Kind, names, size and ranges."""
