@@ -58,10 +58,10 @@ class Row:
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
-    ``scene`` and ``title`` name the rod, ``kind`` its special points, ``labels``, ``words`` and ``units`` the parameters,
-    in mathematics and in words.  ``ordinate`` (n,) is the scene's, with ``ordinate_name`` and ``natural`` size.
-    ``constants`` are all other parameters, ``discretization`` is the mesh; ``states`` are not saved.  Of a ``planar`` rod
-    the index is that of changes in its plane, and stability is not that in space.  ``solve`` gives the rows where a
+    ``scene`` and ``title`` name the rod, ``kind`` its special points, ``labels``, ``words`` and ``units`` the two
+    parameters in mathematics and words.  ``ordinate`` (n,) is the scene's, with ``ordinate_name`` and ``natural`` size.
+    ``constants`` are all other parameters, ``discretization`` is the mesh; ``states`` are not saved.  Of a ``planar``
+    rod the index is that of changes in its plane, and stability is not that in space.  ``solve`` gives the rows where a
     parameter, 0 or 1, has a value; None in a locus from a file.
 
     Attributes
