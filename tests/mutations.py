@@ -241,7 +241,7 @@ FAULTS = {
         "tests/diagram/test_sweep.py",
     ),
     "matrices-pile-up": Fault(
-        "rodfem/stability/nonsymmetric.py", "if self.filled % PILE == 0:", "if False:", "tests/diagram/test_sweep.py"
+        "rodfem/stability/nonsymmetric.py", "if self.filled % 64 == 0:", "if False:", "tests/diagram/test_sweep.py"
     ),
     "more-modes-than-there-are": Fault(
         "rodfem/fem/fields.py",
@@ -302,8 +302,8 @@ FAULTS = {
     ),
     "rods-that-soften-are-not-slow": Fault(
         "rodfem/stability/nonsymmetric.py",
-        "not (self.slow or several)",
-        "not self.slow",
+        "not (self.solver.slow or several)",
+        "not self.solver.slow",
         "tests/diagram/test_slow_and_far_frequencies.py",
     ),
     "differences-along-a-locus-by-the-bounds-alone": Fault(
@@ -815,8 +815,8 @@ FAULTS = {
     # index
     "constraints-are-miscounted": Fault(
         f"{STABILITY}inertia.py",
-        "below = negative - own.constraints - self.drifts",
-        "below = negative - own.constraints",
+        "below = negative - self.constraints - drifts",
+        "below = negative - self.constraints",
         INERTIA,
     ),
     "symmetries-are-no-zeros": Fault(
@@ -845,7 +845,7 @@ FAULTS = {
     ),
     "index-in-space-of-the-plane": Fault(
         f"{STABILITY}in_space.py",
-        "return self.inertia.at(state)",
+        "return self.inertia.at(settled if converged else state)",
         "return Inertia(self.planar).at(x)",
         "tests/literature/test_rods.py tests/literature/test_ruler.py tests/literature/test_classics.py",
     ),
@@ -1099,8 +1099,8 @@ FAULTS = {
     ),
     "left-vectors-have-free-motions": Fault(
         "rodfem/stability/nonsymmetric.py",
-        "if self._free and not left:",
-        "if self._free:",
+        "if free and not left:",
+        "if free:",
         "tests/literature/test_free_rods.py",
     ),
     "sweeps-go-in-one-step": Fault(
@@ -1213,8 +1213,8 @@ FAULTS = {
     ),
     "dependent-only-where-sigma-is-zero": Fault(
         f"{STABILITY}dependence.py",
-        "_distance(blocks, x, pencil, w) < STALLED",
-        "_distance(blocks, x, pencil, w) < 1e-12",
+        "_distance(blocks, x, pencil, w) > STALLED",
+        "_distance(blocks, x, pencil, w) > 1e-12",
         "tests/stability/test_dependence.py",
     ),
     "distances-of-the-mesh": Fault(
@@ -1252,8 +1252,8 @@ FAULTS = {
     ),
     "rigid-motions-take-all-digits": Fault(
         f"{STABILITY}nonsymmetric.py",
-        "return self.near(number + BEYOND, SHIFT * self.system.scene.units.omega2, left=left)",
-        "return self.near(number + BEYOND, 0.0, left=left)",
+        "found = self.near(number + BEYOND, SHIFT * self._one, left=left)",
+        "found = self.near(number + BEYOND, 0.0, left=left)",
         "tests/literature/test_free_rods.py",
     ),
     "double-eigenvalue-of-flutter-twice": Fault(

@@ -54,7 +54,7 @@ class SoftStates:
     """
 
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
-        self.solver, self.names = solver, MotionNames(solver.system, solver.inertia.metric)
+        self.solver, self.names = solver, MotionNames(solver.system)
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
         self.uncompared = ""

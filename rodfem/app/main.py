@@ -17,7 +17,7 @@ from rodfem.app.cli import Parser, complain, folder, sentences, start_petsc
 from rodfem.app.persons_file import as_sentence, load
 from rodfem.errors import InputError
 from rodfem.problem.scene import Scene
-from rodfem.stability.registry import AUTO, METHODS
+from rodfem.stability import AUTO, METHODS
 
 if TYPE_CHECKING:
     from rodfem.diagram.plan import Plan

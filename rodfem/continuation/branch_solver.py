@@ -412,7 +412,7 @@ class BranchSolver:
             return []
         modes = self.spectrum.at(x).leftmost(self.modes)
         tolerance = self.inertia.tolerance / self.inertia.scale * least_eigenvalue(self.system)
-        least, most = modes.negative(tolerance), modes.negative(-tolerance)
+        least, most = (int((modes.values < at).sum()) for at in (-tolerance, tolerance))
         if not least <= min(index.negative, self.modes) <= most or not modes.certified:
             raise ConvergenceError(
                 f"SLEPc finds {least} negative eigenvalues at "

@@ -57,9 +57,8 @@ from rodfem.fem.newton import TOLERANCE, Correction, Limits, newton
 from rodfem.fem.state import Line
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
-from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Factored
-from rodfem.stability.reduced_stiffness import DIFFERENCE
+from rodfem.stability.reduced_stiffness import DIFFERENCE, Bordered
 from rodfem.tolerances import TINY
 
 FARTHEST = 0.5

@@ -87,7 +87,7 @@ def _shares(mine: Spectrum, others: Spectrum) -> np.ndarray:
     there, vectors = others.upper, others.coordinates(mine)[:, mine.upper]
     shares = np.zeros((len(mine.upper), len(there)))
     for group in groups(others.values[there], np.inf, ALIKE):
-        w = others.condensed.pairs.right[:, there[group]]
+        w = others.pairs.right[:, there[group]]
         shares[:, group] = inside(np.concatenate([w.real, w.imag], axis=1), vectors)[:, None]
     return shares
 
@@ -96,7 +96,7 @@ def others_negative(mine: Spectrum, others: Spectrum) -> bool:
     """Whether the negative eigenvalues of two states, as many, are others, by their vectors."""
     if not len(mine.negative):
         return False
-    basis = others.condensed.pairs.right[:, others.negative].real
+    basis = others.pairs.right[:, others.negative].real
     return bool(inside(basis, others.coordinates(mine)[:, mine.negative].real).min() < 1.0 - OUTSIDE)
 
 

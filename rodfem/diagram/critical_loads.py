@@ -214,7 +214,7 @@ def meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
         count += int(mine.values[count - 1].imag < 0.0)  # of a pair that comes first
     first, back = _neighbour(mine, before.spectrum, count)
     last, ahead = _neighbour(mine, behind.spectrum, count)
-    nu = np.array([first, mine.condensed.pairs.nu[:count], last])
+    nu = np.array([first, mine.pairs.nu[:count], last])
     t = abs(before.load - row.load) / abs(behind.load - row.load)
     found = [
         *_pairs(mine, nu, np.array([back * back.T, ahead * ahead.T]), t),
@@ -225,19 +225,18 @@ def meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
 
 def _neighbour(row: Spectrum, other: Spectrum, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (k,) of a neighbour, as the row has them, and the change of ``Z^t T Y`` to it (k, k)."""
-    mine, there = row.condensed, other.condensed
-    left = times(mine.lower, mine.pairs.left[:count].T).T
+    left = times(row.lower, row.pairs.left[:count].T).T
     places, others = assignment(-abs(left @ other.right))
-    matched = mine.pairs.nu[:count].astype(complex)
-    matched[places] = there.pairs.nu[others]
-    projected = left @ times(there.inverse, times(there.lower.T, row.right[:, :count]))
-    return matched, projected - np.diag(mine.pairs.nu[:count])
+    matched = row.pairs.nu[:count].astype(complex)
+    matched[places] = other.pairs.nu[others]
+    projected = left @ times(other.inverse, times(other.lower.T, row.right[:, :count]))
+    return matched, projected - np.diag(row.pairs.nu[:count])
 
 
 def _pairs(row: Spectrum, nu: np.ndarray, products: np.ndarray, t: float) -> list[tuple[float, float]]:
     """Where pairs come near one another, two real ones or a complex one and its conjugate, and their means."""
     count = nu.shape[1]
-    values, noise, right = row.values[:count], row.condensed.pairs.noise[:count], row.condensed.pairs.right[:, :count]
+    values, noise, right = row.values[:count], row.pairs.noise[:count], row.pairs.right[:, :count]
     i, j = np.triu_indices(count, 1)
     one = abs((right.conj().T @ right)[i, j]) ** 2 > ONE
     real, apart = (values.imag[i] == 0.0) & (values.imag[j] == 0.0), abs(nu[1, i] - nu[1, j])
@@ -255,7 +254,7 @@ def _pairs(row: Spectrum, nu: np.ndarray, products: np.ndarray, t: float) -> lis
 def _single(row: Spectrum, nu: np.ndarray, t: float) -> list[tuple[float, float]]:
     """Where eigenvalues come near zero, and do not pass through it, and what they are at the row."""
     real = np.flatnonzero(row.values[: nu.shape[1]].imag == 0.0)
-    mu = row.condensed.shift + 1.0 / nu[:, real].real
+    mu = row.shift + 1.0 / nu[:, real].real
     ends = (mu[0] * mu[2] > 0.0) & (np.minimum(abs(mu[0]), abs(mu[2])) > row.zero / row.one)
     found = _lowest(np.sign(mu[0]) * mu, t, np.array([ends, ends]))
     return [(at, float(row.values[real[n]].real)) for n, at in found]

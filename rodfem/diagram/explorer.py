@@ -24,7 +24,7 @@ from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordin
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.shape import link
-from rodfem.stability.bordered import Bordered
+from rodfem.stability.reduced_stiffness import Bordered
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import APART, SAME_SPECIAL, SAME_STATE
 

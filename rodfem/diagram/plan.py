@@ -13,7 +13,7 @@ from rodfem.problem.events import Event
 from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
-from rodfem.stability import registry
+from rodfem.stability import AUTO, METHODS, find
 
 MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"), Argument("Plan", "spectrum")
 FEWER = "give less in {}, or use more elements"
@@ -90,8 +90,8 @@ class Plan:
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         a(StepControl, "StepControl, as in steps=StepControl(largest=0.02)")("steps", self.steps)
         a(str, "the name of one, as in method='auto'")("method", self.method)
-        if self.method not in ("", registry.AUTO):
-            registry.find(self.method)
+        if self.method not in ("", AUTO):
+            find(self.method)
         if self.accuracy is not None:
             object.__setattr__(self, "accuracy", real("accuracy", self.accuracy, ACCURACY))
         yes_or_no("error_bars", self.error_bars)
@@ -167,7 +167,7 @@ class Plan:
             raise InputError("A search needs loads to search at", GIVE_LOADS)
         if not self.at and (self.modes or self.method):
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
-        if self.modes and self.method in registry.METHODS and not registry.find(self.method).finds_modes:
+        if self.modes and self.method in METHODS and not find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
 
     @staticmethod

@@ -221,7 +221,7 @@ class Solver:
         point
             The equilibrium.
         method
-            ``auto``, or a name of ``rodfem.stability.registry.METHODS``.
+            ``auto``, or a name of ``rodfem.stability.METHODS``.
         number
             How many eigenvalues are computed.
 

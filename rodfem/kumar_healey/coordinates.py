@@ -67,10 +67,7 @@ class MappedPencil(Pencil):
 
 
 class Coordinates:
-    """Makes the :class:`MappedPencil` of states of one system in one set of coordinates, and vectors of the system.
-
-    ``quaternions`` (nodes, 4) are the global numbers of the components of ``q`` at each free node.
-    """
+    """Makes the :class:`MappedPencil` of states of one system in one set of coordinates, and vectors of the system."""
 
     def __init__(self, system: System, coordinates: str = "tangent") -> None:
         """Number rows and columns; raises :class:`InputError` for coordinates that the formulation does not have."""
@@ -85,13 +82,13 @@ class Coordinates:
         every = self.blocks.gathered(f.number[self._dofs])
         first, chosen = np.unique(every[:, 0], return_index=True)
         self._nodes = chosen[first >= 0]
-        self.quaternions = every[self._nodes]
+        self.quaternions = every[self._nodes]  # global numbers of the components of q at each free node
         self._quads = np.searchsorted(self.blocks.rows, self.quaternions)
         self._map = sp.csr_matrix((0, 0))
 
-    def assemble(self, x: PETSc.Vec, sizes: PETSc.Vec | None = None) -> MappedPencil:
-        """Blocks at the state ``x``, in units of natural ``sizes`` of the unknowns if these are given."""
-        p, state = self.blocks.assemble(x, sizes), self.system.at(x)
+    def assemble(self, x: PETSc.Vec, *, scaled: bool = False) -> MappedPencil:
+        """Blocks at the state ``x``; ``scaled``: in units of natural sizes."""
+        p, state = self.blocks.assemble(x, scaled=scaled), self.system.at(x)
         one = sp.identity(len(self.blocks.rows), format="csr")
         out = MappedPencil(p.K, p.C, p.M, p.where, p.place, one, self.system.scene.conservative)
         if self.coordinates != "full":
@@ -101,34 +98,31 @@ class Coordinates:
         self._map = out.T
         return out
 
-    def without_modes(self, x: PETSc.Vec, sizes: PETSc.Vec) -> MappedPencil:
-        """The same with a constraint ``g.Mx = 0`` more for each symmetry mode ``g``, in units of natural ``sizes``."""
+    def without_modes(self, x: PETSc.Vec) -> MappedPencil:
+        """The same in natural units, with a constraint ``g.Mx = 0`` more for each symmetry mode ``g``."""
         modes = symmetry_modes(self.system, x)
-        units = None if self.system.scene.units.ordinary else sizes
-        pencil, images = self.assemble(x, units), []
+        pencil, images = self.assemble(x, scaled=True), []
         if not modes:
             return pencil
         for _, weighed in weighed_modes(self.system, modes, self.blocks.mass).values():
-            if units is not None:
-                weighed.pointwiseMult(weighed, units)
+            if not self.system.scene.units.ordinary:
+                weighed.pointwiseMult(weighed, self.blocks.sizes)
                 weighed.scale(1.0 / weighed.norm())
             images.append(pencil.T.T @ self.blocks.gathered(weighed.array_r.real)[self.blocks.rows])
         C = sp.hstack([pencil.C, np.stack(images, axis=1)]).tocsr()
         return replace(pencil, C=C, place=np.append(pencil.place, np.full(len(modes), np.nan)))
 
-    def lift(self, vectors: np.ndarray, sizes: PETSc.Vec) -> list[PETSc.Vec]:
-        """Vectors of the system from columns in the coordinates of the last pencil, in units of natural ``sizes``."""
+    def lift(self, vectors: np.ndarray) -> list[PETSc.Vec]:
+        """Vectors of the system from columns in the coordinates of the last pencil, in natural units."""
         mine, places = self.blocks.own(self.blocks.rows)
         out = []
         for column in (self._map @ vectors)[mine].T:
             vector = self.system.new_vector()
             vector.array[places] = column
             if not self.system.scene.units.ordinary:
-                vector.pointwiseMult(vector, sizes)
+                vector.pointwiseMult(vector, self.blocks.sizes)
             out.append(vector)
         return out
-
-    # --- maps --------------------------------------------------------------------------------------------------
 
     def _tangent(self, full: MappedPencil, state: State) -> MappedPencil:
         """A spin at each node in the place of its quaternion; that of a planar rod is one already."""

@@ -50,7 +50,7 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
 from rodfem.kumar_healey.null_space import kernel
 from rodfem.linalg.orthogonal import generic
-from rodfem.stability.methods import NEAR_ZERO, Found, Interval, Method, SymmetricMethod, Workspace
+from rodfem.stability.assessment import Assessor, Found, Interval, Method, SymmetricMethod
 from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.spectrum import FINITE, krylov
 
@@ -178,7 +178,7 @@ class ReducedPencil:
 class Reduction(Method):
     """A Krylov space of the reduced pencil."""
 
-    def __init__(self, work: Workspace) -> None:
+    def __init__(self, work: Assessor) -> None:
         super().__init__(work)
         self.coordinates = Coordinates(work.system)
 
@@ -190,26 +190,26 @@ class Reduction(Method):
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """With a shift near zero."""
-        found = self.reduced(x).near(number, NEAR_ZERO * scale_in_units(self.work.system))
+        found = self.reduced(x).near(number, 1e-3 * scale_in_units(self.work.system))  # where it is singular at zero
         return Found(self.work.one * found.values, [], found.errors, factorisations=1)
 
     def reduced(self, x: PETSc.Vec) -> ReducedPencil:
         """The reduced pencil at ``x``, symmetry modes left out."""
-        return ReducedPencil(self.coordinates.without_modes(x, self.work.sizes))
+        return ReducedPencil(self.coordinates.without_modes(x))
 
     def lifted(self, found: Reduced, certified: bool, factorisations: int, note: str = "") -> Found:
         """What was ``found``, as vectors of the system in its units; ``certified``: a count finds no more.
 
         It cost so many ``factorisations``, and a ``note`` goes after the reason.
         """
-        vectors = self.coordinates.lift(found.vectors, self.work.sizes)
+        vectors = self.coordinates.lift(found.vectors)
         return Found(self.work.one * found.values, vectors, found.errors, certified, factorisations, note)
 
 
 class Cayley(Reduction, SymmetricMethod):
     """Its shift is from estimates of the two left-most eigenvalues, or from those of the last state."""
 
-    def __init__(self, work: Workspace) -> None:
+    def __init__(self, work: Assessor) -> None:
         super().__init__(work)
         self._shift: float | None = None
 

@@ -202,11 +202,11 @@ class ModeFinder:
         square = v.dot(inertia.metric * v).real
         if abs(value) < soft_limit(inertia) * square:
             return self._soft(x, [v / square**0.5])[0]
-        return motion_names.name_of(motion_names.turning_shares(self.system, self.system.at(x).turned, [v.array_r]))
+        return motion_names.name_of(self.system, self.system.at(x).turned, v.array_r.real[:, None])
 
     @cached_property
     def _soft(self) -> MotionNames:
-        return MotionNames(self.system, self.solver.inertia.metric)
+        return MotionNames(self.system)
 
     def _weights(self, values: np.ndarray, responses: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
         """Each new mode as a combination: places of those combined, and weights; ``responses`` are (K, 36)."""

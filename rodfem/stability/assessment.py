@@ -1,77 +1,87 @@
-"""A state in, a report on its stability out: one interface to all methods of :mod:`rodfem.stability.registry`.
+"""A state in, a report on its stability out: one interface to all methods.
 
 Every verdict on a conservative state has its index by the count, decided within the count's band by Rayleigh quotients
-(:mod:`rodfem.stability.near_zero`); methods differ in how they find eigenvalues and vectors.
+(:mod:`rodfem.stability.near_zero`); methods differ in how they find eigenvalues and vectors: ``count`` finds none,
+``shift-invert`` has a Krylov space of the singular pencil, ``slicing`` all in an interval, ``dense`` all there are.  A
+method is a class here or in another room, and a name in :data:`rodfem.stability.METHODS`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
+from slepc4py import SLEPc
 
+from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError, InputError, many
 from rodfem.fem.shape import Shape
+from rodfem.fem.system import System
+from rodfem.linalg.factorization import PETSC_ERR_LIB, ordering, preferred
+from rodfem.linalg.matrices import gathered
 from rodfem.ranks import as_failure
+from rodfem.stability import AUTO, METHODS, find
 from rodfem.stability.dependence import require_independent_constraints
-from rodfem.stability.methods import Found, Method, Workspace
+from rodfem.stability.inertia import Inertia
 from rodfem.stability.near_zero import Decision, decide
-from rodfem.stability.registry import AUTO, METHODS, find
+from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricSolver
 from rodfem.stability.soft_mode import ONE_SIDE, WORDS, SoftMode, is_stable, stability
+from rodfem.stability.spectrum import FINITE, Spectrum
+from rodfem.stability.symmetric import Found, SymmetricPencil, SymmetricSolver, eigensolver
 
 COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
-SMALL = 12
-"""A system with fewer unknowns than this for each eigenvalue is solved by dense matrices."""
+LARGEST = 3000
+"""Unknowns that dense matrices may have."""
+
+Interval = tuple[float, float]
 
 
 @dataclass(frozen=True, repr=False)
 class Verdict:
-    """Stability of one state.
-
-    Attributes
-    ----------
-    negative, zero, undecided
-        Index, number of zero eigenvalues (symmetry modes included), and of those whose sign is not decided, which are
-        not among the negative ones; under non-conservative loads the number of eigenvalues with a negative real part
-        or an imaginary part, of all that the mesh has (of those found, if it is too large), and that of free motions.
-    values, vectors, errors
-        Left-most eigenvalues ``mu = omega^2`` without symmetry modes (under non-conservative loads those nearest zero),
-        vectors (without multipliers if constraints were reduced; none if mu is complex), and backward errors.
-    band, inside, uncertainty
-        Half width of the interval about zero, in the metric, in which inertia alone decides nothing; Rayleigh quotients
-        of the eigenvalues in it, and their round-off.
-    certified
-        Whether counts prove that none is missing among the values.
-    seconds, factorisations, method, reason
-        Cost of the verdict, how it was done, and why so.
-    soft, kink, uncompared, negative_in_space
-        Of :meth:`rodfem.Solver.assess`: eigenvalues near zero in the metric, by name; what has a kink at the very
-        state, where the numbers are those of one side; why the index was not compared with that of a richer mesh; of a
-        planar rod the index in space, if it is known.
-    """
+    """Stability of one state: what :meth:`rodfem.Solver.assess` returns."""
 
     negative: int
+    """Index; under loads without a potential the number of eigenvalues with a negative real part or an imaginary part,
+    of all that the mesh has (of those found, if it is too large)."""
     zero: int
+    """Number of zero eigenvalues, symmetry modes included; of free motions, under loads without a potential."""
     values: np.ndarray
+    """Left-most eigenvalues ``mu = omega^2`` without symmetry modes; those nearest zero, without a potential."""
     vectors: list[PETSc.Vec]
+    """Their vectors, without multipliers if constraints were reduced; none without a potential."""
     errors: np.ndarray
+    """Their backward errors."""
     band: float
+    """Half width of the interval about zero, in the metric, in which inertia alone decides nothing."""
     inside: np.ndarray
+    """Rayleigh quotients of the eigenvalues in that band."""
     uncertainty: np.ndarray
+    """Round-off of those."""
     certified: bool
+    """Whether counts prove that none is missing among the values."""
     seconds: float
+    """What it cost."""
     factorisations: int
+    """So many of matrices."""
     method: str
+    """How it was done."""
     reason: str
+    """Why so."""
     undecided: int = 0
+    """Number of eigenvalues whose sign is not decided, which are not among the negative ones."""
     soft: tuple[SoftMode, ...] = ()
+    """Eigenvalues near zero in the metric, by name."""
     kink: str = ""
+    """What has a kink at the very state, where the numbers are those of one side."""
     uncompared: str = ""
+    """Why the index was not compared with that of a richer mesh."""
     negative_in_space: int | None = None
+    """Of a planar rod the index in space, if it is known."""
 
     @property
     def stable(self) -> bool | None:
@@ -108,12 +118,33 @@ class Verdict:
         )
 
 
-class Assessor(Workspace):
+class Assessor:
     """Judges states of one system; keeps matrices, symbolic factorisations and the last modes for the next state."""
 
     def __init__(self, source: Any) -> None:
-        super().__init__(source)
+        """Take a system, or a solver with its inertia."""
+        self.system: System = source if isinstance(source, System) else source.system
+        self.conservative, self.one = self.system.scene.conservative, self.system.scene.units.omega2
+        given = getattr(source, "inertia", None)
+        self.inertia: Inertia | None = (given or Inertia(self.system)) if self.conservative else None
         self._methods: dict[str, Method] = {}
+
+    @cached_property
+    def symmetric(self) -> SymmetricSolver:
+        """Left-most eigenvalues of conservative states."""
+        assert self.inertia is not None
+        return SymmetricSolver(self.inertia)
+
+    @cached_property
+    def nonsymmetric(self) -> NonsymmetricSolver:
+        """Eigenvalues of states under loads without a potential."""
+        return NonsymmetricSolver(self.system)
+
+    def below(self, x: PETSc.Vec) -> SymmetricPencil:
+        """Symmetric pencil at ``x``, its shift below all eigenvalues."""
+        pencil = self.symmetric.at(x)
+        pencil.go_below()
+        return pencil
 
     def choose(self, name: str, number: int) -> tuple[str, str]:
         """Name of the method to use and the reason; raises :class:`InputError` for one unknown or not applicable."""
@@ -122,7 +153,7 @@ class Assessor(Workspace):
                 return "shift-invert", "the load has no potential, the pencil no symmetry"
             if number == 0:
                 return COUNT, "no eigenvalues were asked for"
-            if self.system.fields.unknowns < SMALL * number:
+            if self._few(number):
                 return DENSE, f"{self.system.fields.unknowns} unknowns are too few for a Krylov space"
             return "shift-invert", "the pencil is symmetric: one sparse factorisation serves eigenvalues and count"
         if refusal := find(name).refusal(self.system):
@@ -130,8 +161,12 @@ class Assessor(Workspace):
             raise InputError(f"Method {name!r} {refusal}: choose one of {others}.")
         return name, "as asked"
 
-    def __call__(self, x: PETSc.Vec, method: str = AUTO, number: int = 4, interval: Any = None) -> Verdict:
-        """Assess the equilibrium ``x`` by a ``method`` of :mod:`rodfem.stability.registry`, or ``auto``.
+    def _few(self, number: int) -> bool:
+        """Whether there are so few unknowns that the mesh may have no such ``number`` of eigenvalues."""
+        return self.system.fields.unknowns < 12 * number
+
+    def __call__(self, x: PETSc.Vec, method: str = AUTO, number: int = 4, interval: Interval | None = None) -> Verdict:
+        """Assess the equilibrium ``x`` by a ``method`` of :data:`rodfem.stability.METHODS`, or ``auto``.
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
         :class:`InputError` for a method that does not exist or apply, for dependent constraints, and for more
@@ -140,41 +175,48 @@ class Assessor(Workspace):
         name, reason = self.choose(method, number)
         if number < 0:
             raise InputError(f"{number} eigenvalues cannot be computed: ask for none or more.")
-        started = perf_counter()
-        if self.inertia is None:
+        started, made, nothing = perf_counter(), 0, np.zeros(0)
+        if self.conservative:
+            decision = self._index(x)
+            counts = decision.index.negative, decision.index.zero
+            inside = decision.band, decision.inside, decision.uncertainty
+            made -= self._factorisations() - 2
+            found = self._leftmost(x, name if number else COUNT, number, interval)
+            made += self._factorisations()
+        else:
             with as_failure(self.system.comm):
                 found = self._method(name).nearest(x, max(number, 1))
-            index, zero, nothing = self.nonsymmetric.at(x).spectrum.unstable, self.system.active_drifts(x), np.zeros(0)
-            inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing
-            made = 0
-        else:
-            decision = self._index(x)
-            index, zero = decision.index.negative, decision.index.zero
-            inside, made = (decision.band, decision.inside, decision.uncertainty), 2 - self.factorisations()
-            try:
-                with as_failure(self.system.comm):
-                    found = self._method(name if number else COUNT).leftmost(x, number, interval)
-                if interval is None and len(found.values) < number and name != COUNT:
-                    raise ConvergenceError(
-                        f"The method {name} found {len(found.values)} of {number} eigenvalues: ask for fewer of them, "
-                        "or choose another method."
-                    )
-            except ConvergenceError:
-                few = self.system.fields.unknowns < SMALL * number  # there may be no more than were found
-                if few and not find(DENSE).refusal(self.system):
-                    self._method(DENSE).leftmost(x, number, None)
-                raise
-            made += self.factorisations()
+            counts = self.nonsymmetric.at(x).spectrum.unstable, self.system.active_drifts(x)
+            inside = 0.0, nothing, nothing
         return Verdict(
-            *(index, zero, found.values, found.vectors, found.errors, *inside, found.certified),
+            *(*counts, found.values, found.vectors, found.errors, *inside, found.certified),
             *(perf_counter() - started, made + found.factorisations, name, reason + found.note),
         )
 
+    def _leftmost(self, x: PETSc.Vec, name: str, number: int, interval: Interval | None) -> Found:
+        """By a method; of a small mesh with fewer than ``number`` eigenvalues LAPACK has the sentence on that."""
+        try:
+            with as_failure(self.system.comm):
+                found = self._method(name).leftmost(x, number, interval)
+            if interval is None and len(found.values) < number and name != COUNT:
+                raise ConvergenceError(
+                    f"The method {name} found {len(found.values)} of {number} eigenvalues: ask for fewer of them, "
+                    "or choose another method."
+                )
+        except ConvergenceError:
+            if self._few(number) and not find(DENSE).refusal(self.system):
+                self._method(DENSE).leftmost(x, number, None)
+            raise
+        return found
+
     def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """The ``number`` left-most eigenpairs of the conservative state ``x`` alone, without its index."""
-        name, _ = self.choose(AUTO, number)
         with as_failure(self.system.comm):
-            return self._method(name).leftmost(x, number, None)
+            return self._method(self.choose(AUTO, number)[0]).leftmost(x, number, None)
+
+    def _factorisations(self) -> int:
+        """Number of those of the symmetric pencil, so far."""
+        return self.symmetric.factorisations if "symmetric" in vars(self) else 0
 
     def _method(self, name: str) -> Method:
         """Method by name, kept for the next state."""
@@ -192,9 +234,188 @@ class Assessor(Workspace):
             raise
 
 
-def assess(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
+def assess(source: Any, x: PETSc.Vec, method: str = AUTO, number: int = 4) -> Verdict:
     """Assess one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch.
 
     ``source``, ``x``, ``method`` and ``number`` are as there.
     """
     return Assessor(source)(x, method, number)
+
+
+class Method:
+    """A way to the eigenvalues that decide the stability of states of one system."""
+
+    finds_modes = True
+    """Whether it finds eigenvalues and vectors."""
+
+    def __init__(self, work: Assessor) -> None:
+        self.work = work
+
+    @staticmethod
+    def refusal(system: System) -> str:
+        """Why it does not apply to a system, in words that follow its name; empty where it does."""
+        return ""
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """Left-most eigenvalues of a conservative state, ``number`` of them or those in an interval."""
+        raise NotImplementedError
+
+    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+        """Eigenvalues nearest zero of a state under loads without a potential."""
+        raise NotImplementedError
+
+
+class SymmetricMethod(Method):
+    """A method for conservative loads alone."""
+
+    @staticmethod
+    def refusal(system: System) -> str:
+        """Loads without a potential."""
+        trouble = "needs a symmetric pencil, which a load without potential does not have"
+        return "" if system.scene.conservative else trouble
+
+
+class Count(SymmetricMethod):
+    """The index alone, by the inertia of the saddle matrix, which every verdict on a conservative state has."""
+
+    finds_modes = False
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """Nothing."""
+        return Found(np.zeros(0), [], np.zeros(0), certified=True)
+
+
+class ShiftInvert(Method):
+    """SLEPc on the singular pencil: one sparse factorisation serves eigenvalues and count."""
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """By the Lanczos method, with a shift below the spectrum."""
+        return self.work.symmetric.at(x).leftmost(number)
+
+    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+        """By the Arnoldi method."""
+        return _nearest(self.work.nonsymmetric.at(x).near_zero(number), number)
+
+
+class Dense(Method):
+    """All eigenvalues by LAPACK, of the pencil on its unknowns with mass: an oracle for small systems."""
+
+    @staticmethod
+    def refusal(system: System) -> str:
+        """More than :data:`LARGEST` unknowns."""
+        unknowns = system.fields.unknowns
+        return "" if unknowns <= LARGEST else f"is for at most {LARGEST} unknowns, not {unknowns}"
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """By the symmetric ``T`` of :mod:`rodfem.stability.spectrum`, positive for a shift below all eigenvalues.
+
+        Raises :class:`InputError` if fewer than ``number`` are finite.
+        """
+        below = self.work.below(x)
+        stiffness, mass = (gathered(A).real for A in below.solver.scaled)
+        pencil = Spectrum(stiffness, mass, below.solver.shift)
+        T = pencil.dual.T @ pencil.inverse
+        nu, w = np.linalg.eigh((T + T.T) / 2)
+        if number > (finite := int((nu > FINITE * nu[-1]).sum())):
+            raise InputError(
+                f"The rod has {finite} eigenvalues on this mesh, not {number}: give number={finite} or less, or use "
+                "more elements."
+            )
+        nu, w = nu[::-1][:number], w[:, ::-1][:, :number]
+        vectors, own = [], slice(*below.matrix.getOwnershipRange())
+        for column in (pencil.images @ w / nu).T:
+            vectors.append(self.work.system.new_vector())
+            vectors[-1].array[:] = column[own]
+        values = below.solver.shift + 1.0 / nu
+        errors = below.backward_errors(values, vectors)
+        return Found(self.work.one * values, below.unscaled(vectors), errors, below.certifies(values))
+
+    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+        """Those of all that are nearest zero."""
+        return _nearest(self.work.nonsymmetric.at(x).leftmost(number), number)._replace(factorisations=0)
+
+
+def _nearest(found: Frequencies, number: int) -> Found:
+    """The ``number`` of some eigenvalues that are nearest zero, in the order in which they were found."""
+    nearest = np.sort(np.argsort(abs(found.values), kind="stable")[:number])
+    return Found(found.values[nearest], [], found.errors[nearest], factorisations=1)
+
+
+class Slicing(SymmetricMethod):
+    """SLEPc's spectrum slicing: all eigenvalues in an interval."""
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """In the ``interval``, or in one found by counting that holds ``number`` of them and few more.
+
+        Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` if an end is an eigenvalue.
+        """
+        pencil, one = self.work.below(x), self.work.one
+        low, high = (interval[0] / one, interval[1] / one) if interval else enclosed(pencil, number)
+        if not low < high:
+            raise InputError(f"An interval from {one * low:g} to {one * high:g} is empty: give its lower end first.")
+        for wider in (0.0, 1e-9, 1e-7, 1e-5):  # an end on an eigenvalue is moved off it
+            low, high = low - wider * (high - low), high + wider * (high - low)
+            wanted = pencil.below(high) - pencil.below(low)
+            if (solver := sliced(pencil, low, high)) is not None:
+                break
+        else:
+            ends = f"{one * low:.6g} to {one * high:.6g}"
+            raise ConvergenceError(f"An end of the interval from {ends} is an eigenvalue: move it.")
+        values, vectors = pencil.converged(solver, solver.getConverged() if interval else number)
+        complete = solver.getConverged() == wanted
+        solver.destroy()
+        errors = pencil.backward_errors(values, vectors)
+        return Found(one * values, pencil.unscaled(vectors), errors, complete, 3)  # SLEPc's own, at least
+
+
+def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None:
+    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None if they do not match the counts at these ends.
+
+    Raises :class:`PETSc.Error` where PETSc gives up.
+    """
+    rooms = 100, 400, 1600  # where rotations have no mass many pivots of the pencil are delayed
+    for room in rooms:
+        try:
+            solver = in_interval(*pencil.solver.scaled, low, high, room)
+            with slepc_errors():
+                solver.solve()
+        except PETSc.Error as trouble:
+            if trouble.ierr == 77:  # PETSC_ERR_PLIB: what it finds does not match the counts at the ends
+                return None
+            if trouble.ierr != PETSC_ERR_LIB or room == rooms[-1]:
+                raise
+        else:
+            return solver
+    return None
+
+
+def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
+    """Set up spectrum slicing for all eigenvalues of a pencil ``matrix - mu mass`` between ``low`` and ``high``.
+
+    ``room`` is what MUMPS has beyond its estimate, a percentage.  Options: ``-rodfem_slicing_eps_...``,
+    ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is an eigenvalue.
+    """
+    solver = eigensolver(matrix, mass, "rodfem_slicing_")
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    solver.setInterval(low, high)
+    solver.setTolerances(tol=1e-10)  # of vectors
+    solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    with slepc_errors():
+        solver.setFromOptions()
+        ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
+        ksp.setType("preonly")
+        ksp.getPC().setType("cholesky")
+        ksp.getPC().setFactorSolverType("mumps")
+        controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
+        with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
+            solver.setUp()
+    return solver
+
+
+def enclosed(pencil: SymmetricPencil, number: int) -> Interval:
+    """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
+    # no simple factor: an end on an eigenvalue is unlikely
+    low, step = pencil.solver.shift, max(abs(pencil.solver.shift), pencil.solver.scale) * 1.0371
+    while pencil.below(low + step) < number:
+        step *= 2
+    return low, low + step

@@ -22,7 +22,7 @@ Bases of the subspaces may be any: ``Z`` is the same.  A Chebyshev interpolant s
 load to load: rounding of one matrix at neighbouring loads is much the same.
 
 The error of the eigensolver comes to that.  ``W^t S V`` with both bases is in error by the product of theirs, so that
-it tells how far off are the eigenvalues by which the cluster was measured (Parlett, Math. Comput. 28 (1974) 679).
+it shows how far off are the eigenvalues by which the cluster was measured (Parlett, Math. Comput. 28 (1974) 679).
 """
 
 from __future__ import annotations
@@ -35,17 +35,13 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.linalg.matrices import local_rows
-from rodfem.stability.inertia import EPS, NOISE
+from rodfem.linalg.matrices import EPS, local_rows
+from rodfem.stability.inertia import NOISE
 from rodfem.stability.nonsymmetric import REAL, STILL, Frequencies, NonsymmetricPencil, squares
 from rodfem.tolerances import TINY
 
-SHIFT_OFFSET = 1e-3
-"""Distance from zero, over their natural size, where those near it are sought: the matrix is singular there."""
 FARTHER = 3.0
-"""Times that distance, or that from the mean, eigenvalues are sought that were not found at first."""
-LEAST = 0.25
-"""Share of a vector in an invariant subspace below which the vector does not belong to it."""
+"""Times the first distance of the shift from the mean, eigenvalues are sought that were not found at first."""
 DRAWN = 3.0
 """Uncertainty that an eigensolver leaves of a collision, in units of the error that it made at one load."""
 
@@ -73,7 +69,7 @@ class Measured:
 
     @property
     def spread(self) -> float:
-        """Distance of the eigenvalues from their mean, relative: how well they and their vectors are told apart."""
+        """Distance of the eigenvalues from their mean, relative: how distinct they and their vectors are."""
         return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), TINY))
 
     @property
@@ -82,42 +78,34 @@ class Measured:
         return float(abs((self.values - self.cluster.mean) ** 2 - self.discriminant).max())
 
 
-def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]) -> Cluster:
-    """Cluster of the ``chosen`` ones of eigenvalues found at a state, closed under conjugation."""
-    return Cluster(real_span(pencil, found.vectors[:, chosen]), float(found.values[chosen].real.mean()))
-
-
 def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
     """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`."""
-    found, chosen, values = members(pencil, real_span(pencil, cluster.basis), cluster)
-    here = cluster_of(pencil, found, chosen)
+    found, chosen = members(pencil, real_span(pencil, cluster.basis), cluster)
+    values = found.values[chosen]
+    here = Cluster(real_span(pencil, found.vectors[:, chosen]), float(values.real.mean()))
     return Measured(float(((values - here.mean) ** 2).mean().real), values, here)
 
 
 def members(
     pencil: NonsymmetricPencil, basis: np.ndarray, cluster: Cluster, *, left: bool = False
-) -> tuple[Frequencies, list[int], np.ndarray]:
-    """Eigenvalues of a ``pencil`` near the mean of a ``cluster`` that are its own, by shares in its ``basis``.
+) -> tuple[Frequencies, list[int]]:
+    """Eigenvalues of a ``pencil`` near the mean of a ``cluster``, and the places of its own by shares in a ``basis``.
 
-    Vectors are right ones, or ``left`` ones.  Returns what was found, the places of its own in that, and their values.
-    Of left vectors, orthogonal to the right ones of all other eigenvalues, any share tells.  Right vectors are not
-    orthogonal: rigid motions of a floating rod may have a greater share than its own, and belong to no cluster away
-    from zero.  Raises :class:`ConvergenceError`.
+    Vectors are right ones, or ``left`` ones.  Of left vectors, orthogonal to the right ones of all other eigenvalues,
+    any share is enough.  Right vectors are not orthogonal: rigid motions of a floating rod may have a greater share
+    than its own, and belong to no cluster away from zero.  Raises :class:`ConvergenceError`.
     """
-    size, offset = cluster.size, SHIFT_OFFSET * pencil.system.scene.units.omega2
-    least = REAL if left else LEAST
+    size, offset = cluster.size, 1e-3 * pencil.system.scene.units.omega2  # at zero the matrix may be singular
     shift = 0.97 * cluster.mean if abs(cluster.mean) > offset else -offset
     for number, times in ((size + 2, 1.0), (3 * size + 10, FARTHER)):  # one next to the shift takes digits from others
         found = pencil.near(number, cluster.mean + times * (shift - cluster.mean), left=left)
-        inside = pencil.product(basis, found.weighed)
         energy = squares(pencil.system.comm, found.vectors, found.weighed)
-        share = (abs(inside) ** 2).sum(axis=0) / energy
+        share = (abs(pencil.product(basis, found.weighed)) ** 2).sum(axis=0) / energy
         if found.floating and abs(cluster.mean) > offset:
             share[abs(found.values) < STILL * found.far] = 0.0
         chosen = closed(found.values, share, size)
-        values = found.values[chosen]
-        if len(chosen) == size and share[chosen].min() > least:
-            return found, chosen, values
+        if len(chosen) == size and share[chosen].min() > (REAL if left else 0.25):
+            return found, chosen
     raise ConvergenceError(f"the {size} eigenvalues near {cluster.mean:.6g} are not found again")
 
 
@@ -139,12 +127,9 @@ def closed(values: np.ndarray, share: np.ndarray, size: int) -> list[int]:
 
 def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:
     """Columns (n, k) of this rank's values as vectors of a system."""
-    out = []
-    for column in columns.T:
-        vector = system.new_vector()
+    out = [system.new_vector() for _ in columns.T]
+    for vector, column in zip(out, columns.T, strict=True):
         vector.array[:] = column
-        vector.assemble()
-        out.append(vector)
     return out
 
 
@@ -159,16 +144,13 @@ def real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
 class ClusterNoise(NamedTuple):
     """Uncertainty of the ``mean`` and of the ``discriminant`` of a cluster by round-off in the matrix.
 
-    ``mean_left`` and ``discriminant_left`` are what the eigensolver left open.  The ``square`` is ``|B|^2 / k``: the
-    magnitude of ``D`` if vectors are orthogonal, much more if they are nearly one.  ``two_sided`` is ``D`` by both
-    bases.
+    ``mean_left`` and ``discriminant_left`` are what the eigensolver left open; ``two_sided`` is ``D`` by both bases.
     """
 
     mean: float
     discriminant: float
     mean_left: float
     discriminant_left: float
-    square: float
     two_sided: float
 
     @property
@@ -184,17 +166,15 @@ class ClusterNoise(NamedTuple):
 
 def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     """Uncertainties of a cluster by round-off; :class:`ConvergenceError` if its left vectors are not found."""
-    V, size = measured.cluster.basis, measured.cluster.size
-    found, chosen, _ = members(pencil, V, measured.cluster, left=True)
-    weighed = pencil.weighed(V)
+    V, size, mean = measured.cluster.basis, measured.cluster.size, measured.cluster.mean
+    found, chosen = members(pencil, V, measured.cluster, left=True)
     W = real_span(pencil, found.vectors[:, chosen])
-    product = pencil.product(W, weighed)
+    product = pencil.product(W, pencil.weighed(V))
     if np.linalg.matrix_rank(product) < size:
-        raise ConvergenceError(f"the left vectors of {size} eigenvalues near {measured.cluster.mean:.6g} are not found")
+        raise ConvergenceError(f"the left vectors of {size} eigenvalues near {mean:.6g} are not found")
     W = W @ np.linalg.inv(product).T
-    rows = local_rows(pencil.matrix)
-    every = np.concatenate(pencil.system.comm.allgather(V))
-    B = pencil.product(W, (rows @ every).real) - measured.cluster.mean * np.eye(size)
+    rows, every = local_rows(pencil.matrix), np.concatenate(pencil.system.comm.allgather(V))
+    B = pencil.product(W, (rows @ every).real) - mean * np.eye(size)
 
     def of(left: np.ndarray) -> float:
         squares = abs(rows.data * np.einsum("ij,ij->i", np.repeat(left, np.diff(rows.indptr), 0), every[rows.indices]))
@@ -204,4 +184,4 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     inside = B - off * np.eye(size)
     discriminant = float(np.trace(inside @ inside)) / size
     left = abs(off), abs(discriminant - measured.discriminant)
-    return ClusterNoise(of(W), of(2 * W @ B.T), *left, float((inside**2).sum()) / size, discriminant)
+    return ClusterNoise(of(W), of(2 * W @ B.T), *left, discriminant)

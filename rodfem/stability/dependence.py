@@ -35,19 +35,17 @@ from petsc4py import PETSc
 from rodfem.errors import SceneError
 from rodfem.fem.newton import STALLED
 from rodfem.fem.shape import Shape
+from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.pencil import Blocks, Pencil
 from rodfem.tolerances import NEGLIGIBLE
 
-DIRECTION = 1e-6
-"""Relative tolerance of ARPACK for the vector of the least singular value."""
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
+TIGHT = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let it stretch."
 DOUBTFUL = 1e-5
 """A singular value above this, relative to the greatest column, is far from zero."""
-ROUND = 1e-9
-"""Distance from the scene's start, in the metric, below which a state is that start: Newton's tolerance."""
 TAUT = 1e-9
-"""Slack over length below which a rod may be taut, and the part of a direction that counts as none."""
+"""Part of a direction, and distance of a state from the scene's start, in the metric, that is round-off."""
 
 
 def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec | None = None) -> None:
@@ -57,20 +55,20 @@ def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec
     ``shape`` is that of the states of the system.
     """
     system = shape.system
-    if start is not None and system.norm(start - x) < ROUND:
+    if start is not None and system.norm(start - x) < TAUT:
         x = start
     blocks = Blocks(system)
     pencil = blocks.assemble(x)
     for sigma, w in weak_combinations(pencil, system.scene.length):
-        if sigma < NEGLIGIBLE or (sigma < DOUBTFUL and _distance(blocks, x, pencil, w) < STALLED):
-            equations = [
-                u.group.equation.format(u.component + 1) for u in system.fields.unknown_scalars if u.multiplier
-            ]
-            remedy = "remove those that follow from the others."
-            if taut(shape, x):
-                remedy = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let "
-                remedy += "it stretch."
-            raise SceneError(f"Constraints depend on one another ({named(pencil, equations, w)}): {remedy}")
+        if sigma > DOUBTFUL or (sigma > NEGLIGIBLE and _distance(blocks, x, pencil, w) > STALLED):
+            continue
+        names = named(pencil, _equations(system), w)
+        remedy = TIGHT if taut(shape, x) else "remove those that follow from the others."
+        raise SceneError(f"Constraints depend on one another ({names}): {remedy}")
+
+
+def _equations(system: System) -> list[str]:
+    return [u.group.equation.format(u.component + 1) for u in system.fields.unknown_scalars if u.multiplier]
 
 
 def may_depend(shape: Shape, x: PETSc.Vec) -> bool:
@@ -97,7 +95,7 @@ def weak_combinations(pencil: Pencil, length: float) -> Iterator[tuple[float, np
     small for its unit alone, so that its size is at least :data:`NEGLIGIBLE`.  Positions are over the ``length``.
     """
     C = sp.diags(_units(pencil, length)) @ pencil.C
-    norms = np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).ravel())
+    norms = spl.norm(C, axis=0)
     if not len(norms):
         return
     scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
@@ -141,7 +139,7 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     if p <= 300 or p > m:  # LAPACK takes no time
         _, s, vt = np.linalg.svd(C.toarray(), full_matrices=p > m)
         return (float(s[-1]) if p <= m else 0.0), vt[-1]
-    size = float(np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()))
+    size = float(spl.norm(C, axis=0).max())
     try:
         lu = spl.splu(sp.bmat([[size * sp.identity(m), C], [C.T, None]]).tocsc())
     except RuntimeError:
@@ -154,22 +152,20 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     if not np.isfinite(start).all():
         return 0.0, np.full(p, p**-0.5)
     operator = spl.LinearOperator((p, p), matvec=product, dtype=float)
-    _, vectors = spl.eigsh(
-        operator, k=1, which="LM", v0=start / np.linalg.norm(start), tol=DIRECTION, ncv=min(20, p - 1)
-    )
-    vector = vectors[:, 0] / np.linalg.norm(vectors[:, 0])
-    return float(np.linalg.norm(C @ vector)), vector
+    start /= np.linalg.norm(start)
+    _, vectors = spl.eigsh(operator, k=1, which="LM", v0=start, tol=1e-6)  # the vector shows sigma to all digits
+    return float(np.linalg.norm(C @ vectors[:, 0])), vectors[:, 0]
 
 
 def named(pencil: Pencil, equations: Sequence[str], w: np.ndarray) -> str:
     """Constraints whose gradients cancel with multipliers ``w`` (p,); ``equations`` are words for the scalar ones."""
-    w, words = w / np.linalg.norm(w), list[str]()
+    w, words = abs(w) / np.linalg.norm(w), list[str]()
     for name, what in NAMES.items():
         columns = pencil.where.get(name, np.zeros(0, dtype=int))
         if not (w[columns] ** 2).sum() > 0.01:
             continue
         if name == "scalars":
-            words += [equations[i] for i in np.flatnonzero(abs(w[columns]) > 0.1)]
+            words += [equations[i] for i in np.flatnonzero(w[columns] > 0.1)]
         else:
-            words.append(f"{what} (most of all at s = {pencil.place[columns[np.argmax(abs(w[columns]))]]:.4g})")
+            words.append(f"{what} (most of all at s = {pencil.place[columns[np.argmax(w[columns])]]:.4g})")
     return " and ".join(words)

@@ -11,12 +11,9 @@ from rodfem.fem.newton import correct
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.problem.ends import CLOSING_MOMENT
-from rodfem.stability.inertia import NULL, Factored, Index, Inertia
+from rodfem.stability.inertia import NULL, Factored, Inertia
 from rodfem.stability.near_zero import inside_band
 from rodfem.tolerances import same_place
-
-PUSHED = 1e-8
-"""Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
 
 
 class InSpace:
@@ -28,27 +25,15 @@ class InSpace:
 
     def __init__(self, planar: System) -> None:
         self.planar = planar
-        fields = planar.fields
-        self.system = System(planar.scene.in_space(), fields.discretization, planar.comm, planar.clock)
+        self.system = System(planar.scene.in_space(), planar.fields.discretization, planar.comm, planar.clock)
         self.inertia = Inertia(self.system)
         self._out = self._out_of_plane()
-
-    def lift(self, x: PETSc.Vec) -> PETSc.Vec:
-        """State in space of the planar state ``x``, as accurate an equilibrium as the discretisation is."""
-        state = self.planar.at(x)
-        quaternions = state.fields.turning.quaternion(state.turned)
-        return self.system.vector(self.system.fields.filled(state.named | self._scalars(state) | {"q": quaternions}))
-
-    def count(self, x: PETSc.Vec) -> Index:
-        """Index in space of the planar equilibrium ``x``; raises :class:`SceneError` where it is none in space."""
-        return self.at(x).count()
 
     def negative(self, x: PETSc.Vec) -> int:
         """Number of negative eigenvalues in space of the planar equilibrium ``x``; raises as :meth:`at` does.
 
         Those out of the plane that the count has as zero are decided by their Rayleigh quotients: symmetries are left
-        out, and a rod that is nearly symmetric may fall out of its plane slowly.  Raises :class:`ConvergenceError` if
-        they are not told apart.
+        out, and a rod that is nearly symmetric may fall out of its plane slowly.
         """
         found = self.at(x)
         index = found.count()
@@ -68,22 +53,27 @@ class InSpace:
         return float(self.system.comm.allreduce(own, op=MPI.SUM))
 
     def at(self, x: PETSc.Vec) -> Factored:
-        """Second variation in space at the planar equilibrium ``x``; :class:`SceneError` if that is none in space."""
-        state = self.lift(x)
+        """Second variation in space at the planar equilibrium ``x``; :class:`SceneError` if that is none in space.
+
+        The state is corrected in space, unless it is so near a singular one that its own error decides as well.
+        """
+        planar = self.planar.at(x)
+        quaternions = planar.fields.turning.quaternion(planar.turned)
+        named = planar.named | self._scalars(planar) | {"q": quaternions}
+        state = self.system.vector(self.system.fields.filled(named))
         self.system.set_phase(state)
         residual = self.system.new_vector()
         self.system.at(state).residual(residual)
         out = self.system.comm.allreduce(float(np.sum(residual.array_r[self._out] ** 2)), op=MPI.SUM) ** 0.5
-        if out > PUSHED * self.system.stiffness_scale:
+        if out > 1e-8 * self.system.stiffness_scale:  # else it is round-off
             raise SceneError(
                 f"A force or moment pushes the rod out of its plane across {self.planar.scene.planar}: "
                 "leave planar out of the scene."
             )
         settled = state.copy()
         # within this distance, in the metric, of the planar state
-        if correct(self.system, settled, self.system.load_axis(), 0.01).converged:
-            state = settled  # else the state is so near a singular one that its own error decides as well
-        return self.inertia.at(state)
+        converged = correct(self.system, settled, self.system.load_axis(), 0.01).converged
+        return self.inertia.at(settled if converged else state)
 
     def _scalars(self, state: State) -> dict[str, float]:
         """Scalar unknowns in space from those in the plane, vectors by their components along new directions."""

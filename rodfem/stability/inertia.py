@@ -26,25 +26,20 @@ from rodfem.fem.state import State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
 from rodfem.linalg.chain import factors_of
-from rodfem.linalg.factorization import Factors, Sizes
-from rodfem.linalg.matrices import local_rows, places_in, rounding, shared
+from rodfem.linalg.factorization import Factors
+from rodfem.linalg.matrices import EPS, local_rows, places_in, rounding, shared
 from rodfem.linalg.orthogonal import generic
 from rodfem.tolerances import TINY
 
-EPS = float(np.finfo(float).eps)
 NOISE = 8.0
 """Largest observed ratio of the round-off in an eigenvalue to the effect of random errors of the matrix's entries."""
 ZERO_BAND = 1e-7
 """Half width of the band of eigenvalues that count as zero, over the lowest bending one, where round-off is below."""
 NULL, ROUGH = 1e-8, 1e-2
 """Relative change of eigenvalues nearest zero at which their vectors are null vectors, and first guesses of a mode."""
-DEPTH, RESTARTS = 5, 20
-"""Blocks of a Krylov space, and how often it is begun anew, at most."""
 ROUNDED = 1e-13
 """Residual over the largest eigenvalue of the inverse, and square of the part of a vector across others, that is
 round-off."""
-DEPENDENT = 1e-10
-"""Part of a vector that is left across a space, below which it spans nothing new."""
 FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
 FAR = 0.1
@@ -63,18 +58,6 @@ class Index:
     nearest: float = field(default=0.0, compare=False)
 
 
-def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
-    """LDL^t factors that report the inertia, of matrices of ``unknowns`` rows, the last ``scalars`` perhaps dense.
-
-    ``sizes`` are the natural sizes of the unknowns, None where they are one.  ICNTL(24) = 1 makes MUMPS report it.
-    CNTL(3) is so small that no pivot is taken for zero: the matrices are shifted off their eigenvalues.  ICNTL(8) = 0:
-    with MUMPS's own scaling of saddle matrices solutions lost ten digits.  CNTL(1) is ten times below MUMPS's
-    threshold: the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the hundred
-    thousand, to the few rows of the scalars.  The matrices are those of a communicator ``comm``.
-    """
-    return factors_of("cholesky", comm, unknowns, scalars, sizes)
-
-
 class Inertia:
     """Matrix ``S`` and its factors, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
 
@@ -84,11 +67,9 @@ class Inertia:
     """
 
     def __init__(self, system: System) -> None:
-        self.system = system
-        self.matrix = system.state_matrix(load=True)
-        self.border = system.new_vector()
-        self._axis = system.load_axis()
-        self._without_load = system.new_vector()
+        self.system, fields = system, system.fields
+        self.matrix, self.border = system.state_matrix(load=True), system.new_vector()
+        self._axis, self._without_load = system.load_axis(), system.new_vector()
         self._without_load.set(1.0)
         system.set_load(self._without_load, 0.0)
         self.metric = system.metric.copy()
@@ -99,11 +80,9 @@ class Inertia:
         self._shared, self._on_metric = shared(self.matrix), np.zeros(0, dtype=int)
         if self._shared is not None and self._weights is not None:
             self._on_metric = places_in(self._shared.pattern, self._weights)
-        self.factors = inertia_factors(system.comm, system.fields.along, system.fields.dense_rows, system.natural_sizes)
-        self.constraints = system.fields.constraints()
-        self.scale = system.stiffness_scale
-        self.tolerance = ZERO_BAND * self.scale
-        self.resolution = 0.0
+        self.factors = factors_of("cholesky", system.comm, fields.along, fields.dense_rows, system.natural_sizes)
+        self.constraints, self.scale = fields.constraints(), system.stiffness_scale
+        self.tolerance, self.resolution = ZERO_BAND * self.scale, 0.0
         self.vectors: list[PETSc.Vec] = []
         self.shift, self.filled, self.factored = 0.0, 0, 0
         self._held: tuple[State, Phase, int] | None = None
@@ -135,8 +114,7 @@ class Inertia:
         return Factored(self)
 
     def _assemble(self, x: PETSc.Vec, state: State) -> None:
-        system = self.system
-        with system.clock("assembly"):
+        with self.system.clock("assembly"):
             if self.compiled is not None:
                 self.compiled.assemble(x)
                 self.border.array[:] = self.compiled.border
@@ -146,17 +124,17 @@ class Inertia:
         self._settle_band()
 
     def _assemble_by_petsc(self, state: State) -> None:
-        system = self.system
-        self.matrix.zeroEntries()
-        state.assemble_into(self.matrix, system.equations.jacobian, load=True)
-        system.add_drifts(self.matrix)
-        self.matrix.assemble()
+        system, matrix = self.system, self.matrix
+        matrix.zeroEntries()
+        state.assemble_into(matrix, system.equations.jacobian, load=True)
+        system.add_drifts(matrix)
+        matrix.assemble()
         # at fixed load: the column of the load becomes the border F_lam, a unit diagonal stands for its unknown
-        self.matrix.mult(self._axis, self.border)
-        self.matrix.diagonalScale(R=self._without_load)
+        matrix.mult(self._axis, self.border)
+        matrix.diagonalScale(R=self._without_load)
         if system.has_scalars:
-            self.matrix.setValue(system.load_index, system.load_index, 1.0)
-        self.matrix.assemble()
+            matrix.setValue(system.load_index, system.load_index, 1.0)
+        matrix.assemble()
 
     def move(self, sigma: float) -> None:
         """Let the matrix be ``S - sigma M``, whatever its shift was."""
@@ -213,6 +191,21 @@ class Inertia:
             out[:, i] = (matrix * self.vector(column)).array_r.real
         return out
 
+    def counted(self, factors: Factors, sigma: float, drifts: int) -> int:
+        """Number of eigenvalues below ``sigma`` by ``factors`` of ``S - sigma M`` with ``drifts`` phase conditions.
+
+        Raises :class:`ConvergenceError` if the count breaks down.
+        """
+        negative, zero = factors.inertia()
+        # Sylvester's law: each constraint, and each phase condition, has one negative eigenvalue of the saddle matrix
+        below = negative - self.constraints - drifts
+        if zero or below < 0:
+            raise ConvergenceError(
+                f"The count of eigenvalues below {sigma:.6g} broke down ({zero} zero pivots, {negative} negative ones "
+                f"for {self.constraints} constraints): the constraints depend on each other."
+            )
+        return int(below)
+
     def across(self, own: np.ndarray, basis: np.ndarray, duals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Basis of what vectors (own rows, k) span in addition to a ``basis``, and its products with the metric.
 
@@ -220,7 +213,7 @@ class Inertia:
         """
         size = self.sizes(own)
         own = own[:, size > 0] / size[size > 0]
-        for least in (DEPENDENT, 0.5):  # what little is left of a vector has round-off of all of it: again
+        for least in (1e-10, 0.5):  # what little is left of a vector has round-off of all of it: again
             own = own - basis @ self.sum(duals.T @ own)
             images = self.weighed(own)
             left = np.sqrt(np.maximum(self.sum((own * images).sum(axis=0)), TINY))
@@ -303,15 +296,7 @@ class Factored:
 
     def counted(self) -> int:
         """The same below the shift that was factored; raises :class:`ConvergenceError` if the count breaks down."""
-        own, (negative, zero) = self._own(), self.factors.inertia()
-        # Sylvester's law: each constraint, and each phase condition, has one negative eigenvalue of the saddle matrix
-        below = negative - own.constraints - self.drifts
-        if zero or below < 0:
-            raise ConvergenceError(
-                f"The count of eigenvalues below {own.shift:.2g} broke down ({zero} zero pivots, {negative} negative "
-                f"ones for {own.constraints} constraints): the constraints depend on each other."
-            )
-        return int(below)
+        return self._own().counted(self.factors, self.shift, self.drifts)
 
     def count(self) -> Index:
         """Index; two factorisations, the last of which serves :meth:`nearest`."""
@@ -338,7 +323,7 @@ class Factored:
             column[:] = known.array_r.real + FRESH * column
         before = np.full(number, np.inf)
         with own.system.clock("stability"):
-            for _ in range(RESTARTS):
+            for _ in range(20):
                 nu, vectors, residuals = self._in_krylov_space(vectors)
                 if self._settled(nu, before, residuals, accuracy):
                     break
@@ -375,7 +360,7 @@ class Factored:
         own, size = self.inertia, block.shape[1]
         basis = duals = images = np.zeros((len(block), 0))
         new = block
-        for _ in range(DEPTH):
+        for _ in range(5):
             new, weighed = own.across(new, basis, duals)
             if not new.shape[1]:
                 break

@@ -29,99 +29,79 @@ DEPENDENT = 1e-8
 """Eigenvalue of a Gram matrix of unit vectors below which they are dependent; square of a negligible generator."""
 PURE = 0.99
 """Share of the mean square rotation above which a mode is named after one kind of motion."""
+LEAST = 1e-5
+"""Mean square rotation over that of displacements, by the length, below which there is none but for round-off."""
 RIGID = "rigid motion"
 """Name of what a rod that nothing holds does at no frequency: translations have no rotation to be named after."""
 STRAIGHT = "without rotation"
 """Name of a vibration along the rod, or of one in which it moves as a whole."""
-LEAST = 1e-5
-"""Mean square rotation over that of displacements, by the length, below which there is none but for round-off."""
 KINDS = ("bending about d1", "bending about d2", "torsion")
-
-Group = list[tuple[str, PETSc.Vec]]
 
 
 class MotionNames:
     """Names vectors of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks."""
 
-    def __init__(self, system: System, metric: PETSc.Mat) -> None:
-        """Take the elementary generators together that are one motion of space; the load has no part in ``metric``."""
-        self.system, self.metric = system, metric
+    def __init__(self, system: System) -> None:
+        """Take the elementary generators together that are one motion of space."""
+        self.system = system
         parts = elementary_generators(system.fields)
-        self._turning = {p.name: summed(parts, [p is q for q in parts]) for p in parts if p.name.startswith("turning")}
-        self._rigid = rigid_motions(parts)
-        self._along = Symmetry(np.zeros(len(parts)), parts, along=1.0)
+        turning = {p.name: summed(parts, [p is q for q in parts]) for p in parts if p.name.startswith("turning")}
+        rigid = rigid_motions(parts)
         sliding = "slipping along itself" if system.scene.closed else "sliding along the rod"
-        self._groups = [list(self._turning), list(self._rigid), [sliding]]
+        self.motions = turning | rigid | {sliding: Symmetry(np.zeros(len(parts)), parts, along=1.0)}
+        self._turning, self._rigid, self._sliding = list(turning), list(rigid), sliding
 
     def __call__(self, x: PETSc.Vec, vectors: list[PETSc.Vec]) -> list[str]:
         """Name each of some ``vectors`` of metric norm 1 at the state ``x``."""
         if not vectors:
             return []
         state = self.system.at(x)
-        groups = self.generators(x, state)
-        return [self._name(state, v, groups) for v in vectors]
+        found = self.generators(x, state)
+        rows = np.reshape(list(found.values()), (len(found), state.generators.shape[1]))
+        gram = self._sum(rows @ self.system.weighed(rows).T)
+        own = np.array([v.array_r[: rows.shape[1]].real for v in vectors])
+        shares = self._sum(rows @ self.system.weighed(own).T)
+        return [self._name(state, v, list(found), gram, b) for v, b in zip(vectors, shares.T, strict=True)]
 
-    def generators(self, x: PETSc.Vec, state: State) -> tuple[Group, Group, Group]:
-        """Turning of the cross-sections, rigid motions, and the motion along the rod at a ``state``, which is ``x``.
+    def generators(self, x: PETSc.Vec, state: State) -> dict[str, np.ndarray]:
+        """Own rows of each motion at a ``state``, which is ``x``, by name.
 
         They are of metric norm 1 and across the symmetries of the state, without those that vanish.
         """
-        vector = self.system.generators.vector
-        turning, rigid, along = (
-            [(name, vector(row)) for name, row in zip(group, rows, strict=True)] for group, rows in self.rows(x, state)
-        )
-        return turning, rigid, along
-
-    def rows(self, x: PETSc.Vec, state: State) -> list[tuple[list[str], np.ndarray]]:
-        """The same as names and own rows (number, own rows) of each of the three groups."""
-        system, motions = self.system, self._motions.at(state)
-        before = self.sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
+        system, motions = self.system, self._generators.at(state)
+        before = self._sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
         system.set_phase(x)
         for weights in system.phase.broken.values():
             g = weights @ state.generators
             image = system.weighed(g[None])[0]
-            motions = motions - np.outer(self.sum(motions @ image) / self.sum(g @ image), g)
-        after = self.sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
+            motions = motions - np.outer(self._sum(motions @ image) / self._sum(g @ image), g)
+        after = self._sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
         kept = after > DEPENDENT * np.maximum(before, DEPENDENT)
-        out, first = [], 0
-        for names in self._groups:
-            chosen = [first + i for i in range(len(names)) if kept[first + i]]
-            rows = motions[chosen] / np.sqrt(after[chosen])[:, None]
-            out.append(([names[i - first] for i in chosen], rows))
-            first += len(names)
-        return out
-
-    def sum(self, own: np.ndarray) -> np.ndarray:
-        """Sum over the ranks."""
-        return own if self.system.comm.size == 1 else np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
+        return {name: motions[i] / np.sqrt(after[i]) for i, name in enumerate(self.motions) if kept[i]}
 
     @cached_property
-    def _motions(self) -> Generators:
-        return Generators(self.system, [*self._turning.values(), *self._rigid.values(), self._along])
+    def _generators(self) -> Generators:
+        return Generators(self.system, list(self.motions.values()))
 
-    def _name(self, state: State, v: PETSc.Vec, groups: tuple[Group, Group, Group]) -> str:
-        turning, rigid, along = groups
-        for group in (rigid, *([motion] for motion in turning), [*rigid, *turning]):
-            share, weights = self.share(v, group)
-            if share > SHARE:
-                named = abs(weights) > abs(weights).max() / 2
-                return " with ".join(name for (name, _), chosen in zip(group, named, strict=True) if chosen)
-        if along and self.share(v, [*along, *turning, *rigid])[0] > SHARE:
-            return along[0][0]
-        return name_of(turning_shares(self.system, state.turned, [v.array_r.real]))
+    def _sum(self, own: np.ndarray) -> np.ndarray:
+        """Sum over the ranks."""
+        return np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
 
-    def share(self, v: PETSc.Vec, group: Group) -> tuple[float, np.ndarray]:
-        """Share of ``v`` (metric norm 1) in the span of a group, and the weights of the members in its projection."""
-        if not group:
-            return 0.0, np.zeros(0)
-        images = [self.metric * g for _, g in group]
-        gram = np.array([[g.dot(image).real for image in images] for _, g in group])
-        b = np.array([v.dot(image).real for image in images])
-        return share(gram, b)
+    def _name(self, state: State, v: PETSc.Vec, names: list[str], gram: np.ndarray, b: np.ndarray) -> str:
+        """Name of a vector by its products ``b`` with the motions of these ``names``, whose own are ``gram``."""
+        for group in (self._rigid, *([name] for name in self._turning), [*self._rigid, *self._turning]):
+            places = [names.index(name) for name in group if name in names]
+            part, weights = share(gram[np.ix_(places, places)], b[places])
+            if part > SHARE:
+                chosen = abs(weights) > abs(weights).max() / 2
+                return " with ".join(names[i] for i, named in zip(places, chosen, strict=True) if named)
+        if self._sliding in names and share(gram, b)[0] > SHARE:
+            return self._sliding
+        return name_of(self.system, state.turned, v.array_r.real[:, None])
 
 
 def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
-    """Share of a vector (metric norm 1) in the span of others, and their weights in its projection.
+    """Share of a vector of metric norm 1 in the span of others, and their weights in its projection.
 
     ``gram`` and ``b`` are the products of those in the metric, with each other and with it.
     """
@@ -129,60 +109,38 @@ def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
     return float(weights @ b), weights
 
 
-def turning_shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
-    """Shares of the rotations about the three directors in a mode, (3,), summing to one, or to zero without rotation.
-
-    ``turned`` and ``parts``, the real and the imaginary part of the mode, as in :func:`squares`.  Collective.
-    """
-    columns = np.stack(parts, axis=1)
-    square, moved = squares(system, turned, columns).sum(axis=0), displacements(system, columns).sum()
-    return of_all(square[None, :], np.array([moved]))[0]
-
-
-def of_all(squares: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Shares (k, 3) of rotations with these ``squares`` (k, 3), zero if displacements (k,) hide them."""
-    every = squares.sum(axis=1)
-    return np.asarray(np.where(every > LEAST * moved, 1.0 / np.maximum(every, TINY), 0.0)[:, None] * squares)
-
-
 def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Integrals of the squared rotations about the three directors in perturbations, (k, 3); collective.
+    """Integrals of the squared rotations about the three directors, and displacements, in perturbations, (k, 4).
 
-    ``turned`` (cells, nodes, components) is the rotation field of the state, ``columns`` (n, k) are values of this
-    rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
+    ``turned`` (cells, nodes, components) is the rotation field of the state of a ``system``, ``columns`` (n, k) are
+    values of this rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes; displacements are
+    over the rod's length.  Collective.
     """
     f = system.fields
     cells = slice(0, f.owned_cells)
     size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
-    change = system.changes(columns)[:, f.dofs[f.turning.name][cells]]
-    turned = turned[cells]
-    q, dq = f.turning.quaternion(turned), f.turning.change(turned, change)
+    changes, turned = system.changes(columns), turned[cells]
+    q, dq = f.turning.quaternion(turned), f.turning.change(turned, changes[:, f.dofs[f.turning.name][cells]])
     scalar, v, dv = q[..., :1], q[..., 1:], dq[..., 1:]
     across = v[..., [1, 2, 0]] * dv[..., [2, 0, 1]] - v[..., [2, 0, 1]] * dv[..., [1, 2, 0]]  # v x dv
     w = scalar * dv - dq[..., :1] * v - across
-    mine = (w**2 * size).sum(axis=(1, 2))
+    moved = np.zeros((columns.shape[1], 1))
+    if "r" in f.dofs:
+        moved = (changes[:, f.dofs["r"][cells]] ** 2 * size / system.scene.length**2).sum(axis=(1, 2, 3))[:, None]
+    mine = np.hstack([(w**2 * size).sum(axis=(1, 2)), moved])
     return np.asarray(mine if system.comm.size == 1 else system.comm.allreduce(mine))
 
 
-def displacements(system: System, columns: np.ndarray) -> np.ndarray:
-    """Integrals of the squared displacements, over the rod's length, in perturbations (k,); collective."""
-    f = system.fields
-    if "r" not in f.dofs:
-        return np.zeros(columns.shape[1])
-    cells = slice(0, f.owned_cells)
-    size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None] / system.scene.length**2
-    mine = (system.changes(columns)[:, f.dofs["r"][cells]] ** 2 * size).sum(axis=(1, 2, 3))
-    return np.asarray(mine if system.comm.size == 1 else system.comm.allreduce(mine))
+def name_of(system: System, turned: np.ndarray, columns: np.ndarray) -> str:
+    """Name of one motion by the perturbations (n, k) that span it: see :func:`squares`."""
+    return names_of(squares(system, turned, columns).sum(axis=0)[None])[0]
 
 
-def name_of(share: np.ndarray) -> str:
-    """Name of a motion by its shares: of :data:`KINDS`, ``bending`` (about both), ``mixed``, or :data:`STRAIGHT`."""
-    return names_of(share[None, :])[0]
-
-
-def names_of(shares: np.ndarray) -> list[str]:
-    """The same of several motions, (k, 3)."""
-    kinds = (*KINDS, "bending", "mixed")
-    mixed = np.where(shares[:, 0] + shares[:, 1] > PURE, len(KINDS), len(KINDS) + 1)
-    found = [kinds[i] for i in np.where(shares.max(axis=1) > PURE, shares.argmax(axis=1), mixed).tolist()]
-    return [STRAIGHT if not share.any() else kind for share, kind in zip(shares, found, strict=True)]
+def names_of(squares: np.ndarray) -> list[str]:
+    """Names of motions by their ``squares`` (k, 4): of :data:`KINDS`, ``bending``, ``mixed``, or :data:`STRAIGHT`."""
+    rotation, moved = squares[:, :3], squares[:, 3]
+    every = rotation.sum(axis=1)
+    shares = rotation / np.maximum(every, TINY)[:, None]
+    mixed = np.where(shares[:, 0] + shares[:, 1] > PURE, "bending", "mixed")
+    kinds = np.where(shares.max(axis=1) > PURE, np.array(KINDS)[shares.argmax(axis=1)], mixed)
+    return [str(name) for name in np.where(every > LEAST * moved, kinds, STRAIGHT)]

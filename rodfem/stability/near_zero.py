@@ -10,8 +10,8 @@ smaller by some powers of an element's size.  Eigenvalues inside the band are de
 zero if ten times this exceeds their magnitude.
 
 Those nearer to zero than a part of the lowest bending eigenvalue are *soft*.  Their uncertainty on one mesh is at least
-what Newton's method leaves of the state, :data:`~rodfem.fem.newton.TOLERANCE`.  A richer mesh tells what the mesh adds
-(:mod:`rodfem.adaptivity.soft_states`).
+what Newton's method leaves of the state, :data:`~rodfem.fem.newton.TOLERANCE`.  A richer mesh decides what the mesh
+adds (:mod:`rodfem.adaptivity.soft_states`).
 """
 
 from __future__ import annotations
@@ -32,8 +32,6 @@ MANY = 100
 """Most eigenvalues near zero that are decided one by one."""
 DECIDED = 1e-3
 """Relative accuracy of eigenvalues that decide a sign."""
-FAR = 1e-2
-"""Eigenvalue, over the lowest bending one, above which a relative accuracy of 1e-3 tells it from zero."""
 SPARE = 2
 """Vectors more than there are eigenvalues in the band."""
 SOFT = 1e-4
@@ -73,10 +71,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class NearZero(Quotients):
-    """Soft eigenvalues of a state, in ascending order.
-
-    ``firm`` is the number of negative eigenvalues that are not among them, ``rest`` that of zeros that are not.
-    """
+    """Soft eigenvalues in ascending order; ``firm`` others are negative, and the ``rest`` is zero."""
 
     firm: int
     rest: int
@@ -107,15 +102,15 @@ def inside_band(found: Factored, number: int, accuracy: float = DECIDED, least: 
     inertia = found.inertia
     theta, vectors = found.nearest(number + SPARE, DECIDED)
     vectors = [vectors[i] for i in np.argsort(abs(theta))]
-    small = int((abs(theta) < FAR * inertia.scale).sum())
-    if accuracy < DECIDED and small:  # the signs of all others are known
+    small = int((abs(theta) < 1e-2 * inertia.scale).sum())  # an accuracy of 1e-3 decides the signs of all others
+    if accuracy < DECIDED and small:
         vectors[:small] = found.nearest(small, accuracy)[1]
         inertia.vectors = list(vectors)
     out = quotients(found, vectors[:number], least)
     if (abs(out.values) > 2 * inertia.tolerance).any():
         raise ConvergenceError(
             f"{number} eigenvalues are within round-off of the count, {inertia.tolerance:.2g} in the metric, and are "
-            "not told apart: take larger elements, or a lower degree."
+            "not distinct: take larger elements, or a lower degree."
         )
     return out
 
@@ -159,16 +154,14 @@ def soft_limit(inertia: Inertia) -> float:
     return max(SOFT * inertia.scale, inertia.tolerance)
 
 
-def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> NearZero:
+def near_zero(found: Factored, least: int = 0) -> NearZero:
     """Soft eigenvalues at a state, and the ``least`` number nearest zero whatever their size; symmetries are left out.
 
-    ``index`` is the count that made the factors, None before it.  The vectors that the next state starts from stay.
-    Raises :class:`ConvergenceError` if there are too many.
+    The vectors that the next state starts from stay.  Raises :class:`ConvergenceError` if there are too many.
     """
-    inertia = found.inertia
-    index, limit = index or found.count(), soft_limit(inertia)
+    inertia, index = found.inertia, found.count()
     inside = index.zero - found.drifts
-    members = _candidates(found, limit, inside, least)
+    members = _candidates(found, soft_limit(inertia), inside, least)
     if members is None:
         return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
     q = quotients(found, members, TOLERANCE * inertia.scale)
@@ -177,7 +170,7 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     firm = index.negative - int((q.values[counted] < 0).sum())
     order = np.argsort(q.values)
     values, uncertainty = q.values[order], q.uncertainty[order]
-    # in a wide band of round-off most eigenvalues are told from zero by their quotients
+    # in a wide band of round-off most eigenvalues are distinct from zero by their quotients
     away = abs(values)
     soft = (away < SOFT * inertia.scale) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
     vectors = [members[i] for i in order[soft]]
@@ -196,15 +189,14 @@ def _candidates(found: Factored, limit: float, inside: int, least: int) -> list[
             number *= 2
             values, vectors = found.nearest(number, SOFT)
         # what is far from zero need not be as sharp: the values there lie dense on coarse meshes, and converge slowly
-        close = int((abs(values) < CLEAR * SOFT * inertia.scale).sum())
-        if close:
+        if close := int((abs(values) < CLEAR * SOFT * inertia.scale).sum()):
             sharp = found.nearest(close, NULL, spare=number - close)
             values, vectors = np.append(sharp[0], values[close:]), [*sharp[1], *vectors[close:]]
     chosen = np.flatnonzero((abs(values) < limit) | (np.arange(number) < least))
     if len(chosen) < inside or len(chosen) == number:
         raise ConvergenceError(
-            f"{inside} or more eigenvalues are within {limit:.2g} of zero and are not told apart: use fewer elements "
-            "of a higher degree."
+            f"{inside} or more eigenvalues are within {limit:.2g} of zero and are not distinct: use fewer elements of "
+            "a higher degree."
         )
     return [vectors[i] for i in chosen]
 
@@ -214,7 +206,7 @@ def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judge
 
     Those that are decided have a sign; others are undecided, and zero, too, within the ``tolerance`` of a count.
     """
-    told = [m for m in modes if m.decided]
-    negative = found.firm + sum(m.value < 0 for m in told)
+    decided = [m for m in modes if m.decided]
+    negative = found.firm + sum(m.value < 0 for m in decided)
     zero = sum(not m.decided and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
-    return Judgement(negative, found.rest + zero, len(modes) - len(told), tuple(modes))
+    return Judgement(negative, found.rest + zero, len(modes) - len(decided), tuple(modes))

@@ -27,9 +27,8 @@ class PencilMatrices:
     """Matrices of a pencil, allocated once, which the states of one system share; ``filled`` counts those states."""
 
     def __init__(self, system: System) -> None:
-        self.system = system
+        self.system, self.filled = system, 0
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
-        self.filled = 0
 
     @cached_property
     def sizes(self) -> PETSc.Vec:
@@ -43,7 +42,7 @@ Matrices = TypeVar("Matrices", bound=PencilMatrices)
 
 
 class StatePencil(Generic[Matrices]):
-    """The pencil of one state; raises :class:`RuntimeError` where the matrices hold another state by now."""
+    """The pencil of one state."""
 
     def __init__(self, shared: Matrices) -> None:
         self.system, self._shared, self._filled = shared.system, shared, shared.filled
@@ -149,15 +148,14 @@ def weighed_modes(
     What moves nothing that has inertia is orthonormal in the metric instead, with the metric's product.
     """
     given, scaled = list(modes.values()), mass
-    if given and not system.scene.units.ordinary:  # rotations and positions have masses of different units
+    if not given:
+        return {}
+    if not system.scene.units.ordinary:  # rotations and positions have masses of different units
         scaled = mass.copy()
         scaled.diagonalScale(system.sizes, system.sizes)
-    least = NEGLIGIBLE * scaled.norm(PETSc.NormType.INFINITY) if given else 0.0
-    images = [mass * mode for mode in given]
-    squares, turn = np.linalg.eigh(
-        np.array([[np.real(g.dot(m)) for m in images] for g in given]).reshape(len(given), len(given))
-    )
+    least, images = NEGLIGIBLE * scaled.norm(PETSc.NormType.INFINITY), [mass * mode for mode in given]
     out = {}
+    squares, turn = np.linalg.eigh([[np.real(g.dot(m)) for m in images] for g in given])
     for index, square, weights in zip(modes, squares, turn.T, strict=True):
         mode, image = combine(given, weights), combine(images, weights)
         if square < least * system.norm(mode) ** 2:
@@ -180,8 +178,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
     for index, (mode, image) in weighed_modes(system, modes, mass).items():
         if abs(mode.dot(mass * mode) - 1.0) < 0.5:
             deflated.append(mode)
-        begin, end = image.getOwnershipRange()
-        own = np.arange(begin, end, dtype=PETSc.IntType)
+        own = np.arange(*image.getOwnershipRange(), dtype=PETSc.IntType)
         if system.has_scalars:
             matrix.setValue(index, index, -_one(system, index), addv=True)
         matrix.setValues([index], own, image.array_r, addv=True)
@@ -207,7 +204,7 @@ class Pencil:
     place: np.ndarray
 
 
-class Blocks:
+class Blocks(PencilMatrices):
     """Makes the :class:`Pencil` of states of one system, with multipliers of the ``norms`` of quaternions or without.
 
     ``rows`` and ``columns`` are the global numbers of unknowns and multipliers, ascending, ``numbers`` those of each
@@ -215,8 +212,7 @@ class Blocks:
     """
 
     def __init__(self, system: System, *, norms: bool = True) -> None:
-        self.system = system
-        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
+        super().__init__(system)
         self.numbers: dict[str, np.ndarray] = {}
         self.where: dict[str, np.ndarray] = {}
         self.rows = self._numbered("ends", multiplier=False)
@@ -238,8 +234,7 @@ class Blocks:
 
     def gathered(self, own: np.ndarray) -> np.ndarray:
         """Rows of all ranks."""
-        comm = self.system.comm
-        return own if comm.size == 1 else np.concatenate(comm.allgather(own))
+        return np.concatenate(self.system.comm.allgather(own))
 
     def own(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which of some global ``numbers`` are rows of this rank, and their places in its part of a vector."""
@@ -257,14 +252,13 @@ class Blocks:
             mine = np.isin(numbers, self.columns)
             np.minimum.at(place, np.searchsorted(self.columns, numbers[mine]), middle[mine])
         place = np.min(self.system.comm.allgather(place), axis=0)
-        place[np.isinf(place)] = np.nan
-        return np.asarray(place)
+        return np.where(np.isinf(place), np.nan, place)
 
-    def assemble(self, x: PETSc.Vec, sizes: PETSc.Vec | None = None) -> Pencil:
-        """Blocks at the state ``x``, in units of natural ``sizes`` of the unknowns if these are given."""
+    def assemble(self, x: PETSc.Vec, *, scaled: bool = False) -> Pencil:
+        """Blocks at the state ``x``; ``scaled``: in units of natural sizes."""
         assemble_pencil(self.system, x, self.matrix, self.mass)
-        matrix, mass = self.matrix, self.mass
-        if sizes is not None:
-            matrix, mass = in_units(self.system, matrix, mass, sizes)
-        S, M = (gathered(A).real[self.rows] for A in (matrix, mass))
+        matrices = self.matrix, self.mass
+        if scaled:
+            matrices = in_units(self.system, *matrices, self.sizes)
+        S, M = (gathered(A).real[self.rows] for A in matrices)
         return Pencil(S[:, self.rows], S[:, self.columns], M[:, self.rows], dict(self.where), self.place)

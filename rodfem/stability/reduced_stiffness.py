@@ -28,17 +28,102 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.stability.bordered import Bordered
+from rodfem.fem.system import System
+from rodfem.linalg.chain import factors_of
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.near_zero import quotient_error
 
-NEAR, SOFT = 1e-3, 1e-6
-"""Eigenvalues of H, over the lowest bending one: below the first S is too near singular to be solved with, below the
-second it may be round-off."""
+SOFT = 1e-6
+"""Eigenvalue of H, over the lowest bending one, below which it may be round-off."""
 DIFFERENCE, AHEAD = 1e-4, 1e-6
 """Distances of the states whose matrices are differenced, in the metric: on both sides, and ahead alone."""
 ROTATED = 1.0
 """Size of ``W^t M W - 1`` above which a border has become that of other modes."""
+
+
+class Bordered:
+    """A square ``matrix`` of a system with a number of dense ``borders``, a column and a row each, and its factors.
+
+    Those of a symmetric one, ``constraints`` of whose eigenvalues are negative whatever the state, count the rest;
+    None: it is not symmetric, and nothing is counted.
+    """
+
+    def __init__(self, system: System, matrix: PETSc.Mat, borders: int, constraints: int | None) -> None:
+        self.system, self.k, self.constraints = system, borders, constraints
+        self.comm, self.n = system.comm, system.fields.unknowns
+        self.extra = borders if system.has_scalars else 0  # rows of the borders on this rank, the last one
+        start, columns, _ = matrix.getValuesCSR()
+        rows, along = len(start) - 1, self.n + borders
+        lengths = np.concatenate([np.diff(start) + borders, np.full(self.extra, along)])
+        self.start = np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType)
+        self.own = int(self.start[rows])
+        self._border = np.zeros(self.own, dtype=bool)
+        self._border[(self.start[1 : rows + 1, None] - 1 - np.arange(borders)[::-1]).ravel()] = True
+        self.columns = np.empty(self.start[-1], dtype=PETSc.IntType)
+        self.columns[: self.own][~self._border] = columns
+        self.columns[: self.own][self._border] = np.tile(self.n + np.arange(borders), rows)
+        self.columns[self.own :] = np.tile(np.arange(along), self.extra)
+        self.values, size = np.zeros(self.start[-1]), (rows + self.extra, along)
+        self.matrix = PETSc.Mat().createAIJ((size, size), comm=self.comm)
+        self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
+        kind, natural = "lu" if constraints is None else "cholesky", system.natural_sizes and self._sizes
+        chain = along if system.fields.along else 0
+        self.factors = factors_of(kind, self.comm, chain, system.fields.dense_rows + borders, natural)
+        self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
+
+    def _sizes(self) -> PETSc.Vec:
+        """Natural sizes of the unknowns; the multipliers of the borders have those of drifts."""
+        out, own = self.matrix.createVecRight(), self.system.balanced.array_r
+        out.set(self.system.scene.units.energy**0.5)
+        out.array[: len(own)] = own
+        return out
+
+    def factor(self, matrix: PETSc.Mat, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
+        """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count.
+
+        The ``rows`` of the borders are the ``columns`` unless given.  Raises :class:`ConvergenceError` if it is
+        singular.
+        """
+        self.values[: self.own][~self._border] = matrix.getValuesCSR()[2].real
+        local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]
+        self.values[: self.own][self._border] = local[0].ravel()
+        parts = self.comm.gather(local[1], root=self.comm.size - 1)
+        if parts is not None:
+            below = np.zeros((self.k, self.n + self.k))
+            below[:, : self.n] = np.concatenate(parts).T
+            self.values[self.own :] = below.ravel()
+        self.matrix.setValuesCSR(self.start, self.columns, self.values)
+        self.matrix.assemble()
+        with self.system.clock("stability"):
+            self.factors(self.matrix)
+            if self.constraints is None:
+                rest, singular = -1, not self.factors.regular
+            else:
+                negative, zero = self.factors.inertia()
+                rest = negative - self.constraints - self.system.phase.count - self.k
+                singular = zero > 0 or rest < 0
+        if singular:
+            raise ConvergenceError("another eigenvalue vanishes")
+        return int(rest)
+
+    def solve(self, f: PETSc.Vec | None, g: np.ndarray) -> tuple[PETSc.Vec, np.ndarray]:
+        """Solve for the right-hand side ``(f, g)``, with one step of iterative refinement."""
+        with self.system.clock("solve"):
+            out, right = self.out, self.right
+            right.set(0.0)
+            rows = right.getLocalSize() - self.extra
+            if f is not None:
+                right.array[:rows] = f.array_r
+            if self.extra:
+                right.array[rows:] = g
+            self.factors.solve(right, out)
+            self.matrix.mult(out, self.residual)
+            self.residual.aypx(-1.0, right)
+            self.factors.solve(self.residual, right)
+            out.axpy(1.0, right)
+            x = self.system.new_vector()
+            x.array[:] = out.array_r[:rows]
+            return x, np.array(self.comm.bcast(out.array_r[rows:].copy(), root=self.comm.size - 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +154,7 @@ def negative(H: np.ndarray) -> int:
 
 
 class Condensation:
-    """Reduced stiffness matrices of states on one mesh."""
+    """Reduced stiffness matrices of states on one mesh, by the saddle matrix of an ``inertia``."""
 
     def __init__(self, inertia: Inertia) -> None:
         self.system, self.inertia = inertia.system, inertia
@@ -89,14 +174,13 @@ class Condensation:
 
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
         """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
-        inertia, found = self.inertia, self.inertia.at(x)
-        B = inertia.weighed(phi)
+        inertia, found, B = self.inertia, self.inertia.at(x), self.inertia.weighed(phi)
         try:
             below = found.below(0.0)
             Z = found.factors.solve_all(B)
             H = _symmetric(np.linalg.inv(_symmetric(inertia.sum(B.T @ Z))))
             values, vectors = np.linalg.eigh(H)
-            near = not abs(values).min() > NEAR * inertia.scale
+            near = not abs(values).min() > 1e-3 * inertia.scale  # S is too nearly singular to be solved with
         except (ConvergenceError, np.linalg.LinAlgError):
             near = True
         if near:
@@ -104,8 +188,7 @@ class Condensation:
             values, vectors = np.linalg.eigh(H)
         else:
             far, W = below - int((values < 0).sum()), Z @ H
-        soft = int(abs(values).argmin())
-        doubt = TOLERANCE * inertia.scale
+        soft, doubt = int(abs(values).argmin()), TOLERANCE * inertia.scale
         if abs(values[soft]) < SOFT * inertia.scale:
             doubt = max(doubt, quotient_error(inertia.at(x).matrix, inertia.vector(W @ vectors[:, soft])))
         rotated = float(abs(np.linalg.eigvalsh(inertia.sum(W.T @ inertia.weighed(W))) - 1.0).max())

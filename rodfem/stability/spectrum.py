@@ -7,14 +7,12 @@ With a shift ``a``
 
 has all finite eigenvalues: ``x = (S - a M)^-1 L w / nu`` and ``w = R^t x``.  Massless unknowns, multipliers and
 constraints are eliminated by as many solves as ``L`` has columns.  Directions with mass that the constraints hold have
-``nu = 0``, in no Jordan blocks: round-off leaves them as small as it is, and finite eigenvalues are told from them down
-to there.  LAPACK finds all eigenvalues of ``T``; of a large ``T`` SLEPc finds the greatest.
+``nu = 0``, in no Jordan blocks: round-off leaves them as small as it is, and finite eigenvalues are distinct from them
+down to there.  LAPACK finds all eigenvalues of ``T``; of a large ``T`` SLEPc finds the greatest.
 
 Round-off ``dT`` moves a simple eigenvalue by up to ``|dT| |z|`` for its right and left vectors ``w`` and ``z``, with
 ``|w| = 1`` and ``z.w = 1``, and one of two that meet by no more than ``(|dT| |T|)^(1/2)``, where ``z`` has no bound
 (Wilkinson, The Algebraic Eigenvalue Problem, 1965, chapter 2).
-
-Of a state under loads without a potential a :class:`Spectrum` says which are real, negative, or complex.
 """
 
 from __future__ import annotations
@@ -36,25 +34,19 @@ from rodfem.errors import ConvergenceError
 from rodfem.tolerances import TINY
 
 SHIFT = -10.0
-"""Eigenvalues are sought next to this one, over their natural size: next to zero, where the matrix may be singular.
+"""Eigenvalues are sought next to this one, over their natural size.
 
-Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
-its digits from all others.
-"""
+Next to zero the matrix may be singular, and the rigid motions of a rod that floats take the digits of all others."""
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 ALL = 1000
 """Rank of the mass up to which all eigenvalues are found: LAPACK takes some seconds there."""
-SOME = 40
-"""Eigenvalues that are found where the rank is greater."""
 RANK = 1e-13
 """Pivot of the mass below which it is round-off, relative to its diagonal: a quaternion's own length has no mass."""
 FINITE = 1e-13
 """Eigenvalue of an inverted pencil, over the greatest, below which it is that of an infinite one."""
 ROUNDED = 1e-14
-"""Round-off of ``T``, over the norms of its factors, where the inverse has its natural size, one, at least.
-
-Of free rods on six elements 1.2e-14 of its norm is seen."""
+"""Round-off of ``T``, over the norms of its factors: of free rods on six elements 1.2e-14 of its norm is seen."""
 TOLERANCE = 1e-13
 """Relative tolerance of SLEPc."""
 
@@ -69,10 +61,7 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix, sp.
     if len(heavy) > 2000:  # too many for dense matrices
         return heavy, mass[heavy][:, heavy].tocsr(), sp.identity(len(heavy), format="csr")
     scale = size[heavy]
-    block = mass[heavy][:, heavy].toarray() / np.outer(scale, scale)
-    if not len(heavy):
-        return heavy, sp.csr_matrix(block), sp.csr_matrix(block)
-    lower, pivots, rank, _ = dpstrf(block, tol=RANK, lower=1)
+    lower, pivots, rank, _ = dpstrf(mass[heavy][:, heavy].toarray() / np.outer(scale, scale), tol=RANK, lower=1)
     out = np.zeros((len(heavy), rank))
     out[pivots - 1] = np.tril(lower)[:, :rank]
     lower = sp.csr_matrix(out * scale[:, None])
@@ -83,9 +72,9 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix, sp.
 class Eigenpairs:
     """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, and their ``right`` vectors (r, k), or those of ``T^t``.
 
-    ``noise`` (k,) is what round-off may make of ``nu``, its root where two meet; ``error`` (k,) the residual over the
-    size of ``T``.  Of all eigenvalues there are ``left`` vectors (k, r), too: both are biorthonormal, and right ones
-    have norm one.  ``vectors`` (n, k) of the pencil are known of a large one.
+    ``noise`` (k,) is what round-off may make of ``nu``; ``error`` (k,) the residual over the size of ``T``.  Of all
+    eigenvalues there are ``left`` vectors (k, r), biorthonormal to the right ones.  ``vectors`` (n, k) of the pencil
+    are known of a large one.
     """
 
     nu: np.ndarray
@@ -103,19 +92,27 @@ class Eigenpairs:
         )
 
 
-class Condensed:
-    """A pencil on its unknowns with mass, in units of natural sizes, about a ``shift``."""
+class Spectrum:
+    """A pencil on its unknowns with mass about a ``shift``, and all its finite eigenvalues, nearest to that first.
 
-    def __init__(self, mass: sp.csr_matrix, solve: Solve, solve_transposed: Solve, shift: float) -> None:
-        """``solve`` and ``solve_transposed`` solve with ``S - shift M`` for arrays (n, k).
+    ``one`` is their natural size, the unit of the ``shift``.  ``floor`` is what round-off makes of zero, where it is
+    known (:mod:`rodfem.stability.nonsymmetric`).
+    """
 
-        Raises :class:`~rodfem.errors.ConvergenceError` if nothing has ``mass``.
-        """
-        self.solve, self.solve_transposed, self.shift, self.rows = solve, solve_transposed, shift, mass.shape[0]
+    def __init__(self, stiffness: sp.csr_matrix, mass: sp.csr_matrix, shift: float, one: float = 1.0) -> None:
+        """Factor by LU; raises :class:`~rodfem.errors.ConvergenceError` if the pencil is singular at the shift."""
+        try:
+            lu = splu((stiffness - shift * mass).tocsc())
+        except RuntimeError as trouble:
+            raise ConvergenceError(
+                f"The pencil is singular at the shift {shift:.6g}: choose another load, or another discretisation."
+            ) from trouble
+        self.solve, self.solve_transposed, self.shift, self.one = lu.solve, partial(lu.solve, trans="T"), shift, one
+        self.floor, self.rows = np.inf, mass.shape[0]
         self.heavy, self.lower, self.dual = factors_of_mass(mass)
         self.rank = self.lower.shape[1]
-        if self.rank == 0:
-            raise ConvergenceError("The rod has no inertia: give it a mass, or a rotary inertia.")
+
+    # --- eigenpairs of T ---------------------------------------------------------------------------------------
 
     def spread(self, w: np.ndarray, factor: Matrix | None = None) -> np.ndarray:
         """``L w`` (n, k) for ``w`` (r, k), or that of another ``factor``: products of vectors with the mass."""
@@ -134,11 +131,17 @@ class Condensed:
         """The same in the rows with mass (h, r)."""
         return self.images[self.heavy]
 
+    @property
+    def complete(self) -> bool:
+        """Whether it has all eigenvalues of the mesh."""
+        return self.rank <= ALL
+
     @cached_property
     def pairs(self) -> Eigenpairs:
-        """All finite eigenvalues, or some where the mass has a rank above :data:`ALL`."""
-        if self.rank > ALL:
-            return self._some()
+        """All finite eigenpairs, or 40 where the mass has a rank above :data:`ALL`."""
+        if not self.complete:  # left vectors within the span of the right ones
+            found = self.greatest(40)
+            return replace(found, left=np.linalg.pinv(found.right), vectors=self.vectors(found))
         matrix, size = self.dual.T @ self.inverse, np.linalg.norm(self.lower.data)
         nu, right = np.linalg.eig(matrix)
         try:
@@ -152,24 +155,12 @@ class Condensed:
         order = order[abs(nu[order]) > noise[order]]
         return Eigenpairs(nu[order], right[:, order], noise[order], error[order], left[order])
 
-    def _some(self) -> Eigenpairs:
-        """The :data:`SOME` greatest eigenvalues; left vectors are those within the span of the right ones."""
-        found = self.greatest(SOME)
-        return replace(found, left=np.linalg.pinv(found.right), vectors=self.vectors(found))
-
-    @cached_property
-    def right(self) -> np.ndarray:
-        """Vectors of the pencil (h, k) in the rows with mass."""
-        pairs = self.pairs
-        return times(self.inverse, pairs.right) / pairs.nu if pairs.vectors is None else pairs.vectors[self.heavy]
-
     def greatest(self, number: int, *, left: bool = False) -> Eigenpairs:
         """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones if these are fewer.
 
         By LAPACK where it costs no more, or SLEPc gives up: at times it cannot sort equal complex ones.
         """
-        # all eigenvalues of a rank of 80 cost no more than some by a Krylov space
-        if self.rank > max(80, 3 * number) and (self.rank > ALL or "pairs" not in vars(self)):
+        if self.rank > max(80, 3 * number):
             try:
                 return self._nearest(number, left=left)
             except ConvergenceError:
@@ -187,8 +178,8 @@ class Condensed:
         error, noise = np.full(len(nu), TOLERANCE), np.full(len(nu), TOLERANCE * abs(nu).max())
         return Eigenpairs(nu, w, noise, error).at(order[abs(nu[order]) > noise[order]])
 
-    def values(self, pairs: Eigenpairs) -> np.ndarray:
-        """Eigenvalues ``mu`` (k,) without imaginary parts that are noise."""
+    def eigenvalues(self, pairs: Eigenpairs) -> np.ndarray:
+        """Eigenvalues ``mu`` (k,) in natural units without imaginary parts that are noise."""
         values, size = self.shift + 1.0 / pairs.nu, abs(pairs.nu)
         return np.where(abs(values.imag) * size <= pairs.noise / size, values.real, values).astype(complex)
 
@@ -203,53 +194,45 @@ class Condensed:
         solve = self.solve_transposed if left else self.solve
         if not np.iscomplexobj(given):
             return solve(given) / nu
-        solved = solve(np.concatenate([given.real, given.imag], axis=1))
-        k = w.shape[1]
-        return (solved[:, :k] + 1j * solved[:, k:]) / nu
+        re, im = np.hsplit(solve(np.concatenate([given.real, given.imag], axis=1)), 2)
+        return (re + 1j * im) / nu
 
+    # --- eigenvalues of the pencil -----------------------------------------------------------------------------
 
-@dataclass(frozen=True)
-class Spectrum:
-    """Eigenvalues of a ``condensed`` pencil, nearest to its shift first; ``one`` is their natural size.
+    @cached_property
+    def right(self) -> np.ndarray:
+        """Vectors (h, k) of all eigenvalues in the rows with mass."""
+        pairs = self.pairs
+        return times(self.inverse, pairs.right) / pairs.nu if pairs.vectors is None else pairs.vectors[self.heavy]
 
-    ``floor`` is what round-off makes of zero, where it is known (:mod:`rodfem.stability.nonsymmetric`).
-    """
-
-    condensed: Condensed
-    one: float
-    floor: float = np.inf
-
-    @property
-    def complete(self) -> bool:
-        """Whether it has all eigenvalues of the mesh."""
-        return self.condensed.rank <= ALL
+    def coordinates(self, other: Spectrum) -> np.ndarray:
+        """Vectors (r, k) of another state's eigenvalues in coordinates in which the mass of this state is one."""
+        return times(self.dual.T, other.right)
 
     @cached_property
     def noise(self) -> np.ndarray:
-        """What round-off may make of each (k,)."""
-        pairs = self.condensed.pairs
-        return self.one * pairs.noise / abs(pairs.nu) ** 2
+        """What round-off may make of each eigenvalue (k,)."""
+        return self.one * self.pairs.noise / abs(self.pairs.nu) ** 2
 
-    @cached_property
+    @property
     def values(self) -> np.ndarray:
         """Eigenvalues (k,), complex; imaginary parts that are round-off are zero."""
-        values = self.one * (self.condensed.shift + 1.0 / self.condensed.pairs.nu)
+        values = self.one * (self.shift + 1.0 / self.pairs.nu)
         least = np.maximum(REAL * np.maximum(abs(values), min(self.one, self.floor)), self.noise)
         return np.where(abs(values.imag) <= least, values.real, values).astype(complex)
 
-    @cached_property
+    @property
     def zero(self) -> float:
         """Magnitude below which an eigenvalue counts as zero."""
-        least = REAL * float(abs(self.values).min(initial=np.inf))
-        return min(max(REAL * self.one, least), max(self.floor, least))
+        return size_of_zero(self.values, self.one, self.floor)
 
-    @cached_property
+    @property
     def negative(self) -> np.ndarray:
         """Places (m,) of the real ones that are negative."""
         values = self.values
         return np.flatnonzero((values.imag == 0.0) & (values.real < -np.maximum(self.zero, self.noise)))
 
-    @cached_property
+    @property
     def upper(self) -> np.ndarray:
         """Places (m,) of those of positive imaginary part, one of each complex pair."""
         return np.flatnonzero(self.values.imag > 0.0)
@@ -264,14 +247,11 @@ class Spectrum:
         """Number of eigenvalues that are negative or complex."""
         return len(self.negative) + 2 * len(self.upper)
 
-    @property
-    def right(self) -> np.ndarray:
-        """Vectors (h, k) of all eigenvalues in the rows with mass."""
-        return self.condensed.right
 
-    def coordinates(self, other: Spectrum) -> np.ndarray:
-        """Vectors (r, k) of another state's eigenvalues in coordinates in which the mass of this state is one."""
-        return times(self.condensed.dual.T, other.right)
+def size_of_zero(values: np.ndarray, one: float, floor: float) -> float:
+    """Magnitude below which one of some ``values``, of natural size ``one``, is zero; round-off is the ``floor``."""
+    least = REAL * float(abs(values).min(initial=np.inf))
+    return min(max(REAL * one, least), max(floor, least))
 
 
 def inside(basis: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -288,18 +268,7 @@ def times(matrix: Matrix, w: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(matrix @ parts).view(complex)
 
 
-def condensed(stiffness: sp.csr_matrix, mass: sp.csr_matrix, shift: float) -> Condensed:
-    """A pencil on its unknowns with mass, by LU factors; raises :class:`ConvergenceError` if it is singular there."""
-    try:
-        lu = splu((stiffness - shift * mass).tocsc())
-    except RuntimeError as trouble:
-        raise ConvergenceError(
-            f"The pencil is singular at the shift {shift:.6g}: choose another load, or another discretisation."
-        ) from trouble
-    return Condensed(mass, lu.solve, partial(lu.solve, trans="T"), shift)
-
-
-class Operator:
+class _Operator:
     """A real matrix that is known by its products, as PETSc's python matrices ask for it."""
 
     def __init__(self, apply: Solve) -> None:
@@ -314,12 +283,12 @@ class Operator:
 
 
 def krylov(apply: Solve, size: int, number: int, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The ``number`` greatest eigenvalues, and vectors, of a real matrix (size, size) that ``apply`` multiplies with.
+    """The ``number`` greatest eigenvalues, and vectors, of a real matrix (``size``, ``size``) known by ``apply``.
 
-    The Krylov space begins with ``start`` (size,), or with any vector.  Raises
-    :class:`~rodfem.errors.ConvergenceError` if SLEPc gives up.  Its options begin with ``rodfem_``.
+    The Krylov space begins with ``start`` (size,), or with any vector.  Options of SLEPc begin with ``rodfem_``; raises
+    :class:`~rodfem.errors.ConvergenceError` where it finds none.
     """
-    matrix = PETSc.Mat().createPython((size, size), Operator(apply), comm=PETSc.COMM_SELF)
+    matrix = PETSc.Mat().createPython((size, size), _Operator(apply), comm=PETSc.COMM_SELF)
     matrix.setUp()
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)
     solver.setOptionsPrefix("rodfem_")

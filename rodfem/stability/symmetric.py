@@ -10,14 +10,10 @@ The shift is below the spectrum: the nearest eigenvalues to it are the left-most
 them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the modes that are
 returned.  Along a branch the shift, the symbolic factorisations and a first vector, the sum of the modes, are those of
 the point before: two numeric factorisations a point, one to solve with and one to count.
-
-SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
-and overrule what is set here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -26,9 +22,10 @@ from slepc4py import SLEPc
 
 from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
+from rodfem.linalg.chain import factors_of
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import places_in, shared
-from rodfem.stability.inertia import Inertia, inertia_factors
+from rodfem.stability.inertia import Inertia
 from rodfem.stability.pencil import (
     PencilMatrices,
     StatePencil,
@@ -41,25 +38,15 @@ from rodfem.stability.pencil import (
 from rodfem.tolerances import SAME_EIGENVALUE
 
 HIT = 1e-8
-"""A shift nearer to an eigenvalue than this, relative to the farthest one found, or to itself, is one: but for
-round-off, which spoils the others, and the count there."""
-OF_VECTORS = 1e-9
-"""Relative tolerance of SLEPc for vectors of the left-most ones: the error of the eigenvalues is the square."""
-EXTRA = (1, 4, 14)
-"""How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
-
+"""Distance of a shift from an eigenvalue, relative, below which round-off spoils the others, and the count there."""
 CONVERGED = 1e-7
 """Residual, relative to the stiffness, above which a pair is rejected: the Krylov space broke down."""
-LEAST_SPREAD = 1e-3
-"""Part of the greatest eigenvalue that is added to the distance of the others: equal ones have none."""
-NOISE = 1e-6
-"""Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
 
 
 class Found(NamedTuple):
     """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
 
-    ``factorisations`` are those in addition to the workspace's own; a ``note`` goes after the reason for the method.
+    ``factorisations`` are those in addition to the symmetric solver's; a ``note`` goes after the reason for the method.
     """
 
     values: np.ndarray
@@ -68,22 +55,6 @@ class Found(NamedTuple):
     certified: bool = False
     factorisations: int = 0
     note: str = ""
-
-    def negative(self, tolerance: float) -> int:
-        """Number of eigenvalues below ``-tolerance``."""
-        return int((self.values < -tolerance).sum())
-
-
-NOTHING = Found(np.zeros(0), [], np.zeros(0))
-
-
-@dataclass
-class _Shifted:
-    """Factors of ``S - sigma M``, that matrix, and ``sigma`` (nan: none of this state)."""
-
-    factors: Factors
-    matrix: PETSc.Mat
-    at: float = np.nan
 
 
 class SymmetricSolver(PencilMatrices):
@@ -96,15 +67,12 @@ class SymmetricSolver(PencilMatrices):
 
     def __init__(self, inertia: Inertia) -> None:
         super().__init__(inertia.system)
-        self.inertia = inertia
-        system, sizes = self.system, (self.system.fields.along, self.system.fields.dense_rows)
-        self.shifted = _Shifted(inertia_factors(system.comm, *sizes), system.state_matrix())
+        self.inertia, fields = inertia, self.system.fields
+        self.factors = factors_of("cholesky", self.system.comm, fields.along, fields.dense_rows)
+        self.scaled, self._shifted, self._factored = (self.matrix, self.mass), self.system.state_matrix(), np.nan
         self.scale = scale_in_units(self.system)
-        self.shift = -self.scale
-        self.factorisations = 0
-        self.last = np.zeros(0)
+        self.shift, self.factorisations, self.last = -self.scale, 0, np.zeros(0)
         self.deflated: list[PETSc.Vec] = []
-        self.scaled = self.matrix, self.mass
         self._places: np.ndarray | None = None
 
     def at(self, x: PETSc.Vec) -> SymmetricPencil:
@@ -119,31 +87,26 @@ class SymmetricSolver(PencilMatrices):
             if not system.scene.units.ordinary:
                 for mode in self.deflated:
                     mode.pointwiseDivide(mode, self.sizes)
-        self.shifted.at = np.nan
+        self._factored = np.nan
         return SymmetricPencil(self)
 
     def factor(self, sigma: float) -> None:
         """Factor ``S - sigma M``, unless that is what was factored last."""
-        shifted = self.shifted
-        if sigma == shifted.at:
+        if sigma == self._factored:
             return
-        self._fill(shifted.matrix, sigma)
-        shifted.matrix.stateIncrease()
-        shifted.factors(shifted.matrix)
-        shifted.at = sigma
+        own, mass, target = (shared(matrix) for matrix in (*self.scaled, self._shifted))
+        if own and mass and target:  # in a tenth of PETSc's time
+            if self._places is None:
+                self._places = places_in(own.pattern, mass.pattern)
+            target.values[:] = own.values
+            target.values[self._places] -= sigma * mass.values
+        else:
+            self.scaled[0].copy(self._shifted, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self._shifted.axpy(-sigma, self.scaled[1], PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        self._shifted.stateIncrease()
+        self.factors(self._shifted)
+        self._factored = sigma
         self.factorisations += 1
-
-    def _fill(self, target: PETSc.Mat, sigma: float) -> None:
-        """Let ``target`` be ``S - sigma M``: by numpy where it shares the arrays, in a tenth of PETSc's time."""
-        own, mass, values = (shared(matrix) for matrix in (*self.scaled, target))
-        if own is None or mass is None or values is None:
-            self.scaled[0].copy(target, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            target.axpy(-sigma, self.scaled[1], PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            return
-        if self._places is None:
-            self._places = places_in(own.pattern, mass.pattern)
-        values.values[:] = own.values
-        values.values[self._places] -= sigma * mass.values
 
 
 class SymmetricPencil(StatePencil[SymmetricSolver]):
@@ -154,22 +117,26 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         self.inertia, self._drifts = shared.inertia, shared.system.phase.count
 
     def leftmost(self, number: int) -> Found:
-        """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer."""
+        """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer.
+
+        More are computed where a count finds any missing: a Krylov method finds the second of two equal ones late.
+        """
         own = self.solver
         with self.system.clock("stability"):
-            modes = self._solve(number, EXTRA[0]) if len(own.last) else NOTHING
-            if not modes.certified:
+            modes = self._solve(number, 1) if len(own.last) else None
+            if modes is None or not modes.certified:
                 self.go_below()
-                for extra in EXTRA:
+                for extra in (1, 4, 14):
                     modes = self._solve(number, extra)
                     if modes.certified:
                         break
+        assert modes is not None
         if len(modes.values) < number:
             raise ConvergenceError(
                 f"SLEPc found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
                 "richer discretisation."
             )
-        spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
+        spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()  # equal ones have none
         own.shift = modes.values[0] - 0.1 * spread
         values, vectors = self.system.scene.units.omega2 * modes.values, self.unscaled(modes.vectors)
         return modes._replace(values=values, vectors=vectors)
@@ -196,25 +163,17 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         )
 
     def _shift_is_an_eigenvalue(self) -> bool:
-        """Whether that is so but for round-off, which a count does not tell: a step of inverse iteration does."""
+        """Whether that is so but for round-off, which a count does not show: a step of inverse iteration does."""
         own, mode = self.solver, self.inertia.seed(0)
         mode.scale(1.0 / self.system.norm(mode))
         grown = mode.duplicate()
-        own.shifted.factors.solve(own.scaled[1] * mode, grown)
+        own.factors.solve(own.scaled[1] * mode, grown)
         return not self.system.norm(grown) * HIT * abs(own.shift) < 1.0
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``; :class:`ConvergenceError` if the count breaks down."""
-        own = self.solver
-        own.factor(sigma)
-        negative, zero = own.shifted.factors.inertia()
-        below = negative - self.inertia.constraints - self._drifts
-        if zero or below < 0:
-            raise ConvergenceError(
-                f"The count of eigenvalues below {sigma:.6g} broke down ({zero} zero pivots, {negative} negative ones "
-                f"for {self.inertia.constraints} constraints): the constraints depend on each other."
-            )
-        return int(below)
+        self.solver.factor(sigma)
+        return self.inertia.counted(self.solver.factors, sigma, self._drifts)
 
     def certifies(self, values: np.ndarray) -> bool:
         """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
@@ -227,13 +186,10 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         )
 
     def _solve(self, number: int, extra: int) -> Found:
-        """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
-
-        A Krylov method finds the second of two equal eigenvalues late, by round-off.
-        """
+        """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``."""
         own = self.solver
         own.factor(own.shift)
-        if not own.shifted.factors.regular:
+        if not own.factors.regular:
             own.shift -= own.scale
             return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
@@ -254,42 +210,47 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         More than there are finite ones break the Krylov space down.
         """
         own, start = self.solver, self.inertia.seed(1)
-        if len(own.last):  # a space that is invariant already would miss all else
-            start.scale(NOISE / self.system.norm(start))
+        if len(own.last):
+            start.scale(1e-6 / self.system.norm(start))  # a space that is invariant already would miss all else
             start.array[:] += own.last
         solver = self.eigensolver(number, start)
         with slepc_errors():
             solver.solve()
+        values, vectors = self.converged(solver, number)
         found = solver.getConverged()
-        values = np.array([solver.getEigenvalue(i).real for i in range(found)])
-        order = np.argsort(values)[:number]
-        values, vectors = values[order], [self.system.new_vector() for _ in order]
-        for i, vector in zip(order, vectors, strict=True):
-            solver.getEigenvector(int(i), vector)
         solver.destroy()
         if found < least:
             raise ConvergenceError(
                 f"SLEPc found {found} of the {least} eigenvalues asked for: ask for fewer, or use a richer "
                 "discretisation."
             )
-        self._purify(values, vectors)
+        # purified: (mu - sigma) (S - sigma M)^-1 M x has no arbitrary massless parts
+        right = np.stack([(own.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
+        for value, vector, column in zip(values, vectors, own.factors.solve_all(right).T, strict=True):
+            vector.array[:] = (value - own.shift) * column
         errors = self.backward_errors(values, vectors)
         stiffness, mass = self._norms()
         true = [i for i in range(len(values)) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
         return values[true], [vectors[i] for i in true], errors[true]
 
-    def eigensolver(self, number: int, start: PETSc.Vec) -> SLEPc.EPS:
-        """Set up shift-invert for the ``number`` eigenvalues nearest to the shift that was factored.
+    def converged(self, solver: SLEPc.EPS, number: int) -> tuple[np.ndarray, list[PETSc.Vec]]:
+        """The ``number`` left-most eigenvalues, or all, that a ``solver`` has found, and their vectors."""
+        values = np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+        order = np.argsort(values)[:number]
+        vectors = [self.system.new_vector() for _ in order]
+        for i, vector in zip(order, vectors, strict=True):
+            solver.getEigenvector(int(i), vector)
+        return values[order], vectors
 
-        Vectors are right up to massless unknowns: purification corrects all of them at once.
-        """
+    def eigensolver(self, number: int, start: PETSc.Vec) -> SLEPc.EPS:
+        """Set up shift-invert for the ``number`` eigenvalues nearest to the shift that was factored."""
         own = self.solver
         solver = eigensolver(*own.scaled, "rodfem_")
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         solver.setTarget(own.shift)
         # in a Krylov space with fewer vectors restarts cost more
         solver.setDimensions(number, number + max(number, 6))
-        solver.setTolerances(tol=OF_VECTORS, max_it=300)
+        solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of the eigenvalues is the square
         solver.setPurify(False)
         solver.setInitialSpace([start])
         if own.deflated:
@@ -299,21 +260,14 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         ksp = transform.getKSP()
         ksp.setType("preonly")
         ksp.getPC().setType("python")
-        ksp.getPC().setPythonContext(_Inverse(own.shifted.factors))
+        ksp.getPC().setPythonContext(_Inverse(own.factors))
         with slepc_errors():
             solver.setFromOptions()
         return solver
 
-    def _norms(self) -> tuple[float, float]:
-        stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self.solver.scaled)
-        return stiffness, mass
-
-    def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
-        """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts, all at once."""
-        own = self.solver
-        right = np.stack([(own.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
-        for value, vector, column in zip(values, vectors, own.shifted.factors.solve_all(right).T, strict=True):
-            vector.array[:] = (value - own.shift) * column
+    def _norms(self) -> list[float]:
+        """Sizes of stiffness and mass."""
+        return [matrix.norm(PETSc.NormType.INFINITY) for matrix in self.solver.scaled]
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""

@@ -77,13 +77,12 @@ def test_motions_are_those_of_the_elementary_generators(name: str, formulation: 
     """One sparse matrix for all of them, projected together, beside one motion after the other by its own formula."""
     solver, points = rows(name, formulation)
     system, metric = solver.system, solver.inertia.metric
-    names = MotionNames(system, metric)
-    motions = [*names._turning.values(), *names._rigid.values(), names._along]
+    names = MotionNames(system)
     for point in points[::11]:
         state = system.at(point.x)
-        ours = [row for _, group in names.rows(point.x, state) for row in group]
+        ours = list(names.generators(point.x, state).values())
         theirs = []
-        for motion in motions:
+        for motion in names.motions.values():
             g = system.vector(motion.change(state), np.zeros(len(system.drifts)))
             before = g.dot(metric * g)
             for s in symmetry_modes(system, point.x).values():

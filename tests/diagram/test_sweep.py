@@ -27,7 +27,10 @@ from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_frequencies import curves, draw_frequencies, figure_of, ranges_of
 from rodfem.problem.ends import End
 from rodfem.problem.scene import Scene
-from rodfem.stability.nonsymmetric import PILE, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
+
+PILE = 64
+"""States after which what PETSc keeps of matrices that are not used any more is destroyed."""
 
 
 def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tuple[Branch, dict, str]:

@@ -31,7 +31,7 @@ from rodfem import (
     sliding,
 )
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.registry import METHODS
+from rodfem.stability import METHODS
 
 pytestmark = pytest.mark.alone
 

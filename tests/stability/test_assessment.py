@@ -25,17 +25,13 @@ from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
 from rodfem.kumar_healey.null_space import kernel
 from rodfem.kumar_healey.reduction import INVERSES, ReducedPencil, cayley_shift
 from rodfem.problem.scene import Inertia
-from rodfem.stability.assessment import Assessor, assess
+from rodfem.stability import METHODS, find
+from rodfem.stability.assessment import Assessor, Method, assess
 from rodfem.stability.dependence import named, smallest_singular, weak_combinations
 from rodfem.stability.inertia import Factored
 from rodfem.stability.inertia import Inertia as Count
-from rodfem.stability.methods import Method
 from rodfem.stability.near_zero import decide
-from rodfem.stability.pencil import (
-    Blocks,
-    Pencil,
-)
-from rodfem.stability.registry import METHODS, find
+from rodfem.stability.pencil import Blocks, Pencil
 
 pytestmark = pytest.mark.alone
 

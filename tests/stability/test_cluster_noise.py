@@ -14,9 +14,9 @@ from hard.fuzz import wider
 from rodfem import Discretization, Parameter, Plan, Scene, Solver, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.equilibria import at_load
-from rodfem.linalg.matrices import gathered
-from rodfem.stability.cluster import Measured, closed, cluster_of, measure, noise_of
-from rodfem.stability.inertia import EPS, NOISE
+from rodfem.linalg.matrices import EPS, gathered
+from rodfem.stability.cluster import Cluster, Measured, closed, measure, noise_of, real_span
+from rodfem.stability.inertia import NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 
 pytestmark = pytest.mark.alone
@@ -30,7 +30,8 @@ def nearly_met(scene: Scene, load: float, size: int) -> tuple[NonsymmetricPencil
     x, _ = first_equilibrium(solver, load)
     pencil = NonsymmetricSolver(solver.system).at(at_load(solver, x, load))
     found = pencil.near(size + 2, 0.0)
-    return pencil, measure(pencil, cluster_of(pencil, found, list(range(size))))
+    cluster = Cluster(real_span(pencil, found.vectors[:, :size]), float(found.values[:size].real.mean()))
+    return pencil, measure(pencil, cluster)
 
 
 def equal() -> Scene:

@@ -123,7 +123,7 @@ def test_spectrum_is_that_of_dense_matrices(formulation: str, branch: int, load:
     mu = mu[abs(mu) > f.inertia.tolerance]
     np.testing.assert_allclose(modes.values, mu[:6], rtol=1e-7, atol=1e-9)
     assert modes.certified
-    assert modes.negative(f.inertia.tolerance) == p.negative
+    assert (modes.values < -f.inertia.tolerance).sum() == p.negative
 
 
 @pytest.mark.alone
@@ -164,4 +164,4 @@ def test_spectrum_counts_as_inertia_does_along_branches() -> None:
         for p in branch.points[1::6]:
             if p.zero == branch.depth:
                 f.system.set_phase(p.x)
-                assert spectrum.at(p.x).leftmost(6).negative(f.inertia.tolerance) == p.negative
+                assert (spectrum.at(p.x).leftmost(6).values < -f.inertia.tolerance).sum() == p.negative

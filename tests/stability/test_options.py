@@ -13,8 +13,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import ReducedPencil
-from rodfem.stability.assessment import Assessor
-from rodfem.stability.methods import in_interval
+from rodfem.stability.assessment import Assessor, in_interval
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 pytestmark = pytest.mark.alone
