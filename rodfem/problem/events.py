@@ -26,14 +26,10 @@ ROLE = Role(
 class Event:
     """A number of the state, whose zeros along a branch are special points.
 
-    Attributes
-    ----------
-    name
-        What happens there, as tables show it.
-    of
-        ``of(state)``, a number that changes its sign or touches zero: ``state.s`` (m,), ``state.r`` (m, 3) and
-        ``state.q`` (m, 4) are arclength, centreline and unit quaternions from left to right, nondimensional or in the
-        units of the scene; multipliers, the load and further fields have their names in ``states.h5``.
+    ``name`` is what happens there, ``of(state)`` a number that changes its sign or touches zero: ``state.s`` (m,),
+    ``state.r`` (m, 3) and ``state.q`` (m, 4) are arclength, centreline and unit quaternions from left to right,
+    nondimensional or in the units of the scene; multipliers, the load and further fields have their names in
+    ``states.h5``.
 
     Between two rows of a branch it is a cubic, by its values there and its derivatives along the branch, for which the
     function receives states between the rows, too.  Where the cubic vanishes, or turns near zero, equilibria decide.
@@ -61,10 +57,7 @@ class Event:
         return float(value)
 
     def check(self, length: float) -> None:
-        """Call the function at an undeformed rod of a length; raises :class:`SceneError` where that fails.
-
-        What a function may have at other states (further fields, more nodes, a finite value) is told at the first one.
-        """
+        """Call the function at an undeformed rod of a length; raises :class:`SceneError` where it fails at any."""
         s = np.linspace(0.0, length, 5)
         r, q = np.outer(s, (0.0, 0.0, 1.0)), np.tile((1.0, 0.0, 0.0, 0.0), (5, 1))
         try:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from keyword import iskeyword
 from math import inf, isfinite
 from numbers import Real
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -21,11 +21,13 @@ import ufl
 from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import RODS, UNDEFORMED
-from rodfem.problem.arguments import a, encodes, finite, plain, real, reals, text
+from rodfem.problem.arguments import a, convert, encodes, interval, number, optional, plain, real, text
 from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution
 from rodfem.problem.ends import End, Ring
 from rodfem.problem.functions import (
     Constants,
+    Given,
+    OfPlace,
     Role,
     changes,
     derived,
@@ -36,21 +38,13 @@ from rodfem.problem.functions import (
     watched,
 )
 from rodfem.problem.table import Table, tables_of
-from rodfem.problem.trials import check_function, check_plane, symbols
+from rodfem.problem.trials import check_function, symbols
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
-ASIDE = 1e-6
-"""Distance from an end or a break at which the material is asked, relative to the rod's length."""
-
 GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
 """Names that branches are given as they are found."""
-SHORTEST, FARTHEST = 1e-15, 1e9
-"""Length above which dolfinx makes a mesh, and arclength over the length beyond which its round-off is seen."""
-
-if TYPE_CHECKING:
-    from rodfem.problem.functions import Given, OfPlace, Vector
 
 
 @dataclass(frozen=True)
@@ -70,10 +64,9 @@ class Parameter:
 
     def __post_init__(self) -> None:
         """Check the kinds, and have floats; raises :class:`InputError`."""
-        object.__setattr__(self, "value", real("value", self.value, 1.0))
-        object.__setattr__(self, "admissible", reals("admissible", self.admissible, (0.0, inf), 2))
-        for name in ("label", "words", "unit"):
-            text("P")(name, getattr(self, name))
+        word = text("P")
+        convert(self, value=partial(real, example=1.0), admissible=interval(0.0, inf, real))
+        convert(self, label=word, words=word, unit=word)
 
     def check(self, name: str, value: float) -> None:
         """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""
@@ -90,11 +83,11 @@ def _massless(c: Constants) -> float:
     return 0.0
 
 
-def _unit_rotary(c: Constants) -> Vector:
+def _unit_rotary(c: Constants) -> tuple[float, ...]:
     return (1.0, 1.0, 1.0)
 
 
-def _no_rotary(c: Constants) -> Vector:
+def _no_rotary(c: Constants) -> tuple[float, ...]:
     return (0.0, 0.0, 0.0)
 
 
@@ -115,12 +108,10 @@ class Inertia:
             object.__setattr__(self, "rho_I", _no_rotary)
 
 
-def _role_of_ordinate(ordinate: Ordinate) -> Role:
-    """Role of an ordinate's function: of numbers at a point, of UFL expressions along the rod."""
-    if ordinate.places:
-        hint = "it receives arrays r (3,) and q (4,), and returns a number"
-        return Role("ordinate", "of(r, q)", hint=hint, returns=plain)
-    return Role("ordinate along the rod", "of(x, c)", along=True)
+AT_A_POINT = Role(
+    "ordinate", "of(r, q)", hint="it receives arrays r (3,) and q (4,), and returns a number", returns=plain
+)
+ALONG_THE_ROD = Role("ordinate along the rod", "of(x, c)", along=True)
 
 
 @dataclass(frozen=True)
@@ -146,16 +137,14 @@ class Ordinate:
 
     name: str
     s: float | None
-    of: Callable[[Any, Any], Any] = field(metadata={"role": _role_of_ordinate})
+    of: Callable[[Any, Any], Any] = field(metadata={"role": lambda x: ALONG_THE_ROD if x.s is None else AT_A_POINT})
     label: str = ""
     unit: str = ""
 
     def __post_init__(self) -> None:
         """Check the kinds; raises :class:`InputError`."""
-        for name in ("name", "label", "unit"):
-            text("tip")(name, getattr(self, name))
-        if self.s is not None:
-            object.__setattr__(self, "s", finite("s", self.s, 1.0))
+        word = text("tip")
+        convert(self, name=word, label=word, unit=word, s=optional(number(1.0)))
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -163,19 +152,15 @@ class Ordinate:
         return () if self.s is None else (self.s,)
 
 
-def real_array(values: Any) -> np.ndarray:
-    """Array of floats; raises :class:`TypeError` or :class:`ValueError` for what is none."""
-    if np.iscomplexobj(values):
-        raise TypeError("complex numbers")
-    return np.asarray(values, dtype=float)
-
-
 def rotations(values: Any) -> np.ndarray:
     """Quaternions of unit norm, along the last axis, of an array; those that are so but for round-off stay as they are.
 
-    Zero quaternions, and those that are not finite, stay for the check of the start.
+    Zero quaternions, and those that are not finite, stay for the check of the start.  Raises :class:`TypeError` for
+    complex numbers.
     """
-    q = real_array(values)
+    if np.iscomplexobj(values):
+        raise TypeError("complex numbers")
+    q = np.asarray(values, dtype=float)
     if q.ndim != 2:
         return q
     norm = np.linalg.norm(q, axis=1)
@@ -183,7 +168,9 @@ def rotations(values: Any) -> np.ndarray:
     return np.where(other[:, None], q / np.where(other, norm, 1.0)[:, None], q)
 
 
-START = "it receives an array of arclengths (m,), and returns one (m, 4)"
+START = Role(
+    "start", "start(s)", hint="it receives an array of arclengths (m,), and returns one (m, 4)", returns=rotations
+)
 
 
 class Part(NamedTuple):
@@ -195,10 +182,7 @@ class Part(NamedTuple):
 
 
 class Stated(type):
-    """Class whose ``dir``, and so ``help`` and completion, has its fields and what its ``PUBLIC`` names.
-
-    What else it has is for the modules that compute.
-    """
+    """Class whose ``dir``, and so ``help`` and completion, has its fields and what its ``PUBLIC`` names."""
 
     def __dir__(cls) -> list[str]:
         return sorted([*getattr(cls, "__dataclass_fields__", ()), *getattr(cls, "PUBLIC", ()), "__init__"])
@@ -270,9 +254,7 @@ class Scene(Contribution, metaclass=Stated):
     constraints: tuple[Constraint, ...] = ()
     breaks: tuple[float, ...] = ()
     planar: str | None = None
-    start: Callable[[np.ndarray], np.ndarray] | None = role_field(
-        Role("start", "start(s)", hint=START, returns=rotations)
-    )
+    start: Callable[[np.ndarray], np.ndarray] | None = role_field(START)
     states: str | None = None
 
     def __post_init__(self) -> None:
@@ -280,21 +262,22 @@ class Scene(Contribution, metaclass=Stated):
         self._check_kinds()
         for field_name, value in changes(self, guarded).items():
             object.__setattr__(self, field_name, value)
-        for pair in ("interval", "span"):
-            object.__setattr__(self, pair, reals(pair, getattr(self, pair), (0.0, 1.0), 2))
-        object.__setattr__(self, "breaks", tuple(map(float, self.breaks)))
+        convert(self, interval=interval(0.0, 1.0, real), span=interval(0.0, 1.0, real))
         named = {n: p if isinstance(p, Parameter) else Parameter(p) for n, p in self.parameters.items()}
+        object.__setattr__(self, "breaks", tuple(map(float, self.breaks)))
         object.__setattr__(self, "parameters", named)
         self._check_values()
         check_scene(self)
-        check_plane(self)
+
+    def __dir__(self) -> list[str]:
+        """Names for completion."""
+        return dir(type(self))
 
     def _check_kinds(self) -> None:
         """Raise :class:`InputError` for a field that is no such thing."""
-        names = {"name": self.name} | ({} if self.states is None else {"states": self.states})
-        for field_name, given in ({"title": self.title} | names).items():
-            text("column")(field_name, given)
-        for name in names.values():
+        word = text("column")
+        convert(self, title=word, name=word, states=optional(word))
+        for name in (x for x in (self.name, self.states) if x is not None):
             if name in ("", ".", "..") or not encodes(name) or set(name) & set("/\\\n"):
                 raise SceneError(f"The name {name!r} cannot be that of a folder: give a text without slashes.")
         if GIVEN.fullmatch(self.states or ""):
@@ -303,9 +286,12 @@ class Scene(Contribution, metaclass=Stated):
             )
         if not isinstance(self.ends, (tuple, list, Ring)) or [isinstance(x, End) for x in self.ends] != [True, True]:
             raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
-        a(Mapping, "a dictionary, as in {'P': Parameter(0.0)}")("parameters", self.parameters)
-        a(Inertia, "one, as in Inertia(rho_A=1.0)")("inertia", self.inertia)
-        a(Ordinate, "an Ordinate(name, s, of)")("ordinate", self.ordinate)
+        convert(
+            self,
+            parameters=a(Mapping, "a dictionary, as in {'P': Parameter(0.0)}"),
+            inertia=a(Inertia, "one, as in Inertia(rho_A=1.0)"),
+            ordinate=a(Ordinate, "an Ordinate(name, s, of)"),
+        )
         for name, kind, example in (
             ("attachments", Attachment, "(Attachment(0.5, mass=1.0),)"),
             ("constraints", Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
@@ -329,9 +315,10 @@ class Scene(Contribution, metaclass=Stated):
             raise SceneError(
                 f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first."
             )
-        if not max(SHORTEST, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
+        shortest = 1e-15  # of which dolfinx makes a mesh
+        if not max(shortest, 1e-9 * max(abs(a), abs(b))) < b - a < LARGEST:  # else their round-off is seen
             raise SceneError(
-                f"A rod from {a:g} to {b:g} is shorter than {SHORTEST:g}, beyond the range of floats, or short for its "
+                f"A rod from {a:g} to {b:g} is shorter than {shortest:g}, beyond the range of floats, or short for its "
                 "arclengths' round-off: choose other units, or let the arclength begin at zero."
             )
         if not isinstance(self.rod, str) or self.rod not in RODS:
@@ -342,14 +329,53 @@ class Scene(Contribution, metaclass=Stated):
             parameter.check(name, parameter.value)
         self.check_span(self.span)
 
-    def __dir__(self) -> list[str]:
-        """Names for completion."""
-        return dir(type(self))
+    def check_span(self, span: tuple[float, float]) -> None:
+        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ.
 
-    @cached_property
-    def tables(self) -> list[tuple[Table, str]]:
-        """Tables among its functions, each with the constant that it is called with."""
-        return tables_of(self)
+        For another range than that of the scene all is checked that the scene is checked for at the loads of its own.
+        """
+        for value in span:
+            self.parameters[self.load].check(self.load, value)
+        if span[0] == span[1]:
+            raise SceneError(
+                f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads."
+            )
+        width = abs(span[1] - span[0])
+        if not max(TINIEST, NEGLIGIBLE * max(map(abs, span))) < width < LARGEST:
+            raise SceneError(
+                f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g} is as narrow as round-off, or beyond "
+                "the range of floats: give loads that differ by more, or choose other units."
+            )
+        if tuple(span) != self.span:
+            replace(self, span=span)
+
+    # --- other scenes
+
+    def varying(self, load: str = "", span: tuple[float, float] | None = None, /, **values: float) -> Scene:
+        """Return the same scene with another parameter as its ``load``, over ``span``, and other constants.
+
+        What is left out stays.  Scenes that are made so from one another, or by :func:`dataclasses.replace`, have the
+        same functions: forms are derived and compiled once for all of them.
+
+        Raises :class:`SceneError` for a name that is no parameter's.
+        """
+        unknown = [name for name in values if name not in self.parameters]
+        if unknown:
+            raise SceneError(f"{unknown[0]!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
+        parameters = {n: replace(p, value=values.get(n, p.value)) for n, p in self.parameters.items()}
+        return replace(self, load=load or self.load, span=span or self.span, parameters=parameters)
+
+    def in_space(self) -> Scene:
+        """Return the same rod, free to leave its plane."""
+        return replace(self, planar=None)
+
+    def alike(self, other: Scene) -> bool:
+        """Whether another scene has the same functions and all else: values of constants, load and range may differ."""
+        own = {"interval", "parameters", "load", "span"}  # another scene has its own objects there
+        same = all(getattr(self, f.name) is getattr(other, f.name) for f in fields(self) if f.name not in own)
+        return same and self.interval == other.interval and [*self.parameters] == [*other.parameters]
+
+    # --- parts and places
 
     @property
     def sides(self) -> tuple[End, End]:
@@ -374,10 +400,25 @@ class Scene(Contribution, metaclass=Stated):
             out.append(Part(x, sum(y.letter == x.letter for y in self.constraints[:i]), x.s))
         return out
 
+    @cached_property
+    def tables(self) -> list[tuple[Table, str]]:
+        """Tables among its functions, each with the constant that it is called with."""
+        return tables_of(self)
+
     @property
     def normal(self) -> int | None:
         """Component (0 or 1) across the plane of a planar rod, None for a rod in space."""
         return None if self.planar is None else int(self.planar[1]) - 1
+
+    @property
+    def length(self) -> float:
+        """Reference length of the rod."""
+        return self.interval[1] - self.interval[0]
+
+    @property
+    def free_strains(self) -> tuple[int, ...]:
+        """Components of ``v`` that are unknowns."""
+        return RODS[self.rod]
 
     @property
     def joints(self) -> tuple[float, ...]:
@@ -387,21 +428,18 @@ class Scene(Contribution, metaclass=Stated):
     @property
     def stops(self) -> tuple[float, ...]:
         """Loads at which a piecewise linear path has a corner: a branch has a row there, and no step across."""
-        paths = [table for table, name in self.tables if name == self.load]
-        return tuple(sorted({load for table in paths for load in table.corners}))
+        return tuple(sorted({load for table, name in self.tables if name == self.load for load in table.corners}))
 
     @property
     def vertices(self) -> tuple[float, ...]:
         """Joints, and the knots of piecewise linear tables where these are few: there elements of a mesh meet."""
         knots = {s for table, name in self.tables if name == "s" for s in table.corners}
-        # more of them have several in an element
-        return self._apart({*self.joints, *(knots if len(knots) < 64 else ())})
+        return self._apart({*self.joints, *(knots if len(knots) < 64 else ())})  # of more an element has several
 
     def _apart(self, places: set[float]) -> tuple[float, ...]:
         """Places inside the rod in ascending order, one for what is one place."""
         inner = [s for s in sorted(places) if self.is_inside(s)]
-        apart = [not i or not same_place(inner[i - 1], s, self.length) for i, s in enumerate(inner)]
-        return tuple(s for s, new in zip(inner, apart, strict=True) if new)
+        return tuple(s for i, s in enumerate(inner) if not i or not same_place(inner[i - 1], s, self.length))
 
     def is_inside(self, s: float) -> bool:
         """Whether an arclength is inside the rod, not at an end."""
@@ -411,95 +449,12 @@ class Scene(Contribution, metaclass=Stated):
     def samples(self) -> list[float]:
         """Arclengths at which the material is checked: nine from end to end, and both sides of all breaks."""
         a, b = self.interval
-        eps = ASIDE * self.length
+        eps = 1e-6 * self.length  # to either side of a jump
         return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
 
     def loads(self) -> list[float]:
         """Loads at which all that depends on the load is checked: both ends of the range, then some inside."""
         return [*self.span, *inside(self.span)]
-
-    def varying(self, load: str = "", span: tuple[float, float] | None = None, /, **values: float) -> Scene:
-        """Return the same scene with another parameter as its ``load``, over ``span``, and other constants.
-
-        What is left out stays.  Scenes that are made so from one another, or by :func:`dataclasses.replace`, have the
-        same functions: forms are derived and compiled once for all of them.
-
-        Raises :class:`SceneError` for a name that is no parameter's.
-        """
-        unknown = [name for name in values if name not in self.parameters]
-        if unknown:
-            raise SceneError(f"{unknown[0]!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
-        parameters = {n: replace(p, value=values.get(n, p.value)) for n, p in self.parameters.items()}
-        return replace(self, load=load or self.load, span=span or self.span, parameters=parameters)
-
-    def alike(self, other: Scene) -> bool:
-        """Whether another scene has the same functions and all else: values of constants, load and range may differ."""
-        own = {"interval", "parameters", "load", "span"}  # another scene has its own objects there
-        same = all(getattr(self, f.name) is getattr(other, f.name) for f in fields(self) if f.name not in own)
-        return same and self.interval == other.interval and [*self.parameters] == [*other.parameters]
-
-    @property
-    def length(self) -> float:
-        """Reference length of the rod."""
-        return self.interval[1] - self.interval[0]
-
-    @cached_property
-    def conservative(self) -> bool:
-        """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
-        return not self.without_potential()
-
-    def in_space(self) -> Scene:
-        """Return the same rod, free to leave its plane."""
-        return replace(self, planar=None)
-
-    def without_potential(self, *, in_space: bool = False) -> list[str]:
-        """Loads that have no potential, in words; for a planar rod those that have none while it stays in its plane."""
-        planar = self.planar is not None and not in_space
-        return [
-            what for what, _, role in functions_of(self) if role.load and role.load.potential_in(planar=planar) is None
-        ]
-
-    @property
-    def has_inertia(self) -> bool:
-        """Whether the scene states masses or inertias of its own, apart from the unit rotary inertia that counts by."""
-        return self.inertia != Inertia() or any(x.mass or x.rotary_inertia for x in self.attachments)
-
-    @cached_property
-    def inertia_depends_on_load(self) -> bool:
-        """Whether a mass or a rotary inertia, along the rod or attached to it, is a function of the load."""
-        c, asked = watched(self.constants())
-        for x in self.attachments:
-            for function in filter(None, (x.mass, x.rotary_inertia)):
-                function(c)
-        self.inertia.rho_A(c), self.inertia.rho_I(c)
-        return self.load in asked
-
-    @cached_property
-    def ignored_strains(self) -> tuple[int, ...]:
-        """Components of ``v`` that the stored energy depends on, but that the kind of rod keeps undeformed."""
-        rng = np.random.default_rng(1)
-        v, k = 0.05 * rng.uniform(0.5, 1, size=(2, 3))
-        stiff = [i for i in range(3) if i not in self.free_strains]
-        free = np.where(np.isin(np.arange(3), self.free_strains), v, 0.0)
-        found, places = [], self.samples() if self.depends_on_s() else self.samples()[:1]
-        for i in stiff:
-            pairs = [
-                [self.energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
-                for s in places
-            ]
-            if any(abs(b - a) > NEGLIGIBLE * max(abs(a), abs(b)) for a, *others in pairs for b in others):
-                found.append(i)
-        return tuple(found)
-
-    @cached_property
-    def units(self) -> Units:
-        """Natural sizes of the rod's numbers."""
-        return units_of(self)
-
-    @property
-    def free_strains(self) -> tuple[int, ...]:
-        """Components of ``v`` that are unknowns."""
-        return RODS[self.rod]
 
     def constants(self, load: float | None = None, s: float | None = None) -> Constants:
         """Namespace of all parameters as numbers, at ``load`` and at the arclength ``s`` (default: the mid-point)."""
@@ -508,25 +463,19 @@ class Scene(Contribution, metaclass=Stated):
             values[self.load] = load
         return Constants(s=sum(self.interval) / 2 if s is None else s, **values)
 
-    def check_span(self, span: tuple[float, float]) -> None:
-        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ.
+    # --- loads, inertia, units
 
-        For another range than that of the scene all is checked that the scene is checked for at the loads of its own.
-        """
-        for value in span:
-            self.parameters[self.load].check(self.load, value)
-        if span[0] == span[1]:
-            raise SceneError(
-                f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads."
-            )
-        width = abs(span[1] - span[0])
-        if not max(TINIEST, NEGLIGIBLE * max(map(abs, span))) < width < LARGEST:
-            raise SceneError(
-                f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g} is as narrow as round-off, or beyond "
-                "the range of floats: give loads that differ by more, or choose other units."
-            )
-        if tuple(span) != self.span:
-            replace(self, span=span)
+    @cached_property
+    def conservative(self) -> bool:
+        """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
+        return not self.without_potential()
+
+    def without_potential(self, *, in_space: bool = False) -> list[str]:
+        """Loads that have no potential, in words; for a planar rod those that have none while it stays in its plane."""
+        planar = self.planar is not None and not in_space
+        return [
+            what for what, _, role in functions_of(self) if role.load and role.load.potential_in(planar=planar) is None
+        ]
 
     @cached_property
     def plain(self) -> tuple[bool, bool]:
@@ -547,6 +496,27 @@ class Scene(Contribution, metaclass=Stated):
                 return sign * force
         return None
 
+    @property
+    def has_inertia(self) -> bool:
+        """Whether the scene states masses or inertias of its own, apart from the unit rotary inertia that counts by."""
+        return self.inertia != Inertia() or any(x.mass or x.rotary_inertia for x in self.attachments)
+
+    @cached_property
+    def inertia_depends_on_load(self) -> bool:
+        """Whether a mass or a rotary inertia, along the rod or attached to it, is a function of the load."""
+        c, asked = watched(self.constants())
+        attached = (f for x in self.attachments for f in (x.mass, x.rotary_inertia) if f)
+        for function in (self.inertia.rho_A, self.inertia.rho_I, *attached):
+            function(c)
+        return self.load in asked
+
+    @cached_property
+    def units(self) -> Units:
+        """Natural sizes of the rod's numbers."""
+        return units_of(self)
+
+    # --- the stored energy
+
     def depends_on_s(self) -> bool:
         """Whether the stored energy is a function of the arclength too."""
         return self.energy_depends_on("s")
@@ -563,20 +533,24 @@ class Scene(Contribution, metaclass=Stated):
         W = self.energy(ufl.as_vector(strains), ufl.as_vector([float(x) for x in k]), c)
         return float(ufl.as_ufl(W)(()))
 
+    @cached_property
+    def ignored_strains(self) -> tuple[int, ...]:
+        """Components of ``v`` that the stored energy depends on, but that the kind of rod keeps undeformed."""
+        v, k = 0.05 * np.random.default_rng(1).uniform(0.5, 1, size=(2, 3))
+        free = np.where(np.isin(np.arange(3), self.free_strains), v, 0.0)
+
+        def felt(i: int, s: float) -> bool:
+            one, *others = (
+                self.energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)
+            )
+            return any(abs(other - one) > NEGLIGIBLE * max(abs(one), abs(other)) for other in others)
+
+        places = self.samples() if self.depends_on_s() else self.samples()[:1]
+        return tuple(i for i in range(3) if i not in self.free_strains and any(felt(i, s) for s in places))
+
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
         return derived(self, ("stiffness", s), lambda: self._stiffness_at(s))
-
-    def _hessian(self) -> tuple[Constants, Any]:
-        """Second derivative of ``W`` in the strains of :meth:`stiffness`, and the symbols of its constants."""
-        free_v, c = self.free_strains, symbols(self)
-        x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free_v] + [0.0] * 3))
-        v = [ufl.as_ufl(value) for value in UNDEFORMED]
-        for position, component in enumerate(free_v):
-            v[component] = x[position]
-        k = ufl.as_vector([x[len(free_v) + i] for i in range(3)])
-        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, c))
-        return c, differentiated(ufl.diff(ufl.diff(W, x), x))
 
     def _stiffness_at(self, s: float | None) -> np.ndarray:
         c, hessian = derived(self.energy, ("hessian", self.rod, *self.parameters), self._hessian)
@@ -586,3 +560,11 @@ class Scene(Contribution, metaclass=Stated):
         for i, j in zip(*np.tril_indices(len(out)), strict=True):
             out[i, j] = out[j, i] = float(evaluated(hessian, (int(i), int(j))))
         return out
+
+    def _hessian(self) -> tuple[Constants, Any]:
+        """Second derivative of ``W`` in the strains of :meth:`stiffness`, and the symbols of its constants."""
+        free, c = self.free_strains, symbols(self)
+        x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free] + [0.0] * 3))
+        v = [x[free.index(i)] if i in free else ufl.as_ufl(value) for i, value in enumerate(UNDEFORMED)]
+        W = ufl.as_ufl(self.energy(ufl.as_vector(v), ufl.as_vector([x[len(free) + i] for i in range(3)]), c))
+        return c, differentiated(ufl.diff(ufl.diff(W, x), x))

@@ -12,31 +12,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import exp, pi, sqrt
+from math import exp, inf, pi, sqrt
 from typing import Any
 
 from rodfem.errors import InputError
 from rodfem.forms.energy import bending_and_twist, shear_and_stretch
 from rodfem.forms.kinematics import RODS
-from rodfem.problem.arguments import checked, finite, reals
+from rodfem.problem.arguments import Check, checked, finite, reals
 from rodfem.problem.scene import Inertia
 
-ODD = 1.0045237627951384
-"""Sum of ``1/n^5`` over odd n, 31/32 zeta(5)."""
+NO_DENSITY = "The section has no density: give one, as in density=7850.0."
 
 
 @dataclass(frozen=True)
 class Scales:
     """Units in which a rod has the length, the bending stiffness about ``d1`` and the mass per length one.
 
-    A number without dimension times its unit is the number itself: a load ``P`` is ``P * scales.force``.
-
-    Attributes
-    ----------
-    length, force
-        Length of the rod, and ``E I1 / length^2``.
-    time
-        ``length^2 sqrt(mass / E I1)``; zero for a section without a density.
+    A number without dimension times its unit is the number itself: a load ``P`` is ``P * scales.force``.  The unit of
+    ``force`` is ``E I1 / length^2``, that of ``time`` ``length^2 sqrt(mass / E I1)``, zero for a section without a
+    density.
     """
 
     length: float
@@ -52,7 +46,7 @@ class Scales:
     def frequency(self) -> float:
         """Unit of circular frequencies; raises :class:`InputError` without a density."""
         if not self.time:
-            raise InputError("The section has no density: give one, as in density=7850.0.")
+            raise InputError(NO_DENSITY)
         return 1 / self.time
 
 
@@ -60,16 +54,9 @@ class Scales:
 class Section:
     """A cross-section and its material; all numbers in one set of units.
 
-    Attributes
-    ----------
-    area, I1, I2
-        Area, and its second moments about ``d1`` and ``d2``.
-    J
-        Torsion constant: the twisting moment is ``G J`` times the twist.
-    shear
-        Shear factors along ``d1`` and ``d2``.
-    E, nu, density
-        Young's modulus, Poisson's ratio, and mass per volume (zero: not given).
+    ``I1`` and ``I2`` are the second moments of its ``area`` about ``d1`` and ``d2``, ``J`` is the torsion constant
+    (twisting moment over ``G`` times twist), ``shear`` are the shear factors along ``d1`` and ``d2``, ``E, nu,
+    density`` Young's modulus, Poisson's ratio and mass per volume (zero: not given).
     """
 
     area: float
@@ -137,7 +124,7 @@ class Section:
 
     def scales(self, length: float) -> Scales:
         """Units of a rod of this section and a ``length``; raises :class:`InputError` for what is no length."""
-        L = _positive("length", length)
+        L = LENGTH("length", length)
         return Scales(L, self.bending[0] / L**2, L**2 * sqrt(self.mass / self.bending[0]))
 
     def scaled(self, scales: Scales) -> Section:
@@ -153,54 +140,42 @@ class Section:
     def inertia(self) -> Inertia:
         """Mass and rotary inertia for a scene; raises :class:`InputError` without a density."""
         if not self.density:
-            raise InputError("The section has no density: give one, as in density=7850.0.")
+            raise InputError(NO_DENSITY)
         return Inertia(rho_A=lambda c: self.mass, rho_I=lambda c: self.rotary_inertia)
 
 
-def _positive(name: str, value: Any) -> float:
-    number = finite(name, value, 1.0)
-    if number <= 0:
-        raise InputError(f"{name} is {number:g}: give a number above zero.")
-    return number
+def _bounded(example: float, least: float, most: float, words: str, *, open_below: bool = True) -> Check:
+    """Check for a finite number above ``least``, or at least that, and at most ``most``."""
+
+    def check(name: str, value: Any) -> float:
+        number = finite(name, value, example)
+        if number > most or number < least or (open_below and number == least):
+            raise InputError(f"{name} is {number:g}: {words}.")
+        return number
+
+    return check
 
 
-def _density(name: str, value: Any) -> float:
-    number = finite(name, value, 1.0)
-    if number < 0:
-        raise InputError(f"{name} is {number:g}: give zero or more.")
-    return number
-
-
-def _ratio(name: str, value: Any) -> float:
-    number = finite(name, value, 0.3)
-    if not -1 < number <= 0.5:
-        raise InputError(f"{name} is {number:g}: an isotropic material has a Poisson's ratio above -1, at most 0.5.")
-    return number
-
-
-MATERIAL = {"E": _positive, "nu": _ratio, "density": _density}
+LENGTH = _bounded(1.0, 0.0, inf, "give a number above zero")
+MATERIAL = {
+    "E": LENGTH,
+    "nu": _bounded(0.3, -1.0, 0.5, "an isotropic material has a Poisson's ratio above -1, at most 0.5"),
+    "density": _bounded(1.0, 0.0, inf, "give zero or more", open_below=False),
+}
 """Checks of what all sections need."""
 
 
-@checked(radius=_positive, **MATERIAL)
+@checked(radius=LENGTH, **MATERIAL)
 def circle(radius: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A solid circle.
-
-    Parameters
-    ----------
-    radius
-        A length.
-    E, nu, density
-        Young's modulus, Poisson's ratio, mass per volume.
+    """A solid circle of a ``radius``; ``E, nu, density`` are Young's modulus, Poisson's ratio and mass per volume.
 
     Raises :class:`InputError` for numbers that no section has.
     """
-    second = pi * radius**4 / 4
-    shear = 6 * (1 + nu) / (7 + 6 * nu)
+    second, shear = pi * radius**4 / 4, 6 * (1 + nu) / (7 + 6 * nu)
     return Section(pi * radius**2, second, second, 2 * second, (shear, shear), E, nu, density)
 
 
-@checked(outer=_positive, inner=_positive, **MATERIAL)
+@checked(outer=LENGTH, inner=LENGTH, **MATERIAL)
 def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.0) -> Section:
     """A circular tube with the radii ``outer`` and ``inner``; ``E, nu, density`` are as for :func:`circle`.
 
@@ -213,7 +188,7 @@ def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.
     return Section(pi * (outer**2 - inner**2), second, second, 2 * second, (shear, shear), E, nu, density)
 
 
-@checked(width=_positive, height=_positive, **MATERIAL)
+@checked(width=LENGTH, height=LENGTH, **MATERIAL)
 def rectangle(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
     """A rectangle of a ``width`` along ``d1`` and a ``height`` along ``d2``.
 
@@ -223,13 +198,13 @@ def rectangle(width: float, height: float, *, E: float, nu: float, density: floa
     # the sum of tanh(n pi long / 2 short) / n^5, which converges slowly, by that of its difference from 1 / n^5
     # the seventh term is below 1e-17 in a square
     decays = ((n, exp(-n * pi * long / short)) for n in range(1, 12, 2))
-    series = ODD - sum(2 * x / (1 + x) / n**5 for n, x in decays)
+    series = 1.0045237627951384 - sum(2 * x / (1 + x) / n**5 for n, x in decays)  # 31/32 zeta(5), over odd n
     J = long * short**3 * (1 / 3 - 64 / pi**5 * short / long * series)
     shear = 10 * (1 + nu) / (12 + 11 * nu)
     return Section(width * height, width * height**3 / 12, height * width**3 / 12, J, (shear, shear), E, nu, density)
 
 
-@checked(width=_positive, thickness=_positive, **MATERIAL)
+@checked(width=LENGTH, thickness=LENGTH, **MATERIAL)
 def strip(width: float, thickness: float, *, E: float, nu: float, density: float = 0.0) -> Section:
     """A strip: a flat :func:`rectangle` of a ``width`` and a ``thickness``, which bends easily about its width ``d1``.
 
@@ -240,7 +215,7 @@ def strip(width: float, thickness: float, *, E: float, nu: float, density: float
     return rectangle(width, thickness, E=E, nu=nu, density=density)
 
 
-@checked(width=_positive, height=_positive, **MATERIAL)
+@checked(width=LENGTH, height=LENGTH, **MATERIAL)
 def ellipse(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
     """A solid ellipse whose axes are ``width`` along ``d1`` and ``height`` along ``d2``, twice the semi-axes.
 

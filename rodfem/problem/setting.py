@@ -10,7 +10,7 @@ Cross-sections are not part of a scene.  A picture gives them the proportion of 
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -32,12 +32,10 @@ HELD, AXIS, TURNS = "held", "axis", "free"
 class Support:
     """Support and loads of a rod at the arclength ``s``, in one state; vectors are (3,), zero if there is none.
 
-    ``kind`` is that of :func:`kind_of`, ``turning`` one of :data:`HELD`, :data:`AXIS`, :data:`TURNS`.  ``held``
-    components of the position are along e1, e2, e3, ``guide`` is the only direction in which it moves if that need not
-    be one of them.  ``frame`` is the unit quaternion of what holds the directors, or of the scene's start, ``axis`` is
-    along them.  ``translation_stiffness`` and ``rotation_stiffness`` (3, 3) are along, and about, e1, e2, e3, ``mass``
-    is attached; ``force`` and ``moment`` are in the frame of space, felt in the free directions, those of potentials
-    that are no springs among them; ``follower`` and ``follower_moment`` are along the directors.
+    ``guide`` is the only direction in which the position moves if that need not be e1, e2 or e3.  ``frame`` is the unit
+    quaternion of what holds the directors, or of the scene's start, ``axis`` is along them.  Stiffnesses (3, 3) are
+    along, and about, e1, e2, e3; ``force`` and ``moment`` are in the frame of space, felt in the free directions, those
+    of potentials that are no springs among them.
     """
 
     s: float
@@ -97,8 +95,7 @@ class Setting:
 
     ``section`` has arclengths (n,) and second moments of area (n, 2, 2) up to a factor; ``distributed`` arclengths (n,)
     and forces per length (n, 3) in the frame of space and along the directors; ``foundation`` arclengths (n,) and
-    stiffnesses per length (n, 3, 3) along e1, e2, e3.  ``notes`` names in words what acts and has no place in a
-    picture.  ``supports`` are what holds and loads the rod at points, and ``ties`` what constraints keep.
+    stiffnesses per length (n, 3, 3).  ``notes`` names in words what acts and has no place in a picture.
     """
 
     supports: tuple[Support, ...] = ()
@@ -137,34 +134,29 @@ def read(group: Any, row: int | None = None) -> Setting:
     or a constraint is not whole.
     """
     row, section, distributed, foundation = row or 0, None, None, None
-    supports, ties = (
-        [{name: value[row] for name, value in here.items()} | dict(here.attrs) for here in group[kind].values()]
-        if kind in group
-        else []
-        for kind in (SUPPORTS, TIES)
-    )
+    supports = tuple(_made(Support, here, row) for here in group[SUPPORTS].values()) if SUPPORTS in group else ()
+    ties = tuple(_made(Tie, here, row) for here in group[TIES].values()) if TIES in group else ()
+    notes = [tie.note for tie in ties if tie.note]
     if SECTION in group.file:
         s, B = (group.file[SECTION][name][:] for name in ("s", "stiffness"))
         section = s, B[:, ::-1, ::-1] * np.array([[1.0, -1.0], [-1.0, 1.0]])
     if DISTRIBUTED in group:
         along = group[DISTRIBUTED]
         distributed = along["s"][:], along["force"][row], along["follower"][row]
-    held, kept = tuple(_made(Support, x, group) for x in supports), tuple(_made(Tie, x, group) for x in ties)
-    notes = [tie.note for tie in kept if tie.note]
     if FOUNDATION in group:
         along = group[FOUNDATION]
         foundation = (along["s"][:], along["stiffness"][:]) if "stiffness" in along else None
         notes += [along.attrs["note"]] if foundation is None else []
-    return Setting(held, section, distributed, foundation, kept, tuple(notes))
+    return Setting(supports, section, distributed, foundation, ties, tuple(notes))
 
 
-def _made(kind: type[T], entries: dict[str, Any], group: Any) -> T:
-    """A support or a constraint from the entries of a file, of which it needs some."""
-    known = {f.name: f.default_factory is MISSING for f in fields(kind)}  # type: ignore[arg-type]
-    missing = [name for name, needed in known.items() if needed and name not in entries]
-    if missing:
+def _made(kind: type[T], group: Any, row: int) -> T:
+    """A support or a constraint, in one state, from its group in a file."""
+    entries = {name: value[row] for name, value in group.items()} | dict(group.attrs)
+    try:
+        return kind(**{f.name: entries[f.name] for f in fields(kind) if f.name != "guide" or "guide" in entries})  # type: ignore[arg-type]
+    except KeyError as missing:
         raise SceneError(
-            f"{group.file.filename} has a {kind.__name__.lower()} without {', '.join(missing)} in {group.name}: "
-            "another version of rodfem wrote it; run the scene again."
-        )
-    return kind(**{name: entries[name] for name in known if name in entries})
+            f"{group.file.filename} has a {kind.__name__.lower()} without {missing} in {group.name}: another version "
+            "of rodfem wrote it; run the scene again."
+        ) from None

@@ -1,11 +1,8 @@
 r"""Supports and loads of a rod: derived from a scene, and written to a file.
 
-An end is described by its properties, and named after them by one rule (:func:`~rodfem.problem.setting.kind_of`): how
-many components of its position are held, what its directors are free to do, and whether springs hold it.  A potential
-of an end is a *spring* in translation (in rotation) where its second derivative at the reference is positive
-semidefinite and not zero.  Minus its derivative at the state is a load where it is none, and where it is one in the
-directions in which the position moves without stiffness.  A load along a stiff direction is no other thing than an
-anchor elsewhere.
+A potential of an end is a *spring* in translation (in rotation) where its second derivative at the reference is
+positive semidefinite and not zero.  Minus its derivative at the state is a load where it is none, and where it is one
+in the directions in which the position moves without stiffness: along a stiff one it is an anchor elsewhere.
 
 A constraint ``g = 0`` of a point keeps it on a surface with the normal ``n`` along the derivative of ``g`` in the
 position.  With the second derivative ``H`` the principal curvatures are those of ``H/|g'|`` across ``n``; where they
@@ -15,6 +12,7 @@ are one, ``k``, the point keeps its distance from the centre ``r - n/k``.  An in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,54 +31,66 @@ from rodfem.problem.scene import Scene
 from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPORTS, TIES, Support, Tie, kind_of
 
 Floats = NDArray[np.float64]
-
-SLIGHTLY, SMALL = 0.1, 1e-6
-"""Negative stiffness that a spring may have, over the greatest one, and error of a fit that is none, relative."""
+Sample = dict[str, Any]
+CHANGING = ("frame", "force", "moment", "follower", "follower_moment")
+"""What changes with the state of a support."""
 FLAT = 1e-3
 """Curvature times the rod's length, or difference of two curvatures relative to them, that is taken for zero."""
-Sample = dict[str, Any]
 
 
-def supports_of(scene: Scene, sample: Sample) -> dict[str, Support]:
+def supports_of(scene: Scene, sample: Sample, first: dict[str, Support] | None = None) -> dict[str, Support]:
     """Supports of a rod by the names of their places, in a state given by :meth:`~rodfem.fem.shape.Shape.sample`.
 
-    A ring has none at its ends.
+    Springs are those of the ``first`` state's supports, by default of this one.  A ring has no supports at its ends.
     """
-    load, out = float(sample["load"]), {}
-    for name, (s, end, mass) in _places(scene).items():
-        c, start = scene.constants(load, s), _start(scene, s)
+    places: list[tuple[str, float, End, Callable[[Constants], Any] | None]] = [
+        (f"{side} end", s, end, None)
+        for side, s, end in zip(SIDES, scene.interval, scene.sides, strict=True)
+        if not end.closed
+    ]
+    for i, x in enumerate(scene.attachments, start=1):
+        places.append((f"attachment {i}", x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass))
+    out = {}
+    for name, s, end, mass in places:
+        springs = None
+        if first is not None:
+            springs = np.array([first[name].translation_stiffness, first[name].rotation_stiffness])
+        out[name] = _support(scene, s, end, sample, springs)
+        if mass is not None:
+            out[name] = replace(out[name], mass=_number(mass(scene.constants(float(sample["load"]), s))))
+    return out
+
+
+def _support(scene: Scene, s: float, end: End, sample: Sample, springs: Floats | None) -> Support:
+    start = np.array(IDENTITY) if scene.start is None else np.asarray(scene.start(np.array([s])), dtype=float)[0]
+    frame, loads, c = start / np.linalg.norm(start), np.zeros((2, 3)), scene.constants(float(sample["load"]), s)
+    if springs is None:
         springs = np.zeros((2, 3, 3))
         if end.energy is not None:
-            springs = _springs(second_derivative_of(end.energy, c, _point(scene, s, _state(sample, s)[0], start)))
-        out[name] = Support(
-            s=s,
-            kind=kind_of(len(end.fixed(c)), end.turning, bool(springs.any())),
-            held=np.array([p is not None for p in end.held(c)]),
-            guide=np.array(end.guide),
-            turning=end.turning,
-            axis=np.zeros(3) if end.hinge is None else np.asarray(end.hinge, dtype=float),
-            translation_stiffness=springs[0],
-            rotation_stiffness=springs[1],
-            mass=0.0 if mass is None else _number(mass(c)),
-            **_changing(scene, s, end, sample, springs),
-        )
-    return out
-
-
-def _places(scene: Scene) -> dict[str, tuple[float, End, Callable[[Constants], Any] | None]]:
-    """Where something may hold or load the rod: arclength, the end or what is like one, and the mass attached."""
-    out: dict[str, tuple[float, End, Callable[[Constants], Any] | None]] = {}
-    for side, s, end in zip(SIDES, scene.interval, scene.sides, strict=True):
-        if not end.closed:
-            out[f"{side} end"] = s, end, None
-    for i, x in enumerate(scene.attachments):
-        out[f"attachment {i + 1}"] = x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass
-    return out
-
-
-def _start(scene: Scene, s: float) -> Floats:
-    q = np.array(IDENTITY) if scene.start is None else np.asarray(scene.start(np.array([s])), dtype=float)[0]
-    return np.asarray(q / np.linalg.norm(q))
+            there = _point(scene, s, _state(sample, s)[0], frame)
+            springs = _springs(second_derivative_of(end.energy, c, there))
+    if end.energy is not None:
+        loads = _load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
+        loads[1] *= end.turning != HELD
+    if end.rotation is not None:
+        frame = np.array([_number(x) for x in end.frame(c)])
+    held = np.array([p is not None for p in end.held(c)])
+    return Support(
+        s=s,
+        kind=kind_of(len(end.fixed(c)), end.turning, bool(springs.any())),
+        held=held,
+        guide=np.array(end.guide),
+        turning=end.turning,
+        axis=np.zeros(3) if end.hinge is None else np.asarray(end.hinge, dtype=float),
+        translation_stiffness=springs[0],
+        rotation_stiffness=springs[1],
+        mass=0.0,
+        frame=frame / np.linalg.norm(frame),
+        force=np.where(held, 0.0, _vector(end.force, c) + loads[0]),
+        moment=_vector(end.moment, c) + loads[1],
+        follower=_vector(end.follower, c),
+        follower_moment=_vector(end.follower_moment, c),
+    )
 
 
 def _state(sample: Sample, s: float) -> tuple[Floats, Floats]:
@@ -94,24 +104,6 @@ def _point(scene: Scene, s: float, r: Floats, q: Floats) -> Place:
     """Place of a position (3,) and a quaternion (4,), numbers."""
     turned = ufl.as_vector(q.tolist())
     return place(turned, rotation(turned), s, ufl.as_vector(r.tolist()), length=scene.length)
-
-
-def _changing(scene: Scene, s: float, end: End, sample: Sample, springs: Floats) -> dict[str, Floats]:
-    """Attributes of a support that depend on the state: its frame, forces and moments by their names."""
-    c = scene.constants(float(sample["load"]), s)
-    frame, loads = _start(scene, s), np.zeros((2, 3))
-    if end.energy is not None:
-        loads = _load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
-        loads[1] *= end.turning != HELD
-    if end.rotation is not None:
-        frame = np.array([_number(x) for x in end.frame(c)])
-    return {
-        "frame": frame / np.linalg.norm(frame),
-        "force": np.where([p is not None for p in end.held(c)], 0.0, _vector(end.force, c) + loads[0]),
-        "moment": _vector(end.moment, c) + loads[1],
-        "follower": _vector(end.follower, c),
-        "follower_moment": _vector(end.follower_moment, c),
-    }
 
 
 def _near(function: OfPlace, c: Constants, x: Place) -> tuple[Any, Any]:
@@ -134,14 +126,14 @@ def second_derivative_of(function: OfPlace, c: Constants, x: Place) -> Floats:
     """Second derivatives (2, 3, 3) of ``function(x, c)`` in the position and in the rotation vector."""
     change, value = _near(function, c, x)
     bend = differentiated(ufl.diff(ufl.diff(value, change), change))
-    blocks = [[(first + i, first + j) for i in range(3) for j in range(3)] for first in (0, 3)]
-    return np.array([[float(evaluated(bend, place)) for place in block] for block in blocks]).reshape(2, 3, 3)
+    entries = [(first + i, first + j) for first in (0, 3) for i in range(3) for j in range(3)]
+    return np.array([float(evaluated(bend, entry)) for entry in entries]).reshape(2, 3, 3)
 
 
 def _springs(second: Floats) -> Floats:
     """Second derivatives (n, 3, 3) that are those of springs, zero for what is not positive semidefinite."""
     least, greatest = np.linalg.eigvalsh(second)[:, 0], abs(second).max(axis=(1, 2))
-    return second * (least > -SLIGHTLY * greatest)[:, None, None]
+    return second * (least > -0.1 * greatest)[:, None, None]
 
 
 def _load_of(energy: OfPlace, c: Constants, x: Place, springs: Floats) -> Floats:
@@ -158,13 +150,6 @@ def _load_of(energy: OfPlace, c: Constants, x: Place, springs: Floats) -> Floats
         out[0] = across * bool(np.linalg.norm(across) > FLAT * np.linalg.norm(out[0]))
     out[1] *= not springs[1].any()
     return out
-
-
-def section_of(scene: Scene) -> tuple[Floats, Floats]:
-    """Bending stiffness (n, 2, 2) in ``k1, k2`` of the undeformed rod at n arclengths (n,), one where it is uniform."""
-    varies = scene.depends_on_s()
-    places = scene.samples() if varies else [scene.interval[0]]
-    return np.array(places), np.array([scene.stiffness(s if varies else None)[-3:-1, -3:-1] for s in places])
 
 
 def distributed_on(scene: Scene, load: float) -> tuple[Floats, Floats, Floats]:
@@ -194,8 +179,8 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
 def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
     """Geometry that each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
     load = float(samples[0]["load"])
-    whole = [_of_the_ends(scene, x, load) if x.whole else None for x in scene.constraints]
-    return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, whole, strict=True)]
+    joined = [_of_the_ends(scene, x, load) if x.whole else None for x in scene.constraints]
+    return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, joined, strict=True)]
 
 
 def _tie(scene: Scene, constraint: Constraint, a: Floats | None, sample: Sample) -> Tie:
@@ -232,11 +217,10 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
     By least squares at random rotations, positions and free strains.
     """
     rng = np.random.default_rng(1)
-    strained = np.isin(np.arange(3), scene.free_strains)
     rows, values = [], []
     for s in _stations(scene).tolist():
         q = rng.normal(size=4)
-        v = np.array(UNDEFORMED) + 0.3 * rng.normal(size=3) * strained
+        v = np.array(UNDEFORMED) + 0.3 * rng.normal(size=3) * np.isin(np.arange(3), scene.free_strains)
         turned, r = ufl.as_vector(q.tolist()), ufl.as_vector(rng.normal(size=3).tolist())
         R, strains = rotation(turned), ufl.as_vector(v.tolist())
         known = {"dr": ufl.dot(R, strains), "v": strains, "k": ufl.as_vector(rng.normal(size=3).tolist())}
@@ -245,8 +229,9 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
         rows.append([*(quaternions.directors(q) @ v), 1.0])
     matrix, value = np.array(rows), np.array(values)
     a = np.linalg.lstsq(matrix, value, rcond=None)[0]
-    fits = np.linalg.norm(matrix @ a - value) < SMALL * np.linalg.norm(value)
-    return a[:3] if fits and np.linalg.norm(a[:3]) > SMALL and not scene.closed else None
+    small = 1e-6  # error of a fit that is none
+    fits = np.linalg.norm(matrix @ a - value) < small * np.linalg.norm(value)
+    return a[:3] if fits and np.linalg.norm(a[:3]) > small and not scene.closed else None
 
 
 def _stations(scene: Scene) -> Floats:
@@ -255,31 +240,20 @@ def _stations(scene: Scene) -> Floats:
 
 
 def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
-    """Write what holds and loads P states into groups below an HDF5 group.
-
-    ``supports`` has a group for each place, ``left end``, ``right end``, ``attachment 1`` ...: attributes ``s``,
-    ``kind``, ``held``, ``turning``, ``axis``, ``translation_stiffness``, ``rotation_stiffness``, ``mass`` and, with P
-    rows, ``frame``, ``force``, ``moment``, ``follower``, ``follower_moment``, as in
-    :class:`~rodfem.problem.setting.Support`; of a ring it is empty.  ``distributed``, where there is such a load, has
-    ``s`` (n,), ``force`` and ``follower`` (P, n, 3); ``foundation``, where there is a potential along the rod, ``s``
-    (n,) and ``stiffness`` (n, 3, 3), or an attribute ``note`` where it is no foundation's.  ``constraints``, where
-    there are some, has ``constraint 1`` ... with ``line`` (P, 2, 3), ``normal`` (P, 3) and the attributes ``s`` and
-    ``note``, as in :class:`~rodfem.problem.setting.Tie`.
-    """
-    rows = [float(sample["load"]) for sample in samples]
-    out, places = group.create_group(SUPPORTS), _places(scene)
-    for name, support in supports_of(scene, samples[0]).items():
+    """Write what holds and loads P states into groups below an HDF5 group, as ``docs/files.md`` describes them."""
+    first = supports_of(scene, samples[0])
+    states = [first, *(supports_of(scene, sample, first) for sample in samples[1:])]
+    out = group.create_group(SUPPORTS)
+    for name, support in first.items():
         here = out.create_group(name)
-        springs = np.array([support.translation_stiffness, support.rotation_stiffness])
-        changing = [_changing(scene, *places[name][:2], sample, springs) for sample in samples]
         for key, value in vars(support).items():
-            if key in changing[0]:
-                here[key] = np.array([row[key] for row in changing])
+            if key in CHANGING:
+                here[key] = np.array([getattr(supports[name], key) for supports in states])
             else:
                 here.attrs[key] = value
     if scene.distributed is not None or scene.follower is not None:
         along = group.create_group(DISTRIBUTED)
-        found = [distributed_on(scene, load) for load in rows]
+        found = [distributed_on(scene, float(sample["load"])) for sample in samples]
         along["s"] = found[0][0]
         along["force"], along["follower"] = (np.array([f[i] for f in found]) for i in (1, 2))
     if scene.potential is not None:
@@ -295,8 +269,11 @@ def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
 
 
 def write_section(file: Any, scene: Scene) -> None:
-    """Write the bending stiffness of a rod into a group ``section`` of an HDF5 file: ``s`` (n,), ``stiffness``."""
-    file[f"{SECTION}/s"], file[f"{SECTION}/stiffness"] = section_of(scene)
+    """Write the bending stiffness (n, 2, 2) in ``k1, k2`` at arclengths ``s`` (n,), one where the rod is uniform."""
+    varies = scene.depends_on_s()
+    places = scene.samples() if varies else [scene.interval[0]]
+    stiffness = np.array([scene.stiffness(s if varies else None)[-3:-1, -3:-1] for s in places])
+    file[f"{SECTION}/s"], file[f"{SECTION}/stiffness"] = np.array(places), stiffness
 
 
 def _number(value: Any) -> float:

@@ -24,24 +24,15 @@ from rodfem.tolerances import NEGLIGIBLE
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-CONSTANTS = Variable, Indexed, Sum
-"""Expressions that stand for an arclength, or for a constant: in the equations ``base + direction * load``."""
-
 
 class Table:
     """Piecewise cubic through ``rows`` (n, m) at increasing ``knots`` (n,); linear in between unless ``smooth``.
 
-    Attributes
-    ----------
-    pieces
-        Coefficients of powers 0 to 3 of the distance from the knot at which a piece begins, (n - 1, 4, m).
+    ``pieces`` are the coefficients of powers 0 to 3 of the distance from the knot at which one begins, (n - 1, 4, m).
     """
 
     def __init__(self, what: str, x: Any, values: Any, *, smooth: bool) -> None:
-        """Check and interpolate ``values`` at ``x``; ``what`` names the table in sentences.
-
-        Raises :class:`SceneError` for what is no table.
-        """
+        """Interpolate ``values`` at ``x``; raises :class:`SceneError` for what is no table, ``what`` in words."""
         self.what = what
         self.knots, rows = _floats(f"first column of the {what}", x), _floats(f"values of the {what}", values)
         if self.knots.ndim != 1 or len(self.knots) < 2 or rows.shape[:1] != self.knots.shape or rows.ndim > 2:
@@ -82,16 +73,14 @@ class Table:
         return np.asarray(a + t * (b + t * (c + t * d)))
 
     def __call__(self, x: Any) -> Any:
-        """Value at ``x``, a number or a constant of the scene: a number or an expression, or a tuple of them.
-
-        Raises :class:`UnnamedError` for another expression.
-        """
-        if isinstance(x, Expr) and not isinstance(x, Symbol):
-            if not isinstance(x, CONSTANTS) or any(isinstance(part, Symbol) for part in parts(x)):
+        """Value at ``x``, a number or a constant of the scene: a number or an expression, or a tuple of them."""
+        if isinstance(x, Expr):
+            # in the equations an arclength or a constant is one of these: base + direction * load
+            constant = isinstance(x, (Variable, Indexed, Sum)) and not any(isinstance(p, Symbol) for p in parts(x))
+            if not constant and not isinstance(x, Symbol):
                 raise UnnamedError(
                     f"calls the {self.what} with an expression: call it with c.s, or with one constant alone."
                 )
-        if isinstance(x, Expr):
             values = tuple(Entry(x, self, i) for i in range(len(self._labels)))
         else:
             values = tuple(self.at(np.array([float(x)]))[0].tolist())
@@ -121,10 +110,7 @@ class Entry(Variable):  # type: ignore[misc]
 
 
 def tables_of(scene: Scene) -> list[tuple[Table, str]]:
-    """Tables that the functions of a ``scene`` call, each with the name of what they call it with, as ``s``.
-
-    Raises :class:`SceneError` where they do not have what they are called with.
-    """
+    """Tables that the functions of a ``scene`` call, each with the name of what they call it with, as ``s``."""
     entries = (part for e in expressions_of(scene) for part in parts(e) if isinstance(part, Entry))
     calls = dict.fromkeys((e.table, e.ufl_operands[0].name.removeprefix("c.")) for e in entries)
     for table, name in calls:
@@ -169,10 +155,7 @@ class Rotations(Table):
     """Quaternions of unit norm: of the components, which are interpolated, those of the unit vector count."""
 
     def adjusted(self, rows: np.ndarray) -> np.ndarray:
-        """Give each row unit norm, and the sign by which it is near the one before.
-
-        Raises :class:`SceneError` where it is not near.
-        """
+        """Give each row unit norm, and the sign by which it is near the one before; raises :class:`SceneError`."""
         with np.errstate(invalid="ignore"):
             unit = rows / np.linalg.norm(rows, axis=1)[:, None]
         cosines = (unit[1:] * unit[:-1]).sum(axis=1)

@@ -1,9 +1,8 @@
-"""Natural sizes of a rod's numbers in the units in which its scene is stated.
+"""Natural sizes of a rod's numbers in the units in which its scene is stated: what is small is so relative to them.
 
-What is small is so relative to them.  A scene whose numbers are of order one has the size one for each, and so has one
-that is not far from it: results do not depend on where a rod's length is between a tenth and ten.  Stated in metres and
-newtons the load of a DNA molecule is 1e-12, the stiffness of a steel bar 1e6: then all sizes are the rod's own, also
-those that happen to be about one, as only together they make its equations those of a rod of order one.
+They are one for a scene whose numbers are not far from order one: results do not depend on where a rod's length is
+between a tenth and ten.  Stated in metres and newtons the load of a DNA molecule is 1e-12: then all sizes are the rod's
+own, as only together they make its equations those of a rod of order one.
 """
 
 from __future__ import annotations
@@ -20,9 +19,6 @@ from rodfem.problem.functions import STATES, some_places
 if TYPE_CHECKING:
     from rodfem.problem.contribution import Block, Unknown
     from rodfem.problem.scene import Scene
-
-ORDINARY = 1e3
-"""Sizes between this and its inverse count as one."""
 
 
 class Units(NamedTuple):
@@ -53,7 +49,6 @@ class Units(NamedTuple):
 
 
 ONES = Units(*[1.0] * len(Units._fields))
-"""Those of a scene in numbers of order one."""
 
 
 def units_of(scene: Scene) -> Units:
@@ -76,7 +71,8 @@ def units_of(scene: Scene) -> Units:
 
 def size(value: float) -> float:
     """Natural size of numbers like ``value``: one, unless that is far from it."""
-    return 1.0 if not isfinite(value) or 1.0 / ORDINARY <= value <= ORDINARY or value == 0 else float(value)
+    ordinary = value == 0 or not isfinite(value) or 1e-3 <= value <= 1e3  # in between they count as one
+    return 1.0 if ordinary else float(value)
 
 
 def _of_ordinate(scene: Scene) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from rodfem.errors import SceneError
 from rodfem.problem.arguments import number_of
 from rodfem.problem.functions import SIDES, STATES, asked_for, asks_where, floats, functions_of_places
-from rodfem.problem.trials import check_functions, expressions_of
+from rodfem.problem.trials import check_functions, check_plane, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 LARGEST, TINIEST = 1e60, 1e-60
 """Lengths, widths of ranges and stiffnesses whose powers are floats."""
-EPS, FELT = float(np.finfo(float).eps), 1e-3
-"""Round-off of a strain, and what of it is felt in bending, relative."""
 FLEXIBLE = "choose a kind of rod without the stiff strains"
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
@@ -37,10 +35,17 @@ def check_scene(scene: Scene) -> None:
     check_functions(scene)
     _ = scene.tables  # they cover what they are needed for
     check_start(scene)
-    check_supports(scene)
+    for side, end in zip(SIDES, scene.sides, strict=True):
+        end.check(side, scene)
+    check_drift(scene)
+    check_reach(scene)
     check_convexity(scene)
-    check_inertia(scene)
-    check_ordinate(scene)
+    for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
+        if trouble := trouble_with_inertia(scene, load):
+            raise SceneError(trouble)
+    if (values := ordinates(scene)) and not any(map(isfinite, values)):
+        raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
+    check_plane(scene)
 
 
 def check_load(scene: Scene) -> None:
@@ -52,11 +57,15 @@ def check_load(scene: Scene) -> None:
         )
 
 
-def check_ordinate(scene: Scene) -> None:
-    """Raise :class:`SceneError` if the ordinate at a point is no number in any state; it may be undefined in one."""
-    values = ordinates(scene)
-    if values and not any(map(isfinite, values)):
-        raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
+def check_places(scene: Scene) -> None:
+    """Raise :class:`SceneError` for an ordinate, an attachment, a constraint or a break that is not on the rod."""
+    a, b = scene.interval
+    places = [("ordinate", s) for s in scene.ordinate.places] + [("break", s) for s in scene.breaks]
+    places += [("attachment", x.s) for x in scene.attachments]
+    places += [("constraint", x.s) for x in scene.constraints if x.s is not None]
+    for what, s in places:
+        if not a <= s <= b:
+            raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
 
 
 def ordinates(scene: Scene) -> list[float]:
@@ -73,17 +82,9 @@ def ordinates(scene: Scene) -> list[float]:
 
 def statement(scene: Scene) -> str:
     """Numbers, expressions and trial ordinates of a scene, in which two that state one rod agree."""
-    numbers = (
-        scene.name,
-        scene.interval,
-        scene.rod,
-        scene.parameters,
-        scene.load,
-        scene.span,
-        scene.breaks,
-        scene.planar,
-    )
-    return repr((numbers, [part.s for part in scene.parts], ordinates(scene), list(map(str, expressions_of(scene)))))
+    numbers = (scene.name, scene.interval, scene.rod, scene.parameters, scene.load, scene.span, scene.breaks)
+    places = [part.s for part in scene.parts]
+    return repr((numbers, scene.planar, places, ordinates(scene), list(map(str, expressions_of(scene)))))
 
 
 def check_start(scene: Scene) -> None:
@@ -123,48 +124,30 @@ def _angles(q: np.ndarray) -> np.ndarray:
     return np.asarray(4 * np.arcsin(np.minimum(apart / 2, 1.0)))
 
 
-def check_inertia(scene: Scene) -> None:
-    """Raise :class:`SceneError` for a negative inertia, or none where stability is a matter of motion.
-
-    One that depends on the load is checked at several loads of the range.
-    """
-    for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
-        if trouble := trouble_with_inertia(scene, load):
-            raise SceneError(trouble)
-
-
 def trouble_with_inertia(scene: Scene, load: float | None) -> str:
     """Sentence on a mass or a rotary inertia at a ``load``, None for the scene's own, that cannot be; empty for none.
 
     A rod under loads without a potential has an inertia.
     """
-    masses, rotary = _inertia_at(scene, load)
+    c, along = scene.constants(load), [scene.constants(load, s) for s in scene.samples()]
+    masses = [float(x.mass(c)) for x in scene.attachments if x.mass]
+    masses += [number_of(scene.inertia.rho_A(there)) for there in along]
+    rotary = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
+    rotary += [number_of(x) for there in along for x in scene.inertia.rho_I(there)]
+    least, largest = min(masses + rotary), max(masses + rotary)
     there = "" if load is None else f" at {scene.load} = {load:g}"
-    if min(masses + rotary) < 0:
-        remedy = (
-            "give zero or more" if load is None else f"give zero or more, or a range of {scene.load} in which it is"
-        )
-        return f"A mass or rotary inertia of {min(masses + rotary):g}{there} is negative: {remedy}."
-    largest = max(masses + rotary)  # what is much less is none
-    if largest and not TINIEST < largest < LARGEST:
+    if least < 0:
+        remedy = "" if load is None else f", or a range of {scene.load} in which it is"
+        return f"A mass or rotary inertia of {least:g}{there} is negative: give zero or more{remedy}."
+    if largest and not TINIEST < largest < LARGEST:  # what is much less is none
         return f"A mass or rotary inertia of {largest:g}{there} has powers that are no floats: use other units."
-    given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
+    given = largest > 0 and scene.inertia != type(scene.inertia)()
     if scene.conservative or max(masses) > 0 or given:
         return ""
     return (
         f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter "
         f"of motion, so give it an inertia{there}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
     )
-
-
-def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
-    """Masses and rotary inertias of a scene at a ``load``, by default its own: of the rod at its samples."""
-    c, along = scene.constants(load), [scene.constants(load, s) for s in scene.samples()]
-    carried = [float(x.mass(c)) for x in scene.attachments if x.mass]
-    turned = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    carried += [number_of(scene.inertia.rho_A(there)) for there in along]
-    turned += [number_of(x) for there in along for x in scene.inertia.rho_I(there)]
-    return carried, turned
 
 
 def check_convexity(scene: Scene) -> None:
@@ -186,15 +169,15 @@ def _trouble_with_stiffness(scene: Scene, stiffness: np.ndarray) -> str:
             "The second derivative of the stored energy at the undeformed state is not finite{}: choose constants for "
             "which it is."
         )
-    if not stiffness.any():
+    largest = abs(stiffness).max()
+    if not largest:
         return (
             "The stored energy is flat at the undeformed state{}: write it as a function of the strains v and k whose "
             "second derivative there is not zero, with UFL (ufl.cosh), without math and numpy."
         )
-    if not TINIEST / scene.length**2 < abs(stiffness).max() < LARGEST / scene.length**2:
+    if not TINIEST / scene.length**2 < largest < LARGEST / scene.length**2:
         return (
-            f"The stiffness of {abs(stiffness).max():.3g}{{}} is so far from one that its powers are no floats: choose "
-            "other units."
+            f"The stiffness of {largest:.3g}{{}} is so far from one that its powers are no floats: choose other units."
         )
     balanced = in_lengths(stiffness, scene)
     if not is_definite(balanced):
@@ -225,9 +208,10 @@ def round_off_of_strains(scene: Scene) -> str:
     """How stiff the strains of a rod are whose round-off is felt in bending; empty for any other rod."""
     values = np.linalg.eigvalsh(in_lengths(scene.stiffness(), scene))
     ratio = values[-1] / values[0]
-    if ratio * EPS < FELT:
+    felt = ratio * float(np.finfo(float).eps)
+    if felt < 1e-3:  # of bending
         return ""
-    return f"Shear or stretch is {ratio:.0e} times as stiff as bending, and its round-off {ratio * EPS:.0e} of bending"
+    return f"Shear or stretch is {ratio:.0e} times as stiff as bending, and its round-off {felt:.0e} of bending"
 
 
 def is_definite(matrix: np.ndarray) -> bool:
@@ -235,19 +219,10 @@ def is_definite(matrix: np.ndarray) -> bool:
 
     So stiffnesses may differ by any factor: a stretch 1e14 times as stiff as bending hides no eigenvalue of bending.
     """
-    diagonal = matrix.diagonal()
-    if not (diagonal > 0.0).all():
+    if not (matrix.diagonal() > 0.0).all():
         return False
-    roots = np.sqrt(diagonal)
-    return bool(matrix.size == 0 or np.linalg.eigvalsh(matrix / roots[:, None] / roots)[0] > NEGLIGIBLE)
-
-
-def check_supports(scene: Scene) -> None:
-    """Check shapes, whether anything holds the rod, and whether the ends can be where they are asked to be."""
-    for side, end in zip(SIDES, scene.sides, strict=True):
-        end.check(side, scene)
-    check_drift(scene)
-    check_reach(scene)
+    roots = np.sqrt(matrix.diagonal())
+    return bool(np.linalg.eigvalsh(matrix / roots[:, None] / roots)[0] > NEGLIGIBLE)
 
 
 def check_drift(scene: Scene) -> None:
@@ -261,9 +236,7 @@ def check_drift(scene: Scene) -> None:
     if scene.closed or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
         return
     held = np.vstack([np.zeros(3), *(end.fixed(c) for end in scene.sides)])
-    if not held.any():
-        return
-    for i, direction in enumerate(np.eye(3)):
+    for i, direction in enumerate(np.eye(3) if held.any() else ()):
         if np.linalg.matrix_rank(np.vstack([held, direction])) > np.linalg.matrix_rank(held):
             raise SceneError(
                 f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
@@ -273,8 +246,7 @@ def check_drift(scene: Scene) -> None:
 
 def check_balance(scene: Scene) -> None:
     """Raise :class:`SceneError` where dead forces on the ends of a rod that nothing holds do not add up to zero."""
-    along = [x for x in scene.attachments if x.force]
-    if along or scene.distributed is not None or not scene.conservative:
+    if any(x.force for x in scene.attachments) or scene.distributed is not None or not scene.conservative:
         return
     for load in scene.loads():
         c = scene.constants(load)
@@ -300,14 +272,3 @@ def check_reach(scene: Scene) -> None:
                     f"At {scene.load} = {load:g} the ends are {distance:.6g} apart, but the rod is inextensible "
                     f"and only {scene.length:.6g} long: let it stretch, or move the ends together."
                 )
-
-
-def check_places(scene: Scene) -> None:
-    """Raise :class:`SceneError` for an ordinate, an attachment, a constraint or a break that is not on the rod."""
-    a, b = scene.interval
-    places = [("ordinate", s) for s in scene.ordinate.places] + [("break", s) for s in scene.breaks]
-    places += [("attachment", x.s) for x in scene.attachments]
-    places += [("constraint", x.s) for x in scene.constraints if x.s is not None]
-    for what, s in places:
-        if not a <= s <= b:
-            raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
