@@ -105,7 +105,7 @@ class SmoothnessIndicator:
         system = self.solver.system
         same = state or (system.metric * before).dot(after) >= 0
         apart = before - after if same else before + after
-        squares = self._squares(None, [apart]), self._squares(after, []) if state else self._squares(None, [after])
+        squares = self._squares(None, [apart]), self._squares(*((after, []) if state else (None, [after])))
         change, size = (float(system.comm.allreduce(np.sum(self.solver.shape.size @ parts))) for parts in squares)
         return float(np.sqrt(change / max(size, system.scene.length)))
 

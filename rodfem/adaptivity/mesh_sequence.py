@@ -1,6 +1,8 @@
-"""The discretisations of one run: one, or with an accuracy asked for as many as its branches need; and gaps.
+"""The meshes of one run: one, or with an accuracy asked for as many as its branches need; and gaps.
 
-Every point knows the number of its mesh.  Here meshes are made, and points carried from one to another.
+The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients tells
+how it has changed (:mod:`rodfem.adaptivity.grading`).  If it is too large, :class:`TooCoarse` is raised: the explorer
+has a mesh made for that state, carries the last points over, and goes on.  Every point knows the number of its mesh.
 
 At a gap an imperfection has taken a branch point apart: two branches, that would cross without it, bend away from each
 other.  The state and the load at which they would cross are known from :mod:`rodfem.continuation.singular`.  Steps in
@@ -11,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, log10
+from math import inf, isfinite, isnan, log10
 
 import numpy as np
 from mpi4py import MPI
@@ -19,9 +21,10 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, pieces_of, weights_of
-from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
+from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
@@ -30,38 +33,39 @@ from rodfem.fem.symmetries import may_slide
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import TINY, unit
+from rodfem.stability.inertia import ROUGH
+from rodfem.tolerances import SAME_LOAD, TINY, unit
 
-OF_A_RING = 1e-8
-"""Accuracy with which a uniform ring is computed at least."""
-ALMOST = 1e-6
-"""Part of an element that a piece of the rod may have more than a whole number of them."""
-
+TRIES, MOST = 4, 16
+"""Meshes tried at one place, and in a run."""
+GROWN, SELDOM = 1.5, 10
+"""An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
+NEAR = 0.1
+"""Points of a branch nearer to each other than this, in arclength, are at one place."""
 OWN_MESH = Remedy(
     "use {} and {} instead of an accuracy", *(Argument("Discretization", name) for name in ("elements", "degree"))
 )
-SHARE = 0.25
-"""Largest step near a gap, relative to the distance from where the branches would cross."""
 LEAST = 1e-6
-"""Least bound of a step."""
+"""Least bound of a step next to a gap."""
 ARM = 0.05
 """Distance, in the metric, at which the four arms that would meet are looked for."""
 
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:
     """Accuracy to work with: a mesh breaks the symmetry of a uniform ring along itself, which must not be seen."""
-    return min(accuracy, OF_A_RING) if may_slide(scene) and not scene.depends_on_s() else accuracy
+    uniform_ring = may_slide(scene) and not scene.depends_on_s()
+    return min(accuracy, 1e-8) if uniform_ring else accuracy  # below what counts as a drift
 
 
 def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
     """Discretisation to start with: few elements of nearly equal size, of a degree that grows with the digits.
 
-    The ``accuracy`` is that of loads and ordinates, relative to values greater than one.  The ``formulation`` is kept,
-    and breaks of the ``scene`` are vertices; each rank of ``comm`` has an element.
+    Breaks of the ``scene`` are vertices; each rank of ``comm`` has an element.
     """
     degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
     pieces = pieces_of(scene)
-    counts = np.ceil(np.diff(pieces) / scene.length * max(4, comm.size) - ALMOST).astype(int).clip(1)
+    almost = 1e-6  # part of an element that a piece may have more than a whole number of them
+    counts = np.ceil(np.diff(pieces) / scene.length * max(4, comm.size) - almost).astype(int).clip(1)
     inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
     vertices = tuple(map(float, np.concatenate([pieces[:1], *inner])))
     return Discretization(formulation, len(vertices) - 1, min(max(degree, 4), 9), vertices)
@@ -93,13 +97,12 @@ class Meshes:
         self.accuracy = None if accuracy is None else internal_accuracy(solver.system.scene, accuracy)
         self._companions: dict[int, Enriched] = {}
         self._indicators: dict[int, SmoothnessIndicator] = {}
-        if accuracy is not None:
-            self._weights = weights_of(solver.system.scene)
 
     def indicator(self, number: int) -> SmoothnessIndicator:
         """Smoothness indicator of a mesh."""
         if number not in self._indicators:
-            self._indicators[number] = SmoothnessIndicator(self.solvers[number], self._weights)
+            solver = self.solvers[number]
+            self._indicators[number] = SmoothnessIndicator(solver, weights_of(solver.system.scene))
         return self._indicators[number]
 
     def richer(self, number: int) -> Enriched:
@@ -107,14 +110,6 @@ class Meshes:
         if number not in self._companions:
             self._companions[number] = Enriched(self.solvers[number])
         return self._companions[number]
-
-    def error_of(self, special: SpecialPoint) -> float:
-        """Estimated error of a special point in load and ordinate, relative to those that exceed their natural size."""
-        units = self.solvers[0].units
-        error = special.ordinate_error / unit(special.point.ordinate, one=units.ordinate)
-        if special.kind.singular or special.test_function == "stretch":
-            error = max(error, special.error_estimate / unit(special.point.load, one=units.load))
-        return error
 
     def raised(self, trouble: TooCoarse, tries: int) -> BranchSolver:
         """Solver on the cheapest mesh for the state that was too coarse: one that there is, or a new one."""
@@ -141,38 +136,28 @@ class Meshes:
         self.solvers.append(new)
         return new
 
-    # --- points on another mesh --------------------------------------------------------------------------------
-
-    def state(self, x: PETSc.Vec, source: int, target: BranchSolver) -> PETSc.Vec:
-        """State of one mesh interpolated on another."""
-        return target.shape.restore(self.solvers[source].shape.sample(x))
-
-    def direction(self, d: PETSc.Vec, x: PETSc.Vec, source: int, target: BranchSolver) -> PETSc.Vec:
-        """Change ``d`` of the state ``x`` on mesh number ``source``, on that of a ``target``."""
-        return self.state(x + d, source, target) - self.state(x, source, target)
-
     def here(self, point: Point, target: BranchSolver) -> Point:
         """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""
         if point.mesh == target.mesh:
             return point
-        x = self.state(point.x, point.mesh, target)
-        tangent = None if point.tangent is None else self.direction(point.tangent, point.x, point.mesh, target)
+        source = self.solvers[point.mesh].shape
+        x, tangent = target.shape.restore(source.sample(point.x)), None
+        if point.tangent is not None:
+            tangent = target.shape.restore(source.sample(point.x + point.tangent)) - x
         return replace(point, x=x, tangent=tangent, mesh=target.mesh)
 
-    def carried(self, point: Point, target: BranchSolver, fixed_load: bool) -> Point | None:
+    def _carried(self, point: Point, target: BranchSolver, fixed_load: bool) -> Point | None:
         """Point solved on another mesh, on the plane across its tangent or at its load; None where that fails."""
         guess = self.here(point, target)
         if guess.tangent is None:
             return None
-        x, system = guess.x, target.system
-        row = target.axis if fixed_load else target.row(guess.tangent)
-        outcome = correct(system, x, row, reach=0.5)
+        x, row = guess.x, target.row(guess.tangent)
+        outcome = correct(target.system, x, target.axis if fixed_load else row, reach=0.5)
         if fixed_load and not outcome.converged:  # too far from a state on a far finer mesh: from the scene's start
             x, outcome = first_equilibrium(target, point.load)
         if not outcome.converged:
             return None
-        side = target.row(guess.tangent)
-        return target.point(x, point.arclength, target.tangent(side, at=x), outcome)
+        return target.point(x, point.arclength, target.tangent(row, at=x), outcome)
 
     def carry(
         self, history: Sequence[Point], target: BranchSolver, from_branch_point: bool
@@ -188,7 +173,7 @@ class Meshes:
         pairs: list[tuple[Point, Point]] = []
         for number in range(len(history) - 1, first - 1, -1):
             old = history[number]
-            new = self.carried(old, target, fixed_load=starts and number == 0)
+            new = self._carried(old, target, fixed_load=starts and number == 0)
             if new is not None and (pairs or number == first or new.negative == old.negative):
                 pairs.insert(0, (old, new))
             if pairs and (pairs[0][0] is not old or len(pairs) == 4):
@@ -198,6 +183,139 @@ class Meshes:
                 f"The branch could not be carried to another mesh near load {history[-1].load:.8g}", OWN_MESH
             )
         return pairs
+
+
+class AccuracyControl:
+    """Watches over the accuracy of the points of one branch."""
+
+    def __init__(self, meshes: Meshes, bounds: tuple[float, float]) -> None:
+        """Begin a branch; its points at the ``bounds`` of the load are judged at that very load."""
+        self.meshes, self.bounds = meshes, bounds
+        self.units = meshes.solvers[0].units
+        self.accuracy = meshes.accuracy or np.inf
+        self.checked: tuple[float, float, int] | None = None  # indicator and error of a point, and the points since
+        self.place, self.error, self.tries = -np.inf, np.inf, 0
+        self.excused = -np.inf
+
+    def row(self, point: Point, solver: BranchSolver) -> None:
+        """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
+        if self.meshes.accuracy is None:
+            return
+        indicator = self.meshes.indicator(solver.mesh)(point.x).indicator
+        if self.checked is not None and self.checked[2] < SELDOM and not self._at_bound(point):
+            before, error, since = self.checked
+            point.estimate = error * max(1.0, indicator / before)
+            if indicator < GROWN * before or 10 * point.estimate < self.accuracy:
+                self.checked = before, error, since + 1
+                return
+        with solver.system.clock.scope("error bars"):
+            point.estimate = self._computed(point)
+        self.checked = max(indicator, TINY), point.estimate, 0
+        if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
+            raise TooCoarse(point, point.estimate)
+
+    def special(self, special: SpecialPoint) -> None:
+        """Estimate the errors of a special point; raises :class:`TooCoarse` where another mesh may help."""
+        if self.meshes.accuracy is None:
+            return
+        with self.meshes.solvers[special.point.mesh].system.clock.scope("error bars"):
+            self.meshes.richer(special.point.mesh).estimate(special)
+        self.check(special)
+
+    def check(self, special: SpecialPoint) -> None:
+        """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
+        error = self._error_of(special)
+        located = special.located_to / unit(special.point.load, one=self.units.load)
+        if error > self.accuracy > located and special.point.arclength > self.excused:
+            order = 2.0 if special.test_function == "stretch" else 1.0
+            raise TooCoarse(special.point, error, special.null_vectors, order)
+
+    def _error_of(self, special: SpecialPoint) -> float:
+        """Error of a special point in load and ordinate, relative to those that exceed their natural size.
+
+        It is never within the accuracy where the mesh does not resolve its state.
+        """
+        error = special.ordinate_error / unit(special.point.ordinate, one=self.units.ordinate)
+        if special.kind.singular or special.test_function == "stretch":
+            error = max(error, special.error_estimate / unit(special.point.load, one=self.units.load))
+        return max(error, GROWN * self.accuracy) if special.resolved is False else error
+
+    def drifting(self, point: Point) -> None:
+        """Raise :class:`TooCoarse` for a point at which the mesh breaks a symmetry, where another mesh may help."""
+        if self.meshes.accuracy is not None and point.arclength > self.excused:
+            raise TooCoarse(point, inf, why="the mesh breaks a symmetry")
+
+    def label(self, special: SpecialPoint) -> None:
+        """Say at a special point whether the accuracy was not reached, and why."""
+        if self.meshes.accuracy is None:
+            return
+        special.point.estimate = error = self._error_of(special)
+        if error > self.accuracy:
+            located = special.located_to / unit(special.point.load, one=self.units.load) > self.accuracy
+            why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
+            missed = f"accuracy {self.accuracy:g} not reached: {why}"
+            special.note = f"{special.note}; {missed}" if special.note else missed
+
+    def summary(self, branch: Branch, observer: Observer) -> None:
+        """Say on which meshes a branch was traced, and the largest error of its points."""
+        if self.meshes.accuracy is None:
+            return
+        used = [self.meshes.solvers[number].system for number in sorted({p.mesh for p in branch.points})]
+        worst = max(p.estimate for p in branch.points if not isnan(p.estimate))
+        observer.accuracy(used, worst, self.meshes.accuracy)
+
+    def another(self, trouble: TooCoarse, observer: Observer) -> BranchSolver | None:
+        """Solver on a mesh for the state that was too coarse; None, which is reported, where no mesh helps there."""
+        point, helps = trouble.point, True
+        if abs(point.arclength - self.place) < NEAR:
+            self.tries += 1
+            helps = not isfinite(trouble.error) or trouble.error < 0.5 * self.error
+        else:
+            self.tries = 0
+        self.place, self.error, self.checked = point.arclength, trouble.error, None
+        if helps and self.tries < TRIES and len(self.meshes.solvers) < MOST:
+            return self.meshes.raised(trouble, self.tries)
+        self.excused = point.arclength + NEAR
+        why = f"{self.tries + 1} finer meshes did not do" if helps else "finer meshes do not lower the error"
+        if len(self.meshes.solvers) >= MOST:
+            why = f"{MOST} meshes are the most"
+        words = f"The accuracy is not reached near load {point.load:.6g} ({trouble}): {why}."
+        observer.warn(Remark(words, point.load))
+        return None
+
+    def _at_bound(self, point: Point) -> bool:
+        return min(abs(point.load - bound) for bound in self.bounds) < SAME_LOAD * abs(self.bounds[1] - self.bounds[0])
+
+    def _computed(self, point: Point) -> float:
+        """Error of a point across its branch, or at its load on a bound; :class:`TooCoarse` where its index errs."""
+        richer, solver = self.meshes.richer(point.mesh), self.meshes.solvers[point.mesh]
+        richer.solver.damp(solver.system.damping > 0)
+        try:
+            again = richer.again(point, fixed_load=self._at_bound(point))
+        except ConvergenceError:
+            return inf
+        negative = _index(point, richer, again.x)
+        if negative != point.negative and point.arclength > self.excused:
+            modes = solver.inertia.modes_near_zero(point.x, abs(negative - point.negative), ROUGH)
+            raise TooCoarse(point, inf, modes, why=f"index {point.negative}, {negative} on a richer mesh")
+        values = (point.load, self.units.load), (point.ordinate, self.units.ordinate)
+        error = max(e / unit(v, one=one) for e, (v, one) in zip(again.errors(point), values, strict=True))
+        return error if again.resolved else max(error, GROWN * self.accuracy)
+
+
+def _index(point: Point, richer: Enriched, x: PETSc.Vec) -> int:
+    """Index on the richer mesh; the point's own if eigenvalues that are zero on one of the two make up for it.
+
+    One factorisation suffices if it is the same; else a second one separates zero eigenvalues from others.
+    """
+    inertia = richer.solver.inertia
+    found = inertia.at(x)
+    drifts = found.drifts
+    below = found.below(-inertia.tolerance)
+    if below < point.negative:
+        index = found.count()
+        return point.negative if point.negative <= index.negative + max(index.zero - drifts, 0) else index.negative
+    return point.negative if below <= point.negative + max(point.zero - drifts, 0) else below
 
 
 class Gap(Exception):
@@ -216,32 +334,34 @@ class Gaps:
         self.meshes = meshes
         self.known: list[Gap] = []
 
-    def examine(self, solver: BranchSolver, special: SpecialPoint, found: SingularState) -> Gap | None:
+    def examine(self, special: SpecialPoint, found: SingularState) -> Gap | None:
         """The gap at a singular state whose unfolding parameters are not round-off; None where the mesh makes them.
 
         A mesh need not have a symmetry of the scene: on a richer one its own unfolding is smaller.
         """
         richer = self.meshes.richer(special.point.mesh)
-        x = richer.transfer(found.x, state=True)
         modes = [richer.transfer(v, state=False) for v in special.null_vectors]
         orthonormalize(modes, richer.system.metric)
-        again = SingularSystem(richer.solver, modes, len(modes), fold=False).solve(x)
+        states = SingularSystem(richer.solver, modes, len(modes), fold=False)
+        again = states.solve(richer.transfer(found.x, state=True))
         if again is not None and again.size < 0.5 * found.size + again.noise:  # lowered by half: the mesh's own
             return None
         return Gap(special, found)
 
     def open(self, gap: Gap, solver: BranchSolver) -> bool:
         """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
-        for known in self.known:
-            if solver.system.distance(gap.point.x, self.meshes.here(known.point, solver).x) < LEAST:
-                return False
+        if min(self._distances(solver, gap.point), default=inf) < LEAST:
+            return False
         self.known.append(gap)
         return True
 
     def reach(self, solver: BranchSolver, point: Point) -> float:
-        """Largest step from a point: in proportion to the distance from the nearest gap."""
-        apart = (solver.system.distance(point.x, self.meshes.here(gap.point, solver).x) for gap in self.known)
-        return max(SHARE * min(apart, default=inf), LEAST)
+        """Largest step from a point: a quarter of the distance from the nearest gap."""
+        return max(min(self._distances(solver, point), default=inf) / 4, LEAST)
+
+    def _distances(self, solver: BranchSolver, point: Point) -> list[float]:
+        """Distances of a point from all gaps."""
+        return [solver.system.distance(point.x, self.meshes.here(gap.point, solver).x) for gap in self.known]
 
 
 def arms(solver: BranchSolver, gap: Gap) -> list[Point]:

@@ -35,7 +35,6 @@ from rodfem.continuation.kinds import EVENT, FOLD
 from rodfem.continuation.observer import Remark
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL, ROUGH, Factored
 from rodfem.stability.motion_names import MotionNames
@@ -49,8 +48,8 @@ BARS = "richer meshes may decide that, ask for error bars"
 class SoftStates:
     """Finds and names the soft modes of states of one solver.
 
-    With ``richer``, which makes a companion of its mesh, their uncertainty has the error of the mesh in it.
-    ``uncompared`` says why the index of the last state was not compared with that of the richer mesh, if it was to be.
+    With ``richer``, which makes a companion of its mesh, their uncertainty has the error of the mesh in it;
+    ``uncompared`` says why the index of the last state was not compared with that of the richer mesh.
     """
 
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
@@ -77,13 +76,16 @@ class SoftStates:
         eigenvalue.
         """
         inertia, metric = self.solver.inertia, self.solver.system.metric
-        least = self._doubtful(point, fixed_load, compare=compare)
-        if least is None:
+        clear, self.uncompared = self._is_clear(point), ""
+        # eigenvalues nearest zero to be judged, soft ones apart: those of another sign on the richer mesh
+        least = self._differing(point, fixed_load) if compare and self._richer else 0
+        if clear and not least:
             return False
         near = near_zero(inertia.at(point.x), least=least)
         branch = [point.tangent] if family and point.tangent is not None else []
-        if branch:
-            near = _across_branch(metric, near, branch)
+        if branch:  # its own eigenvalue is a zero, and none of those that are judged
+            kept = [i for i, v in enumerate(near.vectors) if across(metric, [v], branch)]
+            near = near.at(kept, near.rest + len(near.vectors) - len(kept))
         modes = self._modes(point, near)
         others = [i for i, v in enumerate(near.vectors) if across(metric, [v], vanishing)]
         for i in set(range(len(modes))).difference(others):
@@ -97,11 +99,7 @@ class SoftStates:
         return bool(point.soft)
 
     def _modes(self, point: Point, near: NearZero) -> list[SoftMode]:
-        """Eigenvalues ``near`` zero of a ``point`` as soft modes of its mesh.
-
-        Without a richer mesh those within the tolerance of a count are undecided: round-off alone does not tell what
-        is zero for the rod.
-        """
+        """Eigenvalues ``near`` zero as soft modes; without a richer mesh undecided within the tolerance of a count."""
         least, bars = 0.0 if self._richer else self.solver.inertia.tolerance, near.uncertainty
         bars = np.where(abs(near.values) > bars, np.maximum(bars, least), bars)
         names = self.names(point.x, near.vectors)
@@ -120,21 +118,10 @@ class SoftStates:
         limit = soft_limit(self.solver.inertia)
         point.soft = [m for m in found.soft if not m.decided or abs(m.value) < limit]
 
-    def _doubtful(self, point: Point, fixed_load: bool, *, compare: bool) -> int | None:
-        """Number of eigenvalues nearest zero to be judged, soft ones apart; None if there is nothing to judge.
-
-        Those of another sign on the richer mesh, and the one nearest zero if it has another value there.
-        """
-        nearest, self.uncompared = self._nearest(point), ""
-        differing = self._differing(point, fixed_load) if compare and self._richer else 0
-        return None if nearest and not differing else differing
-
-    def _nearest(self, point: Point) -> float:
-        """Estimated distance of the nearest eigenvalue from zero; 0 where one factorisation does not tell the index."""
-        if point.nearest:
-            return point.nearest
-        regular = self.solver.regular.at(point.x)
-        return 0.0 if regular is None or regular.index is None else regular.index.nearest
+    def _is_clear(self, point: Point) -> bool:
+        """Whether one factorisation told the index of a point, with a distance of the nearest eigenvalue from zero."""
+        regular = None if point.nearest else self.solver.regular.at(point.x)
+        return bool(point.nearest or (regular and regular.index and regular.index.nearest))
 
     def _differing(self, point: Point, fixed_load: bool) -> int:
         """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one.
@@ -145,7 +132,8 @@ class SoftStates:
             richer = self._companion(0)
             try:
                 there, again = _on(richer, point, fixed_load)
-                found, inertia = richer.solver.inertia.at(there.x), richer.solver.inertia
+                inertia = richer.solver.inertia
+                found = inertia.at(there.x)
                 below = found.below(-inertia.tolerance)
                 if below == point.negative:
                     self.uncompared = "" if again.resolved else again.unlike(point.load)
@@ -181,7 +169,8 @@ class SoftStates:
             richer = self._companion(level)
             try:
                 point, again = _on(richer, point, fixed_load, soft=soft)
-                zeros = [_unit(richer.system, richer.transfer(v, state=False)) for v in zeros]
+                zeros = [richer.transfer(v, state=False) for v in zeros]
+                zeros = [v / richer.system.norm(v) for v in zeros]
                 finer, rounding = _nearest(richer.solver, point, len(modes), zeros)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
@@ -204,12 +193,6 @@ class SoftStates:
         if level == len(self._companions):
             self._companions.append(Enriched(self._companions[-1].solver) if level else self._richer[0]())
         return self._companions[level]
-
-
-def _across_branch(metric: PETSc.Mat, near: NearZero, branch: Sequence[PETSc.Vec]) -> NearZero:
-    """Eigenvalues without that of a ``branch`` at one load, which is a zero, and none of those that are judged."""
-    kept = [i for i, v in enumerate(near.vectors) if across(metric, [v], branch)]
-    return near.at(kept, near.rest + len(near.vectors) - len(kept))
 
 
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
@@ -235,12 +218,6 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
         raise ConvergenceError(again.unlike(point.load))
     tangent = None if point.tangent is None else richer.transfer(point.tangent, state=False)
     return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again
-
-
-def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
-    """A vector of a system, which is changed, with metric norm 1."""
-    v.scale(1.0 / system.norm(v))
-    return v
 
 
 def _nearest(

@@ -286,7 +286,7 @@ class SpecialSearch:
 
     def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> Gap | None:
         """The gap at a singular state whose unfolding parameters are not round-off; raised unless it is known."""
-        gap = self.gaps.examine(piece.solver, special_point(piece, at, found, fold=False), found)
+        gap = self.gaps.examine(special_point(piece, at, found, fold=False), found)
         if gap is not None and not ended and self.gaps.open(gap, piece.solver):
             raise gap
         return gap

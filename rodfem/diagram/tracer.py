@@ -7,9 +7,8 @@ from contextlib import AbstractContextManager
 from functools import cache
 from math import isnan
 
-from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible
-from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes, TooCoarse
+from rodfem.adaptivity.mesh_sequence import AccuracyControl, Gap, Gaps, Meshes, TooCoarse
 from rodfem.adaptivity.soft_states import SoftRows
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
