@@ -165,10 +165,10 @@ FAULTS = {
         "tests/diagram/test_load_at_an_end.py",
     ),
     "asked-row": Fault(
-        'rodfem/diagram/events.py',
-        '        yield arc.b\n',
-        '        yield replace(arc.b)\n',
-        'tests/diagram/test_load_at_an_end.py',
+        "rodfem/diagram/events.py",
+        "        yield arc.b\n",
+        "        yield replace(arc.b)\n",
+        "tests/diagram/test_load_at_an_end.py",
     ),
     "start-anew": Fault(
         "rodfem/diagram/tracer.py",
@@ -331,10 +331,10 @@ FAULTS = {
         "tests/hard/test_fuzz.py",
     ),
     "steps-are-short-from-where-a-branch-goes-back-to": Fault(
-        'rodfem/diagram/special_search.py',
-        'max(largest, since - s)',
-        'largest',
-        'tests/diagram/test_many_returns.py',
+        "rodfem/diagram/special_search.py",
+        "max(largest, since - s)",
+        "largest",
+        "tests/diagram/test_many_returns.py",
     ),
     "bars-of-a-double-point-hold-for-one-load": Fault(
         f"{CONTINUATION}branch.py",

@@ -215,57 +215,33 @@ def defect(system: System, rows: Sequence[Point]) -> float:
     return float(system.norm(rest))
 
 
-class RowCheck:
-    """Checks that points of one solver are equilibria of unit quaternions; collective over its ranks."""
+def require_equilibrium(solver: BranchSolver, point: Point) -> None:
+    """Raise :class:`ConvergenceError` for a row that is no equilibrium of unit quaternions; collective."""
+    system, x = solver.system, point.x
+    where = f"At {system.scene.load} = {point.load:.8g}"
+    stretched = 0.0
+    if "q" in system.fields.dofs:
+        norms = np.sum(system.at(x).values("q") ** 2, axis=-1)
+        stretched = system.fields.comm.allreduce(float(abs(norms - 1.0).max(initial=0.0)), op=MPI.MAX)
+    if not stretched <= VIOLATED:
+        raise ConvergenceError(
+            f"{where} a quaternion has a squared norm that differs from one by {stretched:.1e}: use more elements or "
+            "smaller steps."
+        )
+    system.set_phase(x)
+    equations = system.new_vector()
+    system.at(x).residual(equations)
+    worst = system.in_units(equations, 1).norm(PETSc.NormType.INFINITY)
+    if not worst <= VIOLATED and not worst <= _round_off(system, x):
+        raise ConvergenceError(
+            f"{where} the state is no equilibrium: its equations are violated by {worst:.1e}; use smaller steps."
+        )
 
-    def __init__(self, solver: BranchSolver) -> None:
-        self.solver, self.system = solver, solver.system
-        self._equations = solver.system.new_vector()
 
-    def __call__(self, point: Point) -> None:
-        """Check a point; raises :class:`ConvergenceError` that names the equation, or the norm, that is violated."""
-        where = f"At {self.system.scene.load} = {point.load:.8g}"
-        stretched = self._stretched(point.x)
-        if not stretched <= VIOLATED:
-            raise ConvergenceError(
-                f"{where} a quaternion has a squared norm that differs from one by {stretched:.1e}: use more elements "
-                "or smaller steps."
-            )
-        number, worst = self._residual(point.x)
-        if not worst <= VIOLATED and not worst <= self._round_off(point.x):
-            raise ConvergenceError(
-                f"{where} the state is no equilibrium: the equation of {self._equation(number)} is violated by "
-                f"{worst:.1e}; use smaller steps."
-            )
-
-    def _residual(self, x: PETSc.Vec) -> tuple[int, float]:
-        """Number and size, in natural units, of the largest residual."""
-        self.system.set_phase(x)
-        self.system.at(x).residual(self._equations)
-        sizes = self.system.in_units(self._equations, 1)
-        sizes.abs()
-        return sizes.max()
-
-    def _round_off(self, x: PETSc.Vec) -> float:
-        """Round-off of the product of the second variation with the state, in natural units."""
-        system, matrix = self.system, self.system.state_matrix()
-        system.at(x).assemble_into(matrix, system.equations.jacobian)
-        matrix.assemble()
-        sizes = system.matrix_in_units(matrix), system.in_units(x, -1)
-        return 1e3 * EPS * float(np.prod([size.norm(PETSc.NormType.INFINITY) for size in sizes]))
-
-    def _stretched(self, x: PETSc.Vec) -> float:
-        """Largest difference of the squared norm of a quaternion from one."""
-        fields = self.system.fields
-        if "q" not in fields.dofs:
-            return 0.0
-        norms = np.sum(self.system.at(x).values("q") ** 2, axis=-1)
-        worst = float(abs(norms - 1.0).max(initial=0.0))
-        return worst if fields.comm.size == 1 else float(fields.comm.allreduce(worst, op=MPI.MAX))
-
-    def _equation(self, number: int) -> str:
-        """Name of the unknown with a ``number``, whose equation is that of the same row."""
-        fields = self.system.fields
-        found = [name for name, i in fields.scalars.items() if i == number]
-        found += [name for name, dofs in fields.dofs.items() if (fields.number[dofs] == number).any()]
-        return str(next(name for names in fields.comm.allgather(found) for name in names))
+def _round_off(system: System, x: PETSc.Vec) -> float:
+    """Round-off of the product of the second variation with the state, in natural units."""
+    matrix = system.state_matrix()
+    system.at(x).assemble_into(matrix, system.equations.jacobian)
+    matrix.assemble()
+    sizes = system.matrix_in_units(matrix), system.in_units(x, -1)
+    return 1e3 * EPS * float(np.prod([size.norm(PETSc.NormType.INFINITY) for size in sizes]))

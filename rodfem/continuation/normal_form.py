@@ -4,18 +4,15 @@ With ``x`` the change of the scene's ordinate, a pitchfork obeys ``load = load_b
 quadratic in the amplitude (a shortening, say), ``load = load_b + c x^2 + ...`` where it is linear (a displacement, or a
 shortening and part of a displacement).  An ordinate that does not change along the branch to leading order, such as a
 position on the axis, or the size of a displacement where the load is no even function of it, says nothing of it: ``x``
-is the distance in the metric then.  A pitchfork is supercritical where the branch exists on the side on which the index
-of the branch that it leaves is higher, else subcritical.
+is the distance in the metric then.
 
 The power series of a load in the amplitude converges up to the nearest other point at which the branch turns, or meets
-another one, and that may be near: of two branch points about to merge, or a fold next to a transcritical point.
-Amplitudes are made smaller until the series is resolved.
-
-Leading coefficients come from the states on both sides of a point.  Values at the amplitudes ``a`` and ``-a`` tell the
-even part of a function from its odd one exactly.  Either is a power of ``a`` times a series in ``a^2``, of which a
-polynomial through four amplitudes has the leading coefficient.  The size of a displacement is not smooth: it is ``|a|``
-times a series in ``a``, even to leading order.  Where neither is so (a size plus a shortening) the series has all
-powers, and its leading coefficient is known less well.
+another one: amplitudes are made smaller until the series is resolved.  Leading coefficients come from the states on
+both sides of a point.  Values at the amplitudes ``a`` and ``-a`` tell the even part of a function from its odd one
+exactly.  Either is a power of ``a`` times a series in ``a^2``, of which a polynomial through four amplitudes has the
+leading coefficient.  The size of a displacement is not smooth: it is ``|a|`` times a series in ``a``, even to leading
+order.  Where neither is so (a size plus a shortening) the series has all powers, and its leading coefficient is known
+less well.
 """
 
 from __future__ import annotations
@@ -40,46 +37,36 @@ from rodfem.tolerances import NEGLIGIBLE, round_off
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved on both sides: half of eight Chebyshev nodes."""
-SCALES = tuple(4.0**-i for i in range(4))
-"""Factors of the amplitudes, of which the first is taken at which the series is resolved, else that of least error."""
 RESOLVED = 1e-3
 """Uncertainty of a coefficient, relative to it, part by which a load is no even function, and other terms of an
 ordinate, of a resolved series."""
 ODD = 0.1
 """Part of the change of the load that is odd in the amplitude, from which on a branch is transcritical."""
-OFFSET = 1e-3
-"""Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 SEEN = 100
 """Ratio of a change of a load or an ordinate to the uncertainty of where it is measured from, for which it counts."""
 SIZE, LINEAR, QUADRATIC = "size", "linear", "quadratic"
 """Leading terms of an ordinate: ``|a|``, ``a`` and ``a^2``."""
-BETWEEN = 1.5
-"""An even part that grows by a greater power of the amplitude than this, from the least one to the next, has no
-``|a|``."""
 
 
 @dataclass(frozen=True)
 class Leading:
-    """Leading coefficient of a series: ``best`` by all amplitudes, ``rough`` by all but the largest.
+    """Leading coefficient of a series."""
 
-    ``left`` is what the uncertainty of the values leaves of it.
-    """
-
-    best: float
-    rough: float
-    left: float
+    best: float  # by all amplitudes
+    rough: float  # by all but the largest
+    left: float  # what the uncertainty of the values leaves of it
 
     @property
     def missed(self) -> float:
         """Uncertainty of the coefficient."""
         return abs(self.best - self.rough) + self.left
 
-    def told(self, least: float = 0.0) -> bool:
-        """Whether it is told from zero, and is more than ``least``."""
+    def significant(self, least: float = 0.0) -> bool:
+        """Whether it is certainly not zero, and more than ``least``."""
         return abs(self.best) > max(least, self.missed)
 
     def over(self, other: Leading, power: int) -> tuple[float, float]:
-        """Ratio to a ``power`` of another coefficient, which is told from zero, and its uncertainty."""
+        """Ratio to a ``power`` of another coefficient, which is significant, and its uncertainty."""
         best, size = self.best / other.best**power, abs(other.best)
         left = (abs(self.best) + self.left) / (size - other.left) ** power - abs(self.best) / size**power
         return best, abs(best - self.rough / other.rough**power) + left
@@ -99,42 +86,33 @@ def leading(amplitudes: np.ndarray, values: np.ndarray, power: int, left: float,
 
     ``values`` (m,) at the ``amplitudes`` (m,), from the largest to the least, are each uncertain by ``left``.
     """
-    best, rough = (_weights(amplitudes[skip:], power, step) for skip in (0, 1))
-    return Leading(float(best @ values), float(rough @ values[1:]), left * float(np.abs(best).sum()))
 
+    def weights(a: np.ndarray) -> np.ndarray:
+        """Factors of values whose sum is the leading coefficient of the polynomial."""
+        return np.asarray(np.linalg.inv(np.vander(a**step, len(a), increasing=True))[0] / a**power)
 
-def _weights(a: np.ndarray, power: int, step: int) -> np.ndarray:
-    """Factors of values at the amplitudes ``a`` (m,) whose sum is the leading coefficient of the polynomial."""
-    first = np.linalg.inv(np.vander(a**step, len(a), increasing=True))[0]
-    return np.asarray(first / a**power)
+    best = weights(amplitudes)
+    return Leading(float(best @ values), float(weights(amplitudes[1:]) @ values[1:]), left * float(np.abs(best).sum()))
 
 
 def leading_term(amplitudes: np.ndarray, ordinates: np.ndarray, left: float) -> tuple[str, Leading, float] | None:
     """How an ordinate changes: its leading term, the coefficient, and the part of it that a lower term may hide in.
 
-    None where it does not change to leading order, or not alike on both sides.  With ``x = o1 a + o2 a^2`` the linear
-    term leads up to the amplitude ``o1/o2``: where the ordinate has not changed visibly there the quadratic one is
-    taken, and what the other adds at the largest amplitude is the part.
-
-    Parameters
-    ----------
-    amplitudes
-        (m,), from the largest to the least.
-    ordinates
-        (2, m), changes at the amplitudes and at their opposites, over the natural size of the ordinate.
-    left
-        Uncertainty of each of them.
+    The ``ordinates`` (2, m), each uncertain by ``left``, are changes at the amplitudes and at their opposites, over the
+    natural size.  None where they do not change to leading order, or not alike on both sides.  With ``x = o1 a + o2
+    a^2`` the linear term leads up to the amplitude ``o1/o2``: where the ordinate has not changed visibly there the
+    quadratic one is taken, and what the other adds at the largest amplitude is the part.
     """
     even, odd = parts(ordinates)
     if np.abs(ordinates).max() <= SEEN * left:
         return None
     linear, quadratic = leading(amplitudes, odd, 1, left), leading(amplitudes, even, 2, left)
     size = _size(amplitudes, even, left)
-    if size is not None and size.told(max(NEGLIGIBLE, RESOLVED * abs(linear.best))):
-        differs = leading(amplitudes, odd, 1, left, step=1).told(RESOLVED * abs(size.best))
+    if size is not None and size.significant(max(NEGLIGIBLE, RESOLVED * abs(linear.best))):
+        differs = leading(amplitudes, odd, 1, left, step=1).significant(RESOLVED * abs(size.best))
         return None if differs else (SIZE, size, 0.0)
-    turns = quadratic.told(NEGLIGIBLE)
-    if linear.told(NEGLIGIBLE) and not (turns and linear.best**2 <= SEEN * left * abs(quadratic.best)):
+    turns = quadratic.significant(NEGLIGIBLE)
+    if linear.significant(NEGLIGIBLE) and not (turns and linear.best**2 <= SEEN * left * abs(quadratic.best)):
         return LINEAR, linear, 0.0
     hidden = (abs(linear.best) + linear.missed) / amplitudes[0]
     return (QUADRATIC, quadratic, hidden / abs(quadratic.best)) if turns else None
@@ -142,7 +120,7 @@ def leading_term(amplitudes: np.ndarray, ordinates: np.ndarray, left: float) -> 
 
 def _size(amplitudes: np.ndarray, even: np.ndarray, left: float) -> Leading | None:
     """Coefficient of ``|a|`` in the ``even`` part (m,) of an ordinate; None where that has no such term."""
-    if abs(even[-2]) > abs(even[-1]) * (amplitudes[-2] / amplitudes[-1]) ** BETWEEN:
+    if abs(even[-2]) > abs(even[-1]) * (amplitudes[-2] / amplitudes[-1]) ** 1.5:  # it grows by a greater power
         return None
     any_powers, odd_powers = (leading(amplitudes, even, 1, left, step) for step in (1, 2))
     agree = abs(odd_powers.best - any_powers.best) <= any_powers.missed
@@ -155,7 +133,7 @@ Term = tuple[str, Leading, float] | None
 
 @dataclass(frozen=True)
 class Origin:
-    """A branch point: state ``x``, ``load``, ``ordinate``; uncertainties ``load_left``, ``ordinate_left`` of these."""
+    """A branch point, with the uncertainties of its load and ordinate."""
 
     x: PETSc.Vec
     load: float
@@ -175,20 +153,21 @@ def origin_of(solver: BranchSolver, special: SpecialPoint) -> Origin:
 
 def ordinate_along(solver: BranchSolver, x: PETSc.Vec, direction: PETSc.Vec) -> float:
     """Change of the ordinate of ``x`` along a direction, of unit size in the metric."""
-    nearby = x + direction * (OFFSET / solver.system.norm(direction))
-    return (solver.shape.ordinate(nearby) - solver.shape.ordinate(x)) / OFFSET
+    offset = 1e-3  # in the metric
+    nearby = x + direction * (offset / solver.system.norm(direction))
+    return (solver.shape.ordinate(nearby) - solver.shape.ordinate(x)) / offset
 
 
 def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -> NormalForm | None:
     """Normal form of the branch that leaves ``origin`` along ``direction``; None if nearby points do not determine it.
 
-    At a pitchfork the load is an even function of the amplitude, at a transcritical point it has a slope in it; the
-    ordinate has an even part and an odd one.  Polynomials through four amplitudes give their leading coefficients.
-    Uncertain is what those through three miss, what a slope of the load adds at a pitchfork, and what the location of
-    the branch point leaves open: of loads and ordinates that are measured from it, divided by a power of an amplitude.
+    At a pitchfork the load is an even function of the amplitude, at a transcritical point it has a slope in it.
+    Polynomials through four amplitudes give leading coefficients.  Uncertain is what those through three miss, what a
+    slope of the load adds at a pitchfork, and what the location of the branch point leaves open of loads and ordinates
+    that are measured from it.  Of several scales the first at which the series is resolved is taken, else the best.
     """
     row, best, seen = solver.row(direction), None, SEEN * origin.load_left
-    for scale in SCALES:
+    for scale in (1.0, 1 / 4, 1 / 16, 1 / 64):
         found = _at_scale(solver, origin, direction, row, scale)
         if found is None:
             continue
@@ -217,10 +196,10 @@ def _at_scale(
     """
     amplitudes, points = AMPLITUDES * scale, list[tuple[float, float]]()
     for a in (*amplitudes, *-amplitudes):
-        point = _near(solver, origin, direction, row, float(a))
-        if point is None:
+        x = origin.x + direction * float(a)
+        if not correct(solver.system, x, row, reach=2.0 * abs(float(a))).converged:
             return None
-        points.append(point)
+        points.append((solver.system.scalar(x) - origin.load, solver.shape.ordinate(x) - origin.ordinate))
     loads, ordinates = np.array(points).T.reshape(2, 2, len(amplitudes))
     span = solver.system.scene.span
     most, moved = np.abs(loads).max(), np.abs(ordinates).max()
@@ -240,10 +219,7 @@ def _at_scale(
 
 
 def _transcritical(load: Leading, x: Term, one: float) -> NormalForm:
-    """Slope of the load in the ordinate, of the natural size ``one``, from their leading terms in the amplitude.
-
-    In the distance where the ordinate has no linear one.
-    """
+    """Slope of the load in the ordinate, of a size ``one``, or in the distance where that has no linear term."""
     side = int(np.sign(load.best))
     if x is None or x[0] != LINEAR:
         best, left = load.over(ONE, 1)
@@ -253,27 +229,15 @@ def _transcritical(load: Leading, x: Term, one: float) -> NormalForm:
 
 
 def _pitchfork(load: Leading, hidden: float, x: Term, one: float) -> NormalForm:
-    """Leading coefficient of the load in the ordinate, of the natural size ``one``, from their terms in the amplitude.
+    """Leading coefficient of the load in the ordinate, of a natural size ``one``, or in the distance where it has none.
 
-    In the distance where the ordinate has none.  ``hidden`` is what a slope of the load adds to its coefficient at the
-    least amplitude.  The side is that of the coefficient: nearly degenerate pitchforks turn back in a fold, and at the
-    amplitudes the load may have the other sign.
+    ``hidden`` is what a slope of the load adds at the least amplitude.  The side is that of the coefficient: nearly
+    degenerate pitchforks turn back in a fold, and at the amplitudes the load may have the other sign.
     """
     term, of, part = (ONE, DISTANCE, 0.0) if x is None else (x[1], ORDINATE, x[2])
     power = 1 if x is not None and x[0] == QUADRATIC else 2
     size = 1.0 if x is None else one**power
     best, left = load.over(term, power)
     left += part * abs(best) + hidden / abs(term.best) ** power
-    side = int(np.sign(load.best)) if load.told() else 0
+    side = int(np.sign(load.best)) if load.significant() else 0
     return NormalForm(PITCHFORK, best / size, power, left / size, side, of)
-
-
-def _near(
-    solver: BranchSolver, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, amplitude: float
-) -> tuple[float, float] | None:
-    """Changes of load and ordinate at an amplitude of the bifurcating branch; None where Newton's method fails."""
-    system = solver.system
-    x = origin.x + direction * amplitude
-    if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
-        return None
-    return system.scalar(x) - origin.load, solver.shape.ordinate(x) - origin.ordinate

@@ -21,7 +21,7 @@ from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import Curves
-from rodfem.continuation.follow import RowCheck
+from rodfem.continuation.follow import require_equilibrium
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.diagram.collisions import Critical, Mean, Measuring, Side, located_flutter, zero_near
@@ -74,7 +74,6 @@ class Sweep:
         self.number = plan.spectrum or FREQUENCIES
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, observer.warn)
-        self.check = RowCheck(solver)
         self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._still = self.number  # frequencies that are zero at all loads
         self.branches: list[Branch] = []
@@ -231,10 +230,10 @@ class Sweep:
         """
         point = self._evaluated(x)
         try:
-            self.check(point)
+            require_equilibrium(self.solver, point)
         except ConvergenceError:
             point = self._evaluated(at_load(self.solver, x, point.load))
-            self.check(point)
+            require_equilibrium(self.solver, point)
         return point
 
     def _evaluated(self, x: PETSc.Vec) -> Point:

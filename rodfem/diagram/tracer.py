@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from functools import cache
 from math import isnan
 
 from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible
@@ -13,7 +12,7 @@ from rodfem.adaptivity.soft_states import SoftRows
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, RowCheck, follow
+from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, follow, require_equilibrium
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.switching import FIRST
@@ -54,7 +53,6 @@ class Tracer:
         self.zeros = PersistentZeros(observer, self.high - self.low)
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
         self.events = Events(plan.events)
-        self._checks = cache(lambda mesh: RowCheck(self.meshes.solvers[mesh]))
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         self.quadrature = Quadrature(self.meshes.solvers, observer, self.scene.load)
 
@@ -183,7 +181,7 @@ class Tracer:
         last = loop_end(branch, Step(self.solver, previous, row), self.high - self.low, self.here, self.alike)
         row = last or row
         self._check_symmetry(row)
-        self._check(row)
+        require_equilibrium(self.solvers[row.mesh], row)
         self.control.row(row, self.solver)
         self.zeros.check(self.solver, history, row, self.specials.undecided)
         if row.stretch <= 0:
@@ -221,7 +219,7 @@ class Tracer:
         known = [s for s in specials if s.point.arclength < a.arclength]
         if reason := self._insert(branch, [*known, *step.singular, *self._asked(step)]):
             return reason
-        self._check(step.b)
+        require_equilibrium(self.solvers[step.b.mesh], step.b)
         branch.append(step.b)
         self.observer.progress(branch, step.b)
         return END_OF_RANGE
@@ -251,7 +249,7 @@ class Tracer:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
             if not special.unfolding > ROUND_OFF:  # else the mesh has an equilibrium next to it only
-                self._check(special.point)
+                require_equilibrium(self.solvers[special.point.mesh], special.point)
             self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = ""
@@ -279,7 +277,7 @@ class Tracer:
             if reason := self._lost_convexity(branch, a, near):
                 return reason
             if near.negative != a.negative:  # what passes zero before is zero at the end once more
-                self._check(near)
+                require_equilibrium(self.solvers[near.mesh], near)
                 if reason := self._between(branch, a, near):
                     return reason
                 branch.append(near)
@@ -327,9 +325,6 @@ class Tracer:
                 f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
                 "accuracy."
             )
-
-    def _check(self, point: Point) -> None:
-        self._checks(point.mesh)(point)
 
     def _finish(self, branch: Branch) -> None:
         self.events.finish(self.observer)
