@@ -413,7 +413,8 @@ elements of high degree reach more digits with a narrower band.
 ## The rank of the constraints
 
 The smallest singular value of the gradients C of the pointwise constraints, and over the size h of an element, for
-linear elements: it vanishes like h, as in Table 5 of Kumar & Healey (2010).
+linear elements. It vanishes like h, as in Table 5 of Kumar & Healey (2010), whose continuous multipliers make it a
+third of this times the stretch ([why](theory/counting.md#full-rank)); here the rod is undeformed.
 
 {rank}"""
 

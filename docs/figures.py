@@ -33,15 +33,21 @@ RESULTS, PICTURES = HOME / "results" / "paper", HOME / "docs" / "paper"
 LOADS = {"cord": (40.0, 20.0), "hemitropic": (0.2, 0.5, 0.9), "ruler": (3.0, 6.0), "follower": ()}
 """Loads of the user points of each demo."""
 SHAPES = {
-    3: ("cord", (("straight", 60.0), ("branch 1", 40.0), ("branch 1.2", 20.0))),
-    6: ("hemitropic", (("branch 1", 0.2), ("branch 1", 0.5), ("branch 1", 0.9))),
-    9: ("ruler", (("plane", 3.0), ("branch 1", 6.0), ("branch 1", 12.0))),
+    "figures-1-4-7-10": (
+        ("cord", "straight", 60.0),
+        ("hemitropic", "straight", 0.0),
+        ("ruler", "plane", 3.0),
+        ("follower", "straight", 25.0),
+    ),
+    "figure-3": (("cord", "straight", 60.0), ("cord", "branch 1", 40.0), ("cord", "branch 1.2", 20.0)),
+    "figure-6": tuple(("hemitropic", "branch 1", load) for load in (0.2, 0.5, 0.9)),
+    "figure-9": (("ruler", "plane", 3.0), ("ruler", "branch 1", 6.0), ("ruler", "branch 1", 12.0)),
 }
-"""Figure: demo, and the states whose shapes it has, by branch and load."""
+"""Picture: the states whose shapes it has, by demo, branch and load."""
 DPI, WIDTH, TITLE = 150, 12.0, 0.3
-"""Dots per inch; width of three states, and height of their titles, in inches."""
-PANEL, PANELS = (900, 760), {"ruler": (760, 860)}
-"""Pixels of the picture of one state, and for the rods for which they are others."""
+"""Dots per inch; width of all states, and height of their titles, in inches."""
+PANEL, PANELS, FLAT = (900, 760), {"ruler": (760, 860)}, (720, 420)
+"""Pixels of the picture of one state, for the rods for which they are others, and for straight rods."""
 RADII = {"ruler": 0.017}
 """Mean radii of rods that are drawn thicker than by default."""
 MARGIN, WHITE = 24, 250
@@ -60,8 +66,8 @@ def main() -> None:
     both_signs(diagram("hemitropic"), "signed displacement of the mid point", PICTURES / "figure-5.png")
     both_signs(diagram("ruler"), "signed tip displacement out of the plane", PICTURES / "figure-8.png")
     draw_frequencies(diagram("follower"), PICTURES / "figure-11.png")
-    for number, (name, states) in SHAPES.items():
-        shapes(name, states, PICTURES / f"figure-{number}.png")
+    for name, states in SHAPES.items():
+        shapes(states, PICTURES / f"{name}.png")
 
 
 def diagram(name: str) -> dict[str, Any]:
@@ -82,30 +88,39 @@ def both_signs(found: dict[str, Any], label: str, path: Path) -> None:
         figure.savefig(path)
 
 
-def shapes(name: str, states: Sequence[tuple[str, float]], path: Path) -> None:
-    """Draw states of a demo, each by its branch and load, beside each other, all as the last one is looked at."""
-    file, found = RESULTS / name / "states.h5", diagram(name)
-    with h5py.File(file) as known:
-        rows = [int(np.argmin(abs(known[f"branches/{branch}/load"][:] - load))) for branch, load in states]
-    view = view_in(file, states[-1][0], rows[-1])
-    pictures = []
+def shapes(states: Sequence[tuple[str, str, float]], path: Path) -> None:
+    """Draw states of demos, each by its demo, branch and load, beside each other, as the last of its demo is seen."""
+    pictures, rows = [], [row_of(*state) for state in states]
+    views = {
+        name: view_in(RESULTS / name / "states.h5", branch, row)
+        for (name, branch, _), row in zip(states, rows, strict=True)
+    }
+    panels = {name: PANELS.get(name, PANEL) if len(views) == 1 else FLAT for name in views}
     with tempfile.TemporaryDirectory() as folder:
-        for (branch, _), row in zip(states, rows, strict=True):
-            kept = {"caption": "", "size": PANELS.get(name, PANEL), "view": view, "radius": RADII.get(name)}
-            picture = draw_shape(file, branch, row, Path(folder, "shape.png"), **kept)
+        for (name, branch, _), row in zip(states, rows, strict=True):
+            kept = {"caption": "", "size": panels[name], "view": views[name], "radius": RADII.get(name)}
+            picture = draw_shape(RESULTS / name / "states.h5", branch, row, Path(folder, "shape.png"), **kept)
             pictures.append(cropped(matplotlib.image.imread(picture)))
     tallest = max(len(picture) / len(picture[0]) for picture in pictures)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, WIDTH / len(states) * tallest + TITLE), dpi=DPI, layout="constrained")
-        for axes, picture, (branch, load), row in zip(
+        for axes, picture, (name, branch, load), row in zip(
             figure.subplots(1, len(states)), pictures, states, rows, strict=True
         ):
+            found = diagram(name)
             index = next(b["columns"]["negative"][row] for b in found["branches"] if b["name"] == branch)
             axes.imshow(picture)
             axes.set_axis_off()
             axes.set_anchor("N")
-            axes.set_title(f"{branch}, {axis_label(found)} = {load:g}, index {index}", fontsize=12)
+            title = found["title"] if len(views) > 1 else f"{branch}, {axis_label(found)} = {load:g}, index {index}"
+            axes.set_title(title, fontsize=12)
         figure.savefig(path)
+
+
+def row_of(name: str, branch: str, load: float) -> int:
+    """Row of a branch of a demo whose load is nearest to ``load``."""
+    with h5py.File(RESULTS / name / "states.h5") as known:
+        return int(np.argmin(abs(known[f"branches/{branch}/load"][:] - load)))
 
 
 def cropped(picture: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import pytest
 from small_states import plain
 
 from rodfem.kumar_healey.coordinates import Coordinates
+from rodfem.kumar_healey.reduction import cayley_shift
 from rodfem.stability.dependence import smallest_singular
 
 pytestmark = pytest.mark.alone
@@ -111,6 +112,15 @@ def test_inverses_of_a_projected_matrix() -> None:
         two.T @ np.linalg.inv(saddle)[:9, :9] @ two,
     ):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
+
+
+def test_cayley_transform() -> None:
+    """(29), with the parameters of section 5, of the eigenvalues themselves."""
+    values = np.array([-3.0, 0.5, 0.7, 4.0, 50.0])
+    a1 = cayley_shift(values)
+    first, second, *beyond = (values - (2 * values[1] - a1)) / (values - a1)
+    assert (first, second) == pytest.approx((3, -1))
+    assert np.max(np.abs(beyond)) < 1
 
 
 @pytest.mark.parametrize(("load", "index"), [(3.0, 0), (6.0, 1), (11.0, 2)])

@@ -10,7 +10,7 @@ ANSWERS = (
     Answer(
         "tension at which the straight cord of k0 = 3 pi loses stability",
         CORD,
-        "exact 5 pi^2, Kumar & Healey 2010",
+        "exact 5 pi^2",
         1e-6,
         "Let the tension go down from 60, where the straight cord is stable.",
         ((HEMITROPIC, "That is the hemitropic rod."), (9 * pi**2, "That is k0^2: the mode has w = 2 pi.")),
@@ -26,7 +26,7 @@ ANSWERS = (
     Answer(
         "tension at which a second direction of the straight cord becomes unstable",
         8.063525384097708,
-        "exact 9 pi^2 - w^2 with tan(w/2) = w/2, Kumar & Healey 2010",
+        "exact 9 pi^2 - w^2 with tan(w/2) = w/2",
         1e-6,
         "Let the tension go down to 1: the index changes from 1 to 2.",
         ((CORD, "That is the first direction."),),
