@@ -486,7 +486,7 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
             mesh = _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None:
-                check_start(found, plan.over(scene), recorder.warn)
+                check_start(found, plan.over(scene))
         asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
         recorder.system(found.system, plan.accuracy)
         if doubt := round_off_of_strains(scene):

@@ -6,6 +6,7 @@ Eigenvalues that stay zero along a branch, without a symmetry of the scene, are 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from math import isfinite, nan
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
@@ -21,14 +22,10 @@ ROWS = 4
 """Rows one after the other that have as many zero eigenvalues, before these are said to stay."""
 
 
-NO_NUMBER = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
-
-
 class PersistentZeros:
     """Watches the rows of a run for zero eigenvalues; an ``observer`` hears of the first that stay."""
 
     def __init__(self, observer: Observer, width: float) -> None:
-        """Nothing is said yet; ``width`` is that of the range of loads."""
         self.observer, self.width, self.reported = observer, width, False
 
     def extra(self, solver: BranchSolver, point: Point) -> int:
@@ -42,12 +39,10 @@ class PersistentZeros:
         solver.damp(_exact(solver, (point,), extra) if extra > 0 else 0)
 
     def check(self, solver: BranchSolver, history: Sequence[Point], point: Point, level: int) -> None:
-        """Damp Newton's method where eigenvalues stay zero, and say so once.
+        """Damp Newton's method where eigenvalues stay zero, and say so once; a branch has had ``level`` all along.
 
         With damping the tangent is one of other equations, by the tolerance of a count over the least eigenvalue: of
         one that is not zero but within that tolerance, next to a fold, the load's part of it has no digit.
-
-        ``history`` has the rows of a ``solver`` before the ``point``; a branch has had ``level`` zeros all along.
         """
         extra = self.extra(solver, point)
         recent = [p for p in history[-ROWS:] if p.arclength > 0.0]  # a branch point has zeros of its own
@@ -91,9 +86,8 @@ class Quadrature:
     """Examines branches on the meshes of several ``solvers``, and tells an ``observer`` what is left open."""
 
     def __init__(self, solvers: Sequence[BranchSolver], observer: Observer, load: str) -> None:
-        """Examine nothing yet; ``load`` is the name of the load."""
-        self.solvers, self.observer, self.load = solvers, observer, load
-        self._by_mesh: dict[int, QuadratureCheck] = {}
+        self.observer, self.load = observer, load
+        self._on = cache(lambda mesh: QuadratureCheck(solvers[mesh].system))
 
     def examine(self, branch: Branch) -> None:
         """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so.
@@ -102,17 +96,18 @@ class Quadrature:
         """
         first = branch.points[:1] if branch.parent is None else []
         asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
-        found = [(point, self._check(point)(point.x)) for point in first]
+        found = [(point, self._on(point.mesh)(point.x)) for point in first]
         found += [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
         self._kinks(branch, [*first, *(special.point for special in asked)])
-        undefined = [(point, NO_NUMBER) for point in branch.points if not isfinite(point.ordinate)]
+        none = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
+        undefined = [(point, none) for point in branch.points if not isfinite(point.ordinate)]
         for point, words in [each for each in found if each[1] and not each[0].kink][:1] + undefined[:1]:
             self.observer.warn(Remark(f"{branch.name}: at {self.load} = {point.load:.6g} {words}", point.load))
 
     def _without_bars(self, special: SpecialPoint) -> str:
         """Take the bars of a special point away where the equations are not integrated, and say why."""
         point = special.point
-        if words := self._check(point)(point.x):
+        if words := self._on(point.mesh)(point.x):
             special.error_estimate = special.ordinate_error = point.estimate = special.omega2_error = nan
             special.resolved = None
             special.note = "; ".join(filter(None, (special.note, "not estimated: see the warnings")))
@@ -120,10 +115,10 @@ class Quadrature:
 
     def _kinks(self, branch: Branch, asked: Sequence[Point]) -> None:
         """Leave the stability of rows on a kink undecided, and say so, where one of some points is on a kink."""
-        if not any(self._check(point).kink(point.x) for point in asked):
+        if not any(self._on(point.mesh).kink(point.x) for point in asked):
             return
         for point in branch.points:
-            point.kink = self._check(point).kink(point.x)
+            point.kink = self._on(point.mesh).kink(point.x)
         loads = [point.load for point in branch.points if point.kink]
         where = " to ".join(dict.fromkeys((f"{loads[0]:.6g}", f"{loads[-1]:.6g}")))
         words = (
@@ -131,8 +126,3 @@ class Quadrature:
             "derivative depends on the side, the index holds for one side only, and stability is undecided there."
         )
         self.observer.warn(Remark(words, *loads))
-
-    def _check(self, point: Point) -> QuadratureCheck:
-        if point.mesh not in self._by_mesh:
-            self._by_mesh[point.mesh] = QuadratureCheck(self.solvers[point.mesh].system)
-        return self._by_mesh[point.mesh]

@@ -8,7 +8,7 @@ each by itself, since a rod that is pressed together much may turn by little.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import copysign, inf
 
@@ -19,41 +19,21 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import FIRST_BRANCH, Point
 from rodfem.continuation.branch_solver import ROWS, BranchSolver, across_orbit, predict_at_load
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.continuation.observer import Remark
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
-from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 
 BENT = 1e-6
 """Distance from the chord, over the rod's length, and rotation from the scene's start, in radian, that are none."""
-AHEAD = 0.1
-"""Distance along the first tangent, in the metric, at which the centreline is looked at as well."""
-NODES = 8
-"""Nodes for each unstable mode below which the index is compared."""
-HOPELESS, A_FEW = 0.9, 4
-"""Index over the number of nodes above which it is that of the mesh; half-waves that a mesh of any size is allowed."""
-PARTS = (1, 2, 4, 8)
-"""Numbers of steps to a load that are tried, one after the other."""
-DRIVEN = 1e-7
-"""Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
-ASTRAY = 0.05
-"""Distance from a prediction, over the step that it predicts, beyond which a state may be of another path."""
-FLOOR = 1e-8
-"""The same in natural sizes, within which it is on the path whatever the step."""
-LEAST = 1e-6
-"""Least step, over the range of loads."""
-PART = 1e-2
-"""Part of a step at whose end a state tells in which direction the path goes on."""
+ASTRAY, FLOOR, LEAST = 0.05, 1e-8, 1e-6
+"""Distance from a prediction, over the step that it predicts, beyond which a state may be of another path; the same in
+natural sizes, within which it is on the path whatever the step; least step, over the range of loads."""
 
 
 def first_state(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
-    """Equilibrium at ``load`` from the scene's start, and the iteration that led to it.
-
-    Raises :class:`~rodfem.errors.SceneError` where constraints depend on one another: then factors are round-off.
-    """
+    """Equilibrium at ``load`` from the scene's start; :class:`SceneError` where constraints depend on one another."""
     start = solver.start(load)
     try:
         x, outcome = first_equilibrium(solver, load)
@@ -68,23 +48,13 @@ def first_state(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonRes
 
 
 def name_of_first(shape: Shape, states: Sequence[PETSc.Vec]) -> str:
-    """Name of the first branch: that of the scene, or else what is true of its first ``states``.  Collective."""
+    """Name of the first branch: that of the scene, or else what is true of its first ``states``."""
     scene = shape.system.scene
     if scene.states is not None:
         return scene.states
     if scene.closed:
         return "ring"
     return "straight" if all(is_straight(shape.sample(x)["r"]) for x in states) else FIRST_BRANCH
-
-
-def ahead(x: PETSc.Vec, tangent: PETSc.Vec) -> PETSc.Vec:
-    """The state a little farther along the tangent at ``x``: straight where straight states go on being so.
-
-    The rotations ``q`` that give d3 one direction are a linear space, so that the length of the step does not matter.
-    """
-    out = x.copy()
-    out.axpy(AHEAD, tangent)
-    return out
 
 
 def is_straight(r: NDArray[np.float64]) -> bool:
@@ -97,7 +67,7 @@ def is_straight(r: NDArray[np.float64]) -> bool:
 
 def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
     """Raise :class:`InputError` for an ``index`` of a ``scene`` at a ``load`` that so many ``nodes`` cannot hold."""
-    if index > max(HOPELESS * nodes, A_FEW):
+    if index > max(0.9 * nodes, 4):
         raise InputError(
             f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index "
             f"is {index} there)",
@@ -105,48 +75,28 @@ def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
         )
 
 
-def check_start(solver: BranchSolver, span: tuple[float, float], warn: Callable[[str], None]) -> None:
-    """Compare the index at the ends of a ``span`` with that on twice as many elements, where a mesh has few.
+def check_start(solver: BranchSolver, span: tuple[float, float]) -> None:
+    """Raise an error where the mesh cannot hold the half-waves of the scene's start at the ends of a ``span``.
 
-    Each unstable mode has half-waves: another index is that of the mesh, and ``warn`` gets a sentence.  Of a rod that
-    bends from the start on, only the first load is looked at.  Raises :class:`InputError` where the mesh of the
-    ``solver`` cannot hold the half-waves at all, :class:`SceneError` where constraints depend on one another.
-    Collective.
+    Of a rod that bends from the start on, only the first load is looked at.
     """
-    scene, mesh = solver.system.scene, solver.system.fields.discretization
+    system, mesh = solver.system, solver.system.fields.discretization
     for load in span if solver.conservative else ():
-        index = _index(solver, load)
-        if index is None:
+        start = solver.start(load)
+        x, outcome = solver.at_load(start, load)
+        turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
+        bent = load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT
+        if not outcome.converged or bent or solver.lost_convexity(x):
             return
-        check_index(scene, load, index, mesh.elements * mesh.degree)
-        if NODES * index > mesh.elements * mesh.degree:
-            there = _index(BranchSolver(System(scene, mesh.finer(2), solver.system.comm)), load)
-            if there not in (None, index):
-                words = (
-                    f"At {scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} elements "
-                    f"and {there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a higher "
-                    "degree."
-                )
-                warn(Remark(words, load))
-
-
-def _index(solver: BranchSolver, load: float) -> int | None:
-    """Index of the scene's start at a load; None where it is no equilibrium there, or its energy not convex."""
-    start, system = solver.start(load), solver.system
-    x, outcome = solver.at_load(start, load)
-    turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
-    bent = load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT
-    if not outcome.converged or bent or solver.lost_convexity(x):
-        return None
-    if may_depend(solver.shape, x):  # then a count is round-off
-        require_independent_constraints(solver.shape, x, start)
-    return solver.inertia.at(x).count().negative
+        if may_depend(solver.shape, x):  # then a count is round-off
+            require_independent_constraints(solver.shape, x, start)
+        check_index(system.scene, load, solver.inertia.at(x).count().negative, mesh.elements * mesh.degree)
 
 
 def at_load(solver: BranchSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     """Equilibrium at a load from a ``guess`` nearby, in more and more steps; raises :class:`ConvergenceError`."""
     begin = solver.system.scalar(guess)
-    for parts in PARTS:
+    for parts in (1, 2, 4, 8):
         x = guess
         for part in range(1, parts + 1):
             x, outcome = solver.at_load(x, load if part == parts else begin + (load - begin) * part / parts)
@@ -161,7 +111,7 @@ def at_load(solver: BranchSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
 def require_balance(solver: BranchSolver, x: PETSc.Vec) -> None:
     """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
     system = solver.system
-    if system.drift(x) > DRIVEN * system.stiffness_scale:
+    if system.drift(x) > 1e-7 * system.stiffness_scale:
         raise SceneError(
             f"There is no equilibrium at {system.scene.load} = {system.scalar(x):g}: nothing holds the rod against the "
             f"{' or the '.join(system.free_motions(x))}, and the loads drive it; hold that motion at one end, or "
@@ -173,17 +123,16 @@ class LoadSteps:
     """Equilibria on one path, load by load."""
 
     def __init__(self, solver: BranchSolver, first: Point, span: tuple[float, float]) -> None:
-        """Begin at the ``first`` point of a sweep over a ``span`` of loads, on the mesh of the ``solver``."""
+        """Begin at the ``first`` point of a sweep over a ``span`` of loads."""
         self.solver, self.least = solver, LEAST * abs(span[1] - span[0])
-        self.known = [first]
-        self.step = inf
+        self.known, self.step = [first], inf
         f = solver.system.fields
         begin, end = solver.system.metric.getOwnershipRange()
         numbers = [f.number[f.dofs[block.name]].ravel() for block in f.blocks if not block.multiplier]
         self.blocks = [of[(begin <= of) & (of < end)] - begin for of in numbers]
 
     def to(self, load: float) -> PETSc.Vec:
-        """Equilibrium on the path at a ``load`` further on; raises :class:`ConvergenceError`.  Collective."""
+        """Equilibrium on the path at a ``load`` further on; raises :class:`ConvergenceError`."""
         last = self.known[-1]
         while last.load != load:
             last = self._next(last, load)
@@ -218,7 +167,7 @@ class LoadSteps:
         solver, last = self.solver, self.known[-1]
         if len(self.known) > 1 and (x := self._predicted(self.known, load)) is not None:
             return x
-        near = last.load + PART * (load - last.load)
+        near = last.load + 0.01 * (load - last.load)
         y, outcome = solver.at_load(last.x, near)
         return self._predicted([replace(last, x=y, load=near), last], load) if outcome.converged else None
 

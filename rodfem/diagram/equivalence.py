@@ -28,41 +28,26 @@ from rodfem.problem.units import Units
 from rodfem.stability.inertia import NULL, Factored
 from rodfem.tolerances import LOCATED, NEGLIGIBLE, SAME_SPECIAL, SAME_STATE, unit
 
-STEP = 0.05
-"""Change of load and energy in a step of a branch, relative to values greater than the rod's units."""
-SAME_VALUE = 1e-3
-"""Relative difference of eigenvalues of mirror images: of last iterates, and of meshes that are not symmetric."""
-COMPARED = 3
-"""Eigenvalues nearest zero, beyond those that count as zero, that are compared."""
-CARRIED = 1e-3
-"""Distance of a state's image from another state, over the distance of the two, below which the one is the other."""
-OTHER = 1e-6
-"""Difference of two ordinates, relative to the greatest one, above which they are two; one below it has no side."""
-SHARES = (0.5, 1.0)
-"""Places along a branch, as shares of its rows, at whose states an image is asked for."""
+CARRIED, OTHER = 1e-3, 1e-6
+"""Distance of a state's image from another state, over that of the two, below which the one is the other; difference of
+two ordinates, relative to the greatest one, above which they are two: one below it has no side."""
 
 Alike = Callable[[Point, Point, float], bool]
-"""Whether two points are equivalent within a tolerance, whatever meshes they are on."""
 
 
 def equivalent(a: Point, b: Point, units: Units, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
-    """Whether two points ``a``, ``b`` agree in load, energy and stretch.
-
-    They may differ by ``tolerance``, relative to values greater than the rod's ``units``; stretches by ``of_strain``
-    where that is larger.
-    """
-    strain = max(tolerance, of_strain)
+    """Whether two points agree in load, energy and stretch to a ``tolerance``, stretches ``of_strain`` if larger."""
     pairs = (
         (a.load, b.load, tolerance, units.load),
         (a.energy, b.energy, tolerance, units.energy),
-        (a.stretch, b.stretch, strain, 1.0),
+        (a.stretch, b.stretch, max(tolerance, of_strain), 1.0),
     )
     return all(abs(p - q) <= allowed * unit(p, q, one=one) for p, q, allowed, one in pairs)
 
 
 def near(a: Point, b: Point, units: Units, steps: float = 2.0) -> bool:
     """Whether points ``a``, ``b`` of a rod with these ``units`` could be neighbours, ``steps`` apart, on one branch."""
-    reach = STEP * steps
+    reach = 0.05 * steps
     close = abs(a.load - b.load) <= reach * unit(a.load, one=units.load)
     return close and abs(a.energy - b.energy) <= reach * unit(a.energy, one=units.energy)
 
@@ -101,23 +86,22 @@ def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
     (first, noise), (second, _) = (_nearest(at(point.x), indices[0].zero) for point in (a, b))
     # of a zero the mesh makes a value as it lies to the elements: two of one sign are alike
     alike = (noise > 0) & (first * second > 0)
-    return bool((alike | (abs(first - second) <= SAME_VALUE * abs(first) + noise)).all())
+    return bool((alike | (abs(first - second) <= 1e-3 * abs(first) + noise)).all())
 
 
 def _nearest(found: Factored, zero: int) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues that count as ``zero`` and a few more, ascending, and the round-off of those; 0 for others."""
     found.count()
-    values, vectors = found.nearest(zero + COMPARED, NULL)
+    values, vectors = found.nearest(zero + 3, NULL)
     order = np.argsort(values)
     noise = np.array([found.noise(v) for v in vectors]) * (abs(values) <= found.inertia.tolerance)
     return values[order], noise[order]
 
 
 def image_of(branch: Branch, solver: BranchSolver) -> str:
-    """The symmetry, in words, that carries a branch to one with the opposite ordinate; empty where there is none.
+    """The symmetry, in words, of the equations that carries a branch to one with the opposite ordinate; empty for none.
 
-    It is one of the equations at the loads of two states, one within the ``branch`` and its last one, and takes the
-    ordinates of both to their opposites, to round-off.  States of other meshes than that of ``solver`` are left out.
+    It is found at two states on the mesh of the ``solver``.
     """
     chosen, size = _sampled(branch, solver)
     if not chosen or any(abs(point.ordinate) <= OTHER * size for point in chosen):
@@ -136,8 +120,7 @@ def image_of(branch: Branch, solver: BranchSolver) -> str:
 def other_ordinates(branch: Branch, first: Point, image: Point, solver: BranchSolver) -> str:
     """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty where it keeps them, or signs.
 
-    It carries the ``first`` state after the branch point to the state ``image`` on the other side.  States of other
-    meshes than that of ``solver`` are left out.
+    It carries the ``first`` state after the branch point to the state ``image`` on the other side.
     """
     system, near = solver.system, CARRIED * solver.system.norm(first.x - image.x)
     found, phase = [m for m in candidates(system) if system.norm(m(system, first.x) - image.x) <= near], system.phase
@@ -154,7 +137,7 @@ def other_ordinates(branch: Branch, first: Point, image: Point, solver: BranchSo
 def _sampled(branch: Branch, solver: BranchSolver) -> tuple[list[Point], float]:
     """Two points of a branch on the mesh of a solver, and the size of its ordinates there."""
     points = [point for point in branch.points if point.mesh == solver.mesh]
-    chosen = [points[round(share * (len(points) - 1))] for share in SHARES] if points else []
+    chosen = [points[round(share * (len(points) - 1))] for share in (0.5, 1.0)] if points else []
     return chosen, max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])
 
 

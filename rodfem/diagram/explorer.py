@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.mesh_sequence import Gap, arms
-from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.observer import Remark
@@ -19,7 +19,7 @@ from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, lines, start_branch
 from rodfem.deflation.search import Deflation, equilibria_at
 from rodfem.deflation.symmetries import Orbits
-from rodfem.diagram.equilibria import ahead, first_state, name_of_first
+from rodfem.diagram.equilibria import first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
@@ -28,19 +28,15 @@ from rodfem.stability.reduced_stiffness import Bordered
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import APART, SAME_SPECIAL, SAME_STATE
 
-TAIL = 8
-"""Rows before the end of a side branch, at least, among which its mirror image is recognised."""
-REACH = 4.0
-"""Length of that part of it, at least, over the distance of the state that may be its own."""
-COLLAPSED = 1e-6
-"""A first state whose smallest stretch is below this is no rod."""
+TAIL, REACH = 8, 4.0
+"""Rows before the end of a side branch, at least, among which its mirror image is recognised; length of that part of
+it, at least, over the distance of the state that may be its own."""
 
 
 class Explorer(Tracer):
     """Explores the equilibria of a scene from its start state: what to trace, and in which order."""
 
-    _crossed = 0
-    """Number of gaps whose other side was looked at."""
+    _crossed = 0  # gaps whose other side was looked at
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
@@ -53,21 +49,16 @@ class Explorer(Tracer):
 
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
-        found, before = self._found(load), len(self.branches)
+        self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
+        with self.solver.system.clock.scope("search"):
+            search = Deflation(self.solver, load, equilibria_at(self.solver, self.branches, load, self.here))
+            found = search.run(self.plan.tries)
+        self.observer.note(Remark(f"\n{search}", load))
+        before = len(self.branches)
         for i, point in enumerate(self._resolved(self._convex(found))):
             if not self._on_branch(point, before):
                 self.trace_whole(point, self._unused("found ", f" at {load:g}", i + 1), 0)
         self._branch_off(before)
-
-    def _found(self, load: float) -> list[Point]:
-        """Equilibria at ``load`` that a search finds on no branch."""
-        self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
-        with self.solver.system.clock.scope("search"):
-            known = equilibria_at(self.solver, self.branches, load, self.here)
-            search = Deflation(self.solver, load, known)
-            found = search.run(self.plan.tries)
-            self.observer.note(Remark(f"\n{search}", load))
-            return found
 
     def _on_branch(self, point: Point, first: int = 0) -> bool:
         """Whether a point is on one of the branches traced, from number ``first`` on."""
@@ -134,7 +125,7 @@ class Explorer(Tracer):
     def _primary(self) -> Branch:
         """First branch: its first state."""
         point, start = self._first(), self.span[0]
-        if point.stretch < COLLAPSED:
+        if point.stretch < 1e-6:
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
                 f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
@@ -147,8 +138,9 @@ class Explorer(Tracer):
             index = index_range(point.negative, point.zero - self.solver.system.active_drifts(point.x))
             words = f"  the first state is unstable already (index {index}): stability was lost outside the range"
             self.observer.note(Remark(words, start))
-        name = name_of_first(self.solver.shape, [point.x, ahead(point.x, point.tangent)])
-        return Branch(name, None, 0, [point])
+        assert point.tangent is not None
+        ahead = point.x + 0.1 * point.tangent  # rotations that give d3 one direction are a linear space
+        return Branch(name_of_first(self.solver.shape, [point.x, ahead]), None, 0, [point])
 
     def _first(self) -> Point:
         start, stop = self.span
@@ -226,10 +218,7 @@ class Explorer(Tracer):
         return Branch(name, (parent.name, i), depth, points, begins=begins)
 
     def _is_new(self, parent: Branch, branch: Branch, firsts: list[Point], before: int) -> bool:
-        """Whether a branch that leaves is none that has been traced, or the mirror image of one.
-
-        ``firsts`` gets its first point: those of branches that leave there, traced since there were so many ``before``.
-        """
+        """Whether a branch that leaves is new, and no mirror image of one of the ``firsts`` that leave there."""
         assert branch.parent is not None
         special, first = parent.special[branch.parent[1]], branch.points[1]
         image = next((p for p in firsts if are_images(self.solver, special, p, first, self.alike)), None)
@@ -252,34 +241,27 @@ class Explorer(Tracer):
                 self.observer.note(Remark(said, special.point.load, branch=branch.name))
 
     def _lines(self, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
-        """Directions of the branches that leave, given those of the null vectors; what leaves subcritically is first.
-
-        Of several motions that become unstable at once the branches are to be found; each has its own normal form.
-        """
+        """Directions of the branches that leave, by those of the null vectors; what leaves subcritically is first."""
         if len(ways) < 2 or special.test_function != "mu":
             return list(ways)
+        if len(ways) > 2:
+            words = (
+                f"  {len(ways)} null vectors at {self.scene.load} = {special.point.load:.8g}: directions in which "
+                "branches leave are sought at random there, and some may be missing."
+            )
+            self.observer.note(Remark(words, special.point.load))
+        found = list[tuple[str, PETSc.Vec]]()
         with self.solver.system.clock.scope("location"):
-            found = lines(self.solver, special, ways)
-            if len(ways) > 2:
-                words = (
-                    f"  {len(ways)} null vectors at {self.scene.load} = {special.point.load:.8g}: directions in which "
-                    "branches leave are sought at random there, and some may be missing."
-                )
-                self.observer.note(Remark(words, special.point.load))
-            forms = [normal_form_of(self.solver, origin_of(self.solver, special), way) for way in found]
-        kinds = [self._kind(form, special) for form in forms]
-        order = sorted(range(len(found)), key=lambda i: not kinds[i].startswith("subcritical"))
-        several = dict.fromkeys(kinds[i] for i in order if kinds[i])
+            for way in lines(self.solver, special, ways):
+                form = normal_form_of(self.solver, origin_of(self.solver, special), way)
+                if form is not None:
+                    form.classify(*self._indices(special))
+                found.append(("" if form is None else form.kind, way))
+        found.sort(key=lambda each: not each[0].startswith("subcritical"))
+        several = dict.fromkeys(kind for kind, _ in found if kind)
         if len(several) > 1:
             special.note = f"branches of several forms leave here: {', '.join(several)}"
-        return [found[i] for i in order]
-
-    def _kind(self, form: NormalForm | None, special: SpecialPoint) -> str:
-        """Kind of the form of a branch that leaves a special point; empty where it is not known."""
-        if form is None:
-            return ""
-        form.classify(*self._indices(special))
-        return form.kind
+        return [way for _, way in found]
 
     @staticmethod
     def _indices(special: SpecialPoint) -> tuple[int, int]:
@@ -328,10 +310,10 @@ class Explorer(Tracer):
 
     def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
-        ends = ((other, end) for other in self.branches for end in other.special if end.connects_to is not None)
-        for other, end in ends:
-            if self.alike(end.point, special.point, SAME_SPECIAL):
-                rows = other.points[max(end.row - 2, 0) : end.row]
-                if any(near(branch.points[1], row, self.solver.units) for row in rows):
-                    return True
-        return False
+        return any(
+            near(branch.points[1], row, self.solver.units)
+            for other in self.branches
+            for end in other.special
+            if end.connects_to is not None and self.alike(end.point, special.point, SAME_SPECIAL)
+            for row in other.points[max(end.row - 2, 0) : end.row]
+        )

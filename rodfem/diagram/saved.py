@@ -20,18 +20,13 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint, same
 from rodfem.fem.system import System
-from rodfem.file_format import DIAGRAM
+from rodfem.file_format import DIAGRAM, refusal
 from rodfem.output.files import load_json, load_state
 from rodfem.output.states import check_run
-from rodfem.output.table import COLUMNS, REMARK, SPECIAL, point_values, special_values
+from rodfem.output.table import point_values, special_values
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
-
-NEEDED = ("scene", "parameter", "branches", "range", "accuracy", "constants", "discretization", "meshes")
-"""Entries of a diagram, in addition to those that all of its readers need."""
-OF_BRANCH = ("name", "parent", "ended", "columns", "special")
-OF_SPECIAL = tuple(entry.name for entry in SPECIAL if entry.name not in ("energy", "resolved", "omega2_error_estimate"))
 
 
 @checked(folder=path("results/column"), scene=SCENE, comm=RANKS)
@@ -54,31 +49,22 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     format, or lack something.
     """
     folder = Path(folder)
-    data = load_json(folder / "diagram.json")
-    _check_entries(data, folder / "diagram.json")
-    _check(data, scene, folder)
-    check_run(data, folder / "states.h5")
-    solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
-    _check_equations(data, solvers[0].system, folder)
-    branches = [_branch(entry, solvers, folder / "states.h5") for entry in data["branches"]]
-    asked, span = data.get("asked"), tuple(data["range"])
-    plan = replace(Plan() if asked is None else plan_without(asked), span=span, accuracy=data["accuracy"])
-    diagram = Diagram(scene, plan, branches, solvers)
-    diagram.warnings, diagram.notes = ([_remark(e, folder) for e in data.get(x) or ()] for x in ("warnings", "notes"))
+    path, states = folder / "diagram.json", folder / "states.h5"
+    data = load_json(path)
+    DIAGRAM.check(data, path, ("scene", "range", "meshes"))
+    with refusal(f"{path} lacks something, or holds something else ({{}}): give {DIAGRAM.file}."):
+        _check(data, scene, folder)
+        check_run(data, states)
+        solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
+        _check_equations(data, solvers[0].system, folder)
+        branches = [_branch(entry, solvers, states) for entry in data["branches"]]
+        asked, span = data.get("asked"), tuple(data["range"])
+        plan = replace(Plan() if asked is None else plan_without(asked), span=span, accuracy=data["accuracy"])
+        diagram = Diagram(scene, plan, branches, solvers)
+        diagram.warnings, diagram.notes = ([_remark(e) for e in data.get(x) or ()] for x in ("warnings", "notes"))
     diagram.lacks = "" if asked is None else not_held(asked)
     diagram.asked, diagram.complete = asked, data.get("complete", True)
     return diagram
-
-
-def _check_entries(data: dict[str, Any], path: Path) -> None:
-    """Raise :class:`InputError` where a file without a version lacks what a diagram is made of."""
-    DIAGRAM.check(data, path, NEEDED)
-    for branch in data["branches"]:
-        where = f"{path}, branch {branch.get('name')!r},"
-        DIAGRAM.check(branch, where, OF_BRANCH)
-        DIAGRAM.check(branch["columns"], where, [column.name for column in COLUMNS if column.always])
-        for special in branch["special"]:
-            DIAGRAM.check(special, where, OF_SPECIAL)
 
 
 def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
@@ -138,8 +124,7 @@ def _unexplained(change: dict[str, Any], points: Sequence[Point]) -> Unexplained
     return Unexplained(points[row], points[row + 1], change["before"], change["after"])
 
 
-def _remark(entry: dict[str, Any], folder: Path) -> Remark:
-    DIAGRAM.check(entry, folder / "diagram.json", [each.name for each in REMARK])
+def _remark(entry: dict[str, Any]) -> Remark:
     return Remark(entry["sentence"], *entry["loads"] or (), branch=entry["branch"])
 
 

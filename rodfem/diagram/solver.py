@@ -35,17 +35,9 @@ from rodfem.stability.assessment import Verdict, assess
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.timing import Clock
 
-
-def ranks(name: str, value: object) -> MPI.Comm:
-    """Check for a communicator that has ranks; raises :class:`InputError` for anything else."""
-    if not isinstance(value, MPI.Comm) or value == MPI.COMM_NULL:
-        raise InputError(f"{name} is {value!r}: give a communicator of mpi4py, as in {name}=MPI.COMM_SELF.")
-    return value
-
-
 SCENE: Check = a(Scene, "a rodfem.Scene")
 MESH: Check = a(Discretization, "a Discretization, as in Discretization(elements=8, degree=6)")
-RANKS: Check = ranks
+RANKS: Check = a(MPI.Comm, "a communicator of mpi4py, as in @=MPI.COMM_SELF")
 POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['branch 1'].points[0]")
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
 METHOD: Check = text("auto")
