@@ -114,8 +114,7 @@ print(chiral, straight, sep="\n")
 #
 # With $a = A\lambda/2$, $\Omega^2 = a^2 + P$, $p = 3(a - \Omega)$, $q = 3(a + \Omega)$ the hemitropic rod buckles where
 # $\sin(q-p) = (q-p)\,\sin p\,\sin q/(pq)$, at $\lambda = 0.1143042145$ for $A = \pm 3$. The straight cord loses
-# stability at the tension $\lambda = k_0^2 - w^2$ with $w = 2\pi$: at $5\pi^2 = 49.3480220$. Both rods are those of
-# Kumar & Healey (2010).
+# stability at the tension $\lambda = k_0^2 - w^2$ with $w = 2\pi$: at $5\pi^2 = 49.3480220$.
 
 # %%
 from scipy.optimize import brentq
