@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 1. Equilibrium is a stationary point
 #
+# *After it you can* derive equilibrium, natural boundary conditions included, from an energy, and solve it by elements.
+# *Time:* at the board 15 min idea and picture, 25 form, 20 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # A loaded rod could take any shape. It takes one at which its energy does not change, to first order, whichever way the

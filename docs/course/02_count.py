@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 2. Stable means minimum: count
 #
+# *After it you can* say what an index is, and count it without an eigenvalue. *Time:* at the board 15 min idea and
+# picture, 20 form, 25 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # Push the straight rod gently. If every small variation costs energy, it springs back: the equilibrium is *stable*. If

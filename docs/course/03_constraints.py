@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 3. Constraints change what is stable
 #
+# *After it you can* judge stability under constraints by counting a saddle matrix. *Time:* at the board 15 min idea and
+# picture, 25 form, 20 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # Hold the tip of a column on its axis, and it carries more. The energy is the same; there are fewer variations. A

@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 4. Loads that go back: folds
 #
+# *After it you can* follow a curve of equilibria around a fold, and say what a dead load and a machine see there.
+# *Time:* at the board 15 min idea and picture, 20 form, 25 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # Press on an arch. It yields, and at some load it jumps. Up to there a stable equilibrium went along with the load;

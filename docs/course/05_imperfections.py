@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 5. Branch points and imperfections
 #
+# *After it you can* derive a pitchfork's law from the Taylor series of the energy, and its imperfect version. *Time:*
+# at the board 20 min idea and picture, 25 form, 15 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # At Euler's load the straight rod and a bent one meet. Close by only one amplitude matters: all other directions are
@@ -22,8 +25,16 @@ import numpy as np
 from lesson.pictures import axes, equilibria, show
 
 EULER = np.pi**2 / 4
-near = lambda a, eps: EULER * (1 + a**2 / 8) - 4 * eps / (np.pi * a)  # noqa: E731, load of the amplitude a
-at_fold = lambda eps: (16 * eps / (np.pi * EULER)) ** (1 / 3)  # noqa: E731, size of a at the fold
+
+
+def near(a, eps):  # load of the amplitude a
+    return EULER * (1 + a**2 / 8) - 4 * eps / (np.pi * a)
+
+
+def at_fold(eps):  # size of a at the fold
+    return (16 * eps / (np.pi * EULER)) ** (1 / 3)
+
+
 ax = axes("load $P$", "angle $a$ of the tip")
 a = np.linspace(1e-3, 1.5, 600)
 for loads, angles, style in (([1.8, EULER], [0, 0], "-"), ([EULER, 3.2], [0, 0], ":"), (near(a, 0), [a, -a], "-")):

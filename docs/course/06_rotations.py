@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 6. Big rotations in space
 #
+# *After it you can* work with quaternions past full turns, and explain why angles fail. *Time:* at the board 20 min
+# idea and picture, 25 form, 15 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # A small rotation is a vector. A big one is not: turns about different axes do not commute, and a full turn changes

@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 7. Symmetry: circles of states
 #
+# *After it you can* recognise a zero eigenvalue that belongs to a symmetry, and fix it by a phase condition. *Time:* at
+# the board 20 min idea and picture, 25 form, 15 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # Turn a rod that nothing holds: its energy does not notice. Whatever motion $g_\varepsilon$ leaves the energy of

@@ -1,6 +1,10 @@
 # %% [markdown]
 # # 8. Chirality: DNA and telephone cords
 #
+# *After it you can* say what chirality does to an energy, and find buckling loads of chiral rods in closed form.
+# *Time:* at the board 15 min idea and picture, 25 form, 20 by hand; at the computer 20 min rodfem, 40 exercises and the
+# page.
+#
 # ## Idea
 #
 # In a mirror a right-handed helix is left-handed. A reflection across $d_1$ keeps stretch and the curvature $k_1$, and
@@ -142,6 +146,10 @@ print(f"cord: {answer:.8f} (exact {5 * pi**2:.8f}), hemitropic: {chiral.point.lo
 # Its $w$ is a number that you have met in lesson 6. Why?
 #
 # **8.3** For which $|A|$ does the hemitropic rod buckle at $\lambda = 0.12$?
+#
+# **8.4** On the page: `rodfem run demos/hemitropic.py`, `rodfem view results/hemitropic`. Click through the states of
+# branch 2 while its index falls from 3 to 2, and watch the modes move. At which $\lambda$ does it fall, and what does
+# the branch do there? (Hide the other branches by their squares in the legend.)
 
 # %% [markdown]
 # ## Where it breaks

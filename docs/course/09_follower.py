@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 9. Pushed along its own tip
 #
+# *After it you can* tell flutter from divergence, and say why no energy decides. *Time:* at the board 15 min idea and
+# picture, 25 form, 20 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # A dead force has a potential. A force that *turns with the rod*, the thrust of a rocket or the recoil of a jet of

@@ -1,6 +1,9 @@
 # %% [markdown]
 # # 10. Do you trust the number?
 #
+# *After it you can* bound the error of a computed load, and list what no bound covers. *Time:* at the board 15 min idea
+# and picture, 25 form, 20 by hand; at the computer 20 min rodfem, 40 exercises.
+#
 # ## Idea
 #
 # A number without an error is an opinion. A computed load can be wrong in four ways. The *mesh* is finite. *Round-off*

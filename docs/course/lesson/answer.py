@@ -62,4 +62,5 @@ class Answer:
         return f"right to {10.0 ** ceil(log10(max(self.error(number), FINEST))):.0e}" if self.accuracy else "right"
 
     def _distance(self, number: float) -> str:
-        return f"too {'large' if number > self.value else 'small'}, by {float(f'{abs(number - self.value):.1g}'):g}"
+        """The side on which a number is, but not by how much: that would be the answer."""
+        return f"too {'large' if number > self.value else 'small'}"

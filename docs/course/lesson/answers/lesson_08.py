@@ -39,4 +39,12 @@ ANSWERS = (
         "Solve the closed form of the lesson for A, or follow the branch point with diagram.locus.",
         ((-1.9614199207686485, "Give its size: both hands buckle alike."),),
     ),
+    Answer(
+        "compression at which the index of branch 2 of the hemitropic rod falls from 3 to 2",
+        0.321650086556920,
+        "shooting",
+        1e-4,
+        "Choose the fold of branch 2: there the compression turns back along the branch.",
+        ((0.3320390797, "That is where the branch begins."),),
+    ),
 )
