@@ -157,10 +157,10 @@ class Equations:
         sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
         acting = [x for x in sites if not x[0].nodal]
         acting.sort(key=lambda x: x[2] is not None)  # first along the rod, then at points
-        loads = [term * (measure or dx) for of, site, measure in acting for term in of.lagrangian(site)]
+        loads = _terms("lagrangian", acting, dx)
         potential = fields.formulation.integrand(self, W, along) * dx + sum(loads)
         L = potential + self._nodal(sites)
-        work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
+        work = sum(_terms("virtual_work", sites, dx))
         first = ufl.derivative(self.compilable(L), u, test) - self.compilable(work)
         kinetic = self._kinetic(a, b, sites, dx)
         self.massless = apply_algebra_lowering(kinetic).empty()
@@ -183,9 +183,8 @@ class Equations:
         f, rule = self.unknowns, {"quadrature_degree": 2 * self.fields.discretization.degree - 1}
         dx = ufl.dx(domain=self.fields.mesh, metadata=rule | {"quadrature_rule": "GLL"})
         out = 0 if f.eta is None else lagrangian.unit_norm(f.eta, f.q) * dx
-        for of, site, measure in sites:
-            if of.nodal:
-                out += sum(term * (measure or dx) for term in of.lagrangian(site))
+        for nodal in (x for x in sites if x[0].nodal):
+            out += sum(_terms("lagrangian", [nodal], dx))
         return out
 
     def _metric(self, a: Any, b: Any) -> Any:
@@ -203,7 +202,7 @@ class Equations:
         kinetic = inertia.rotary(f.q, a.q, b.q, tuple(own.rho_I(c))) * dx
         if f.r is not None:
             kinetic += inertia.translational(a.r, b.r, own.rho_A(c)) * dx
-        return kinetic + sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
+        return kinetic + sum(_terms("kinetic", sites, dx))
 
     @classmethod
     def compile_ahead(cls, fields: Fields) -> None:
@@ -318,6 +317,11 @@ class Equations:
             pair = (b, b) if a is None else (a, a) if b is None else (a, b)
             lift.append(0.0 if pair == (None, None) else (1 - x) * pair[0] + x * pair[1])
         return ufl.as_vector([value + 0 * x for value in lift])
+
+
+def _terms(name: str, sites: list[Any], dx: Any) -> list[Any]:
+    """Terms that parts of a scene have of that name, at their sites."""
+    return [term * (measure or dx) for of, site, measure in sites for term in getattr(of, name)(site)]
 
 
 def point_measures(mesh: Any, points: list[float]) -> Any:

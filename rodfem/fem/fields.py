@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -56,11 +55,11 @@ class Discretization:
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`InputError`."""
-        for name, example in (("elements", 8), ("degree", 6)):
-            object.__setattr__(self, name, whole(name, getattr(self, name), example))
+        object.__setattr__(self, "elements", whole("elements", self.elements, 8))
+        object.__setattr__(self, "degree", whole("degree", self.degree, 6))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
-        names, elements, vertices = formulations.names(), self.elements, self.vertices or ()
+        names, elements = formulations.names(), self.elements
         most = 1_000_000  # of which 100000 of degree 2 take 4 GB
         if self.formulation not in names:
             raise InputError(
@@ -73,10 +72,11 @@ class Discretization:
             raise InputError(f"A mesh of {elements} elements holds no rod, or is too large: give 1 to {most}.")
         if not 1 <= self.degree <= HIGHEST:
             raise InputError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
-        if vertices and len(vertices) != elements + 1:
-            raise InputError(f"{len(vertices)} vertices do not bound {elements} elements: give {elements + 1}.")
-        if any(a + SAME_PLACE * (vertices[-1] - vertices[0]) >= b for a, b in pairwise(vertices)):
-            raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
+        if given := self.vertices:
+            if len(given) != elements + 1:
+                raise InputError(f"{len(given)} vertices do not bound {elements} elements: give {elements + 1}.")
+            if np.diff(given).min() <= SAME_PLACE * (given[-1] - given[0]):
+                raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
 
     def finer(self, factor: int, richer: int = 0) -> Discretization:
         """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""

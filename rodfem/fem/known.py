@@ -46,19 +46,19 @@ class Known:
     """Name of the function, by which compiled forms have it."""
 
     def __init__(self, fields: Fields, degree: int) -> None:
-        found, self._fields, cells = fields.scene.tables, fields, len(fields.vertices)
-        self._degree = degree
+        self._fields, self._degree = fields, degree
+        self.function: Any = None
+        found, cells = fields.scene.tables, len(fields.vertices)
         self.tables = list(dict.fromkeys(table for table, name in found if name == "s"))
         self.paths = [(table, name) for table, name in found if name != "s"]
         self.names: dict[Any, str] = {}
         self.lines = np.zeros((len(self.paths), 2))
         self.rows = [np.hstack([t.knots[:-1, None], t.pieces.reshape(len(t.pieces), -1)]) for t, _ in self.paths]
-        sizes = sum(len(t.rows[0]) for t in self.tables), sum(rows.shape[1] for rows in self.rows)
-        parts = [(False, d, size) for d, size in zip((degree, 0), sizes, strict=True) if size]
-        self.function = None
         self.along, self._dofs = np.zeros((cells, 0)), np.zeros((cells, 0), dtype=int)
-        if not parts:
+        sizes = sum(len(t.rows[0]) for t in self.tables), sum(rows.shape[1] for rows in self.rows)
+        if not any(sizes):
             return
+        parts = [(False, d, size) for d, size in zip((degree, 0), sizes, strict=True) if size]
         space = compat.mixed_space(fields.mesh, parts)
         self.function = compat.fem.Function(space, name=self.name, dtype=compat.REAL)
         self._dofs = compat.cell_dofs(space, cells)

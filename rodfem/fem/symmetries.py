@@ -124,17 +124,15 @@ class Symmetry:
 
 def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     """All elementary generators of a scene's fields and groups of scalars; translations are by its natural length."""
-    counts = {motion: {g.name: len(fields.groups[g]) for g in fields.groups if g.motion is motion} for motion in Motion}
-    positions = {"r", *counts[Motion.POSITION]}
-    vectors = [b.name for b in fields.blocks if b.name in ("r", "n")]
-    vectors += [*counts[Motion.VECTOR], *counts[Motion.POSITION]]
+
+    def counts(motion: Motion) -> dict[str, int]:
+        return {group.name: len(members) for group, members in fields.groups.items() if group.motion is motion}
+
+    positions = {"r", *counts(Motion.POSITION)}
+    vectors = [*({"r", "n"} & {*fields.dofs}), *counts(Motion.VECTOR), *counts(Motion.POSITION)]
     normal, length, out = fields.scene.normal, fields.scene.units.length, list[Elementary]()
     for i, axis in enumerate(AXES, start=1):
-        if normal is None:
-            out.append(Elementary("q", left(axis), (0.0,) * 4, f"rotation about e{i}"))
-            out.append(Elementary("q", right(axis), (0.0,) * 4, f"turning of the cross-sections about d{i}"))
-        elif normal == i - 1:
-            out.append(Elementary("angle", ((0.0,),), (1.0,), f"rotation about e{i}"))
+        out += _turning(normal, i)
         for target in sorted(vectors):
             out.append(Elementary(target, cross(axis), (0.0,) * 3, ""))
             if target in positions:
@@ -142,12 +140,26 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
                 out.append(Elementary(target, ((0.0,) * 3,) * 3, along, f"translation along e{i}"))
     if normal is None:
         out += _of_strains(list(fields.scene.free_strains))
-    for name, count in sorted(counts[Motion.MIXED].items()):  # rotations in all planes of a group of scalars
-        for i, j in zip(*np.tril_indices(count, -1), strict=True):
-            turned = np.zeros((count, count))
-            turned[i, j], turned[j, i] = 1.0, -1.0
-            out.append(Elementary(name, tuple(map(tuple, turned)), (0.0,) * count, ""))
-    return tuple(out)
+    return (*out, *(x for group in sorted(counts(Motion.MIXED).items()) for x in _mixing(*group)))
+
+
+def _mixing(name: str, count: int) -> list[Elementary]:
+    """Rotations in all planes of a group of ``count`` scalars."""
+    out = []
+    for i, j in zip(*np.tril_indices(count, -1), strict=True):
+        turned = np.zeros((count, count))
+        turned[i, j], turned[j, i] = 1.0, -1.0
+        out.append(Elementary(name, tuple(map(tuple, turned)), (0.0,) * count, ""))
+    return out
+
+
+def _turning(normal: int | None, i: int) -> list[Elementary]:
+    """Changes of the rotation by turning about axis ``i`` = 1, 2, 3 of space and of the cross-sections."""
+    axis, turn = AXES[i - 1], f"rotation about e{i}"
+    if normal is None:
+        own = Elementary("q", right(axis), (0.0,) * 4, f"turning of the cross-sections about d{i}")
+        return [Elementary("q", left(axis), (0.0,) * 4, turn), own]
+    return [Elementary("angle", ((0.0,),), (1.0,), turn)] if normal == i - 1 else []
 
 
 def _of_strains(free: list[int]) -> list[Elementary]:
@@ -379,8 +391,12 @@ def _orthogonal(
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
         sizes.append(system.norm(system.generators.vector(rest @ state.generators)))
         combinations = np.vstack([combinations, rest])
-        # the jumps of the derivative between elements say how far the mesh is from this invariance
-        jumps = float(abs(times(state.fields.derivative_jumps, state.local)).max(initial=0.0))
-        jumps = jumps if system.comm.size == 1 else float(system.comm.allreduce(jumps, op=MPI.MAX))
-        least.append(max(10.0 * jumps, 1e-5))  # as SYMMETRIC_STATE, of what is left over
+        least.append(max(10.0 * _jumps(state), 1e-5))  # as SYMMETRIC_STATE, of what is left over
     return combinations, sizes, least
+
+
+def _jumps(state: State) -> float:
+    """Greatest jump of the derivative between elements: how far the mesh is from the motion along itself."""
+    worst = float(abs(times(state.fields.derivative_jumps, state.local)).max(initial=0.0))
+    comm = state.fields.comm
+    return worst if comm.size == 1 else float(comm.allreduce(worst, op=MPI.MAX))

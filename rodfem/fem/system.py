@@ -95,15 +95,19 @@ class System:
         own, fixed = shared(self.metric), self.fields.unknowns - len(self.drifts)
         self._weights = None if own is None else own.matrix[:fixed, :fixed]
         self.generators = Generators(self)
-        self.rigid: Generators | None = None
-        if floats(scene) and self.symmetries and scene.without_potential():
-            motions = rigid_motions(elementary_generators(self.fields)).values()
-            self.rigid = Generators(self, [motion for motion in motions if motion.weights.any()])
+        self.rigid = self._rigid()
         self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, self.natural_sizes)
         self.compiled = compiled_newton(self, self.matrix, self.lu)
+
+    def _rigid(self) -> Generators | None:
+        """Rigid motions of which a rod is capable that floats under loads without a potential; None for others."""
+        if not (self.symmetries and floats(self.scene) and self.scene.without_potential()):
+            return None
+        motions = rigid_motions(elementary_generators(self.fields)).values()
+        return Generators(self, [motion for motion in motions if motion.weights.any()])
 
     def _symmetries(self) -> list[Symmetry]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""

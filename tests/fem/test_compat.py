@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -48,24 +47,6 @@ def test_basis_is_nodal_and_reproduces_polynomials(degree: int) -> None:
     np.testing.assert_allclose(compat.lagrange_basis(degree, compat.nodes(degree)), np.eye(degree + 1), atol=1e-12)
     np.testing.assert_allclose(basis.sum(axis=1), 1, rtol=0, atol=1e-13)
     np.testing.assert_allclose(basis @ compat.nodes(degree) ** degree, x**degree, rtol=0, atol=1e-13)
-
-
-@pytest.mark.alone
-def test_constants() -> None:
-    np.testing.assert_array_equal(compat.lagrange_basis(0, np.array([0.1, 0.9])), [[1], [1]])
-    assert compat.lagrange_basis(3, np.array([])).shape == (0, 4)
-    assert 0 <= compat.nodes(0)[0] <= 1
-
-
-@pytest.mark.short
-def test_mixed_space_has_the_parts_asked_for() -> None:
-    elements = 5
-    parts = [(True, 3, 4), (True, 3, 1), (False, 2, 2), (False, 0, 3)]
-    space = compat.mixed_space(compat.interval_mesh(COMM, elements, -1.0, 2.0), parts)
-    for i, (continuous, degree, components) in enumerate(parts):
-        dofmap = space.sub(i).collapse()[0].dofmap
-        size = elements * degree + 1 if continuous else elements * (degree + 1)
-        assert dofmap.index_map.size_global * dofmap.index_map_bs == size * components
 
 
 @pytest.mark.short
@@ -112,25 +93,6 @@ def test_a_second_system_compiles_nothing() -> None:
     with form_compiler.announce_compilation(lambda: said.append("compiling")):
         System(scene(), Discretization("reduced", 9, 6))
     assert COMM.allreduce(said, op=MPI.SUM) == []
-
-
-@pytest.mark.long
-def test_compilation_is_announced_once(folder: Path) -> None:
-    mesh = compat.interval_mesh(COMM, 4, 0.0, 1.0)
-    cache: dict[str, Any] = {KEYWORD: {"cache_dir": str(folder)}}
-    said: list[str] = []
-
-    def integrate() -> float:
-        x = ufl.SpatialCoordinate(mesh)[0]
-        forms = [fem.form(x**n * ufl.dx, **cache) for n in (1, 2)]
-        return sum(COMM.allreduce(fem.assemble_scalar(form)) for form in forms)
-
-    with form_compiler.announce_compilation(lambda: said.append("compiling")):
-        assert integrate() == pytest.approx(1 / 2 + 1 / 3, rel=1e-14)
-    assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]  # by the rank that compiles
-    with form_compiler.announce_compilation(lambda: said.append("again")):
-        assert integrate() == pytest.approx(1 / 2 + 1 / 3, rel=1e-14)
-    assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]
 
 
 @pytest.mark.long

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
+import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from rodfem import compat
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
+from rodfem import Discretization, Ordinate, Plan, Scene, Solver, clamped, compat, free, trace
 from rodfem.fem import form_compiler
 from rodfem.fem.equations import with_constants
-from rodfem.fem.fields import Discretization
-from rodfem.problem.ends import clamped, free
-from rodfem.problem.scene import Ordinate, Scene
+from rodfem.problem.scene import Parameter
 
 pytestmark = pytest.mark.alone
 
@@ -65,3 +63,33 @@ def test_values_are_those_of_the_numbers() -> None:
     assert values[1] == pytest.approx(values[0], rel=1e-14)
     for nothing in (0, 0.5 * x * dx, 7 * x**1.5 * dx):
         assert not getattr(with_constants(nothing, mesh), "constants", list)()
+
+
+def by_number(v: Any, k: Any, c: Any) -> Any:
+    return (k[0] ** 2 + 1.3 * (k[1] - 0.3) ** 2 + 1.5 * k[2] ** 2) / 2 + 0.1 * k[0] ** 4
+
+
+def by_parameter(v: Any, k: Any, c: Any) -> Any:
+    return (k[0] ** 2 + 1.3 * (k[1] - c.n) ** 2 + 1.5 * k[2] ** 2) / 2 + 0.1 * k[0] ** 4
+
+
+def linear(v: Any, k: Any, c: Any) -> Any:
+    return 5.1 * k[2] + (k[0] ** 2 + 1.3 * k[1] ** 2 + 1.5 * k[2] ** 2) / 2 + 0.1 * k[0] ** 4
+
+
+def rod(energy: Any) -> Scene:
+    return Scene(
+        "rod", (0.0, 1.0), "unshearable and inextensible", energy, {"p": Parameter(0.0), "n": Parameter(0.3)}, "p",
+        (clamped(), free(lambda c: (c.p, 0.0, 0.0))), Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 12.0),
+    )  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("energy", [by_number, by_parameter, linear])
+def test_a_number_that_vanishes_shifts_no_other(energy: Any) -> None:
+    """diag(1, -0.3, 1.5) was computed for diag(1, 1.3, 1.5)."""
+    solver = Solver(rod(energy), Discretization(elements=2, degree=3)).equilibria
+    convexity = solver.convexity
+    assert convexity is not None
+    matrices = convexity._matrices(solver.start(0.0))  # the straight rod
+    np.testing.assert_allclose(matrices, np.broadcast_to(np.diag([1.0, 1.3, 1.5]), matrices.shape), atol=1e-12)

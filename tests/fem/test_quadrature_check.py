@@ -129,16 +129,3 @@ def test_loads_and_masses_that_jump(jumping: Callable[[Any], dict[str, Any]]) ->
     for at, elements in ((0.43, 8), (0.5, 8)):
         rod = scene(lambda s: 1.0, **jumping(lambda s, at=at: ufl.conditional(ufl.lt(s, at), 1.0, 3.0)))
         assert (f"{NOT}0.43" in checked(rod, elements, 6)) == (at == 0.43)
-
-
-def test_a_kilometre_of_pipe() -> None:
-    """A force along it that is sharp about 710 m, between two beds that end at a break."""
-    bed = lambda x, c: 1e-9 * ufl.conditional(ufl.lt(x.s, 500.0), 1.0, 3.0) * x.r[0] ** 2  # noqa: E731
-    push = lambda c: (0.0, 0.0, -c.P * (1 + ufl.tanh((c.s - 710.0) / 0.3)))  # noqa: E731
-    pipe = column(
-        "long", SUPPORTS["clamped-free"], (0.0, 1e-6), interval=(0.0, 1e3), breaks=(500.0,), potential=bed,
-        distributed=push,
-    )  # fmt: skip
-    solver = Solver(pipe, Discretization("auto", 8, 6))
-    sentence = QuadratureCheck(solver.equilibria.system)(solver.equilibrium(5e-7).x)
-    assert "the element from 625 to 750" in sentence and any(f"{NOT}{place}" in sentence for place in (70, 71))

@@ -75,14 +75,6 @@ def test_a_distributed_force_adds_up_along_the_rod() -> None:
     assert np.allclose(found["n"], LOAD * (1.0 - found["s"])[..., None] * [0.0, 0.0, -1.0], atol=1e-9)
 
 
-@pytest.mark.long
-def test_the_force_jumps_where_a_force_acts() -> None:
-    """``midway`` has its force at s = 0.4."""
-    found = at_vertices(scenes()["midway"])
-    below = found["s"].mean(axis=1) < 0.4
-    assert np.allclose(found["n"][below], [0.0, 0.0, -LOAD], atol=1e-9) and abs(found["n"][~below]).max() < 1e-9
-
-
 def test_profiles_of_polynomials() -> None:
     """Values at nodes are exact, and a jump counts where nothing acts."""
     ends = np.array([0.0, 0.5, 0.7, 1.0])

@@ -239,12 +239,6 @@ def test_they_agree_at_an_equilibrium_and_only_there() -> None:
     assert abs(balance - second) > 1e-3
 
 
-def test_the_papers_linearisation_is_named() -> None:
-    for function, paper_has_it in ((paper.linearized_balance, True), (paper.second_variation, False)):
-        assert ("(17)-(19)" in (function.__doc__ or "")) == paper_has_it
-    assert "(11)-(12)" in (paper.first_variation.__doc__ or "")
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_acceleration_of_the_curve_is_a_change_of_length(seed: int) -> None:
     """Polarised, it is ``-1/4 theta1 . theta2 q``: the unit norm term's share in the Hessian, times minus eta."""

@@ -143,12 +143,6 @@ def test_rooms_know_only_those_below() -> None:
             assert known.isdisjoint({"dolfinx", "petsc4py", "slepc4py", "mpi4py"}), module
 
 
-def test_circles_and_levels_of_a_graph() -> None:
-    graph = {"a": {"b"}, "b": {"c"}, "c": {"d", "b"}, "d": set(), "e": {"e", "a"}}
-    assert circles(graph) == [{"b", "c"}, {"e"}]
-    assert levels({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == 3
-
-
 def test_forms_are_ufl_alone() -> None:
     for module, tree in modules().items():
         if module.startswith(FORMS):

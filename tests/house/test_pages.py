@@ -50,16 +50,3 @@ def test_every_public_name_is_described() -> None:
         if not re.search(rf"auto\w+:: rodfem\.{name}$|auto\w+:: {name}$|`{name}`", described, re.M)
     ]
     assert not missing, f"docs/api lacks {', '.join(missing)}"
-
-
-def test_a_wrong_line_and_a_wrong_name_are_found(tmp_path: Path) -> None:
-    page = HOME / "docs" / "theory" / "rod.md"
-    text = links["refreshed"](page)
-    assert len(links["LINK"].findall(text)) > 10
-    name = "[`rodfem.forms.rotation.product`](../../forms/rotation.py#L30)"
-    assert name in text
-    wrong = type("Page", (), {"parent": page.parent, "read_text": lambda self: name.replace("L30", "L31")})()
-    assert links["refreshed"](wrong) == name
-    wrong = type("Page", (), {"parent": page.parent, "read_text": lambda self: name.replace("product", "sum")})()
-    with pytest.raises(KeyError, match=r"rodfem\.forms\.rotation\.sum"):
-        links["refreshed"](wrong)

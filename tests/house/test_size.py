@@ -109,18 +109,5 @@ def test_nothing_grows(name: str) -> None:
     assert figures()[name] <= MOST[name]
 
 
-def test_measures() -> None:
-    """Each measure, of a program in which one counts by hand."""
-    tree = ast.parse(
-        "import ufl.algorithms\nA, B = 1.5, 'b'\nC: bool = True\n"
-        "def f(a, b, c, d, e, *, g=1):\n    for x in a:\n        if x and b or c:\n"
-        "            o.warn([y for y in d if y])\n    else:\n        return 1 if e else 2\n"
-    )
-    (function,) = (node for node in tree.body if isinstance(node, ast.FunctionDef))
-    assert complexity(function) == 1 + 2 + 1 + 2 + 2 + 1
-    assert (parameters(function), [numeric(line) for line in tree.body]) == (6, [False, True, False, False])
-    assert (internal(tree), sum(map(warns, ast.walk(tree)))) == (True, 1)
-
-
 if __name__ == "__main__":
     print(*(f"{number:6}  {name}" for name, number in figures().items()), sep="\n")

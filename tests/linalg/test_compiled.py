@@ -62,12 +62,3 @@ def test_memory_keeps_what_a_pointer_points_to() -> None:
 def test_arrays_that_c_would_read_wrongly_are_refused(values: np.ndarray) -> None:
     with pytest.raises(ValueError):
         compiled.buffer(compiled.module("linalg/chain").ffi, values)
-
-
-def test_interface_of_a_file() -> None:
-    code = "#define MOST 3\n#define PUBLIC static\ntypedef struct {\n    int a[MOST];\n} Some;\n\n"
-    code += "static int no(void) { return 1; }\n"
-    code += "PUBLIC int yes(const Some *s,\n               int k)\n{\n    return s->a[k];\n}\n"
-    assert compiled.interface(code).split("\n")[0] == "#define MOST 3"
-    assert "no(" not in compiled.interface(code)
-    assert " ".join(compiled.interface(code).split()).endswith("} Some; int yes(const Some *s, int k);")

@@ -68,19 +68,6 @@ def test_inertia_and_solutions(name: str, state: str, formulation: str, load: fl
         check(factors, matrix, right)
 
 
-@FORMULATIONS
-def test_inertia_beside_a_branch_point(formulation: str) -> None:
-    """The straight rod loses stability at 0.1143042145: eigenvalues are near zero there."""
-    system, x = at("hemitropic", "plain", formulation, 0.1143042145)
-    inertia, factors = Inertia(system), symmetric()
-    for sigma in (-1e-5, 1e-5):
-        matrix = inertia.at(x).matrix
-        matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        factors(matrix)
-        negative = (np.linalg.eigvalsh(gathered(matrix).toarray()) < 0).sum()
-        assert factors.inertia() == (negative, 0)
-
-
 @pytest.mark.versions
 def test_many_right_hand_sides() -> None:
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
