@@ -19,8 +19,10 @@ from rodfem import compat
 from rodfem.fem import form_compiler
 from rodfem.fem.system import System
 from rodfem.forms import paper
+from rodfem.forms.inertia import rotary
 from rodfem.forms.kinematics import RODS, UNDEFORMED, curvature, strain
 from rodfem.forms.lagrangian import pointwise, reduced
+from rodfem.forms.loads import follower_work
 from rodfem.forms.rotation import product, rotation
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.stability.pencil import Blocks
@@ -193,6 +195,23 @@ def test_17_to_19_to_the_letter(rod: str, seed: int) -> None:
     dn = np.cross(x.theta, x.n) + x.R @ x.dn_body
     tests, fields = [x.psi, x.psi_s, x.test_dv, 0 * x.n, x.eta_s], [x.theta, x.theta_s, x.dv, dn, x.dr_s]
     assert x.balance(tests, fields) == pytest.approx(literal, rel=1e-12)
+
+
+def test_16_and_20_to_the_letter() -> None:
+    """The mass ``R I Rt``, and what the rotation of an end adds under a follower force, ``-(theta x n) . eta``."""
+    rng = np.random.default_rng(0)
+    q, (theta, psi, eta, force) = rng.normal(size=4), rng.normal(size=(4, 3))
+    q /= np.linalg.norm(q)
+    dq, dp = (hamilton(np.append(0.0, spin), q) / 2 for spin in (theta, psi))
+    R, inertia = value(rotation(constant(q))), [0.3, 0.5, 0.7]
+    found = rotary(constant(q), constant(dq), constant(dp), tuple(ufl.as_ufl(x) for x in inertia))
+    assert float(value(found)) == pytest.approx(theta @ R @ np.diag(inertia) @ R.T @ psi, rel=1e-13)
+
+    def work(eps: float) -> float:
+        turned = rotation(constant(q + eps * dq))
+        return float(value(follower_work(turned, constant(force), constant(eta))))
+
+    assert (work(1e-5) - work(-1e-5)) / 2e-5 == pytest.approx(np.cross(theta, R @ force) @ eta, rel=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -96,7 +96,7 @@ def test_buckled(name: str, index: int) -> None:
 
 @pytest.mark.long
 def test_nothing_happens_the_easy_way() -> None:
-    found = explored("ruler", direction="e2")
+    found = explored("ruler", direction="e2", span=(0.0, 20.0))
     (plane,) = found.branches
     assert [s.kind for s in plane.special] == ["end"]
     assert {(p.negative, p.zero) for p in plane.points} == {(0, 0)}
