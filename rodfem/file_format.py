@@ -11,13 +11,10 @@ Each entry, group and column is described in ``docs/files.md``.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
-from stat import S_ISREG
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,36 +48,24 @@ class Format:
         return {KEYS[key]: value for key, value in self.mark().items()}
 
     def check(self, data: Any, where: Path | str, needs: Sequence[str] = ()) -> None:
-        """Check the contents of a JSON file, named ``where`` in what is raised.
-
-        Raises :class:`InputError` where it has another format, a newer version of this one, or no mark and not all
-        entries that a reader ``needs``.
-        """
+        """Raise :class:`InputError` for another format, a newer version, or what lacks what a reader ``needs``."""
         if not isinstance(data, Mapping):
             raise InputError(f"{where} has no entries by name, so it is no {self.name}: give {self.file}.")
         self._check(data.get("format"), data, where, needs)
 
     def check_hdf5(self, file: h5py.File, needs: Sequence[str] = ()) -> None:
-        """Check an open HDF5 file, as :meth:`check` does; ``needs`` are names of groups, or of attributes."""
+        """Check an open HDF5 file, as :meth:`check` does a JSON file; ``needs`` are names of groups or attributes."""
         mark = {key: file.attrs.get(name) for key, name in KEYS.items()}
         self._check(mark if mark["name"] else None, {*file.attrs, *file}, file.filename, needs)
 
     @contextmanager
     def opened(self, path: Path | str, needs: Sequence[str] = (), unfit: str = "") -> Iterator[h5py.File]:
-        """Open an HDF5 file that :meth:`check_hdf5` admits, and whose arrays are no larger than what it stores of them.
-
-        Raises :class:`InputError` for what cannot be read inside of the block, too, as :func:`refusal` does; ``unfit``
-        is the sentence.
-        """
+        """Open an HDF5 file; raises :class:`InputError` for what cannot be read inside of the block, too."""
         import h5py
 
-        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."):
-            stat = regular(path)
-            with h5py.File(path, "r") as file:
-                self.check_hdf5(file, needs)
-                if hollow := _hollow(Path(path), stat.st_mtime_ns, stat.st_size):
-                    raise InputError(f"{path} stores a part of the array {hollow} only: run the scene again.")
-                yield file
+        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."), h5py.File(path, "r") as file:
+            self.check_hdf5(file, needs)
+            yield file
 
     def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
         if mark is not None and mark["name"] != self.name:
@@ -124,41 +109,10 @@ def refusal(unfit: str) -> Iterator[None]:
         raise InputError(unfit.replace("{}", reason)) from trouble
 
 
-@lru_cache
-def _hollow(path: Path, changed: int, size: int) -> str:
-    """Name of an array in a file that would be larger in memory than what is stored of it; empty if there is none.
-
-    rodfem stores arrays whole.  The file has its ``size`` since it was ``changed``: it is not searched for each row.
-    """
-    import h5py
-
-    def found(name: str, item: Any) -> str | None:
-        large = isinstance(item, h5py.Dataset) and item.nbytes > item.id.get_storage_size()
-        return name if large else None
-
-    with h5py.File(path, "r") as file:
-        return file.visititems(found) or ""
-
-
-def regular(path: Path | str) -> os.stat_result:
-    """Status of a file; raises :class:`OSError` for a folder, a pipe, and what is larger than this machine's memory."""
-    status = os.stat(path)
-    if not S_ISREG(status.st_mode) or status.st_size > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
-        raise OSError("no regular file, or one larger than the memory")
-    return status
-
-
-def _no_number(name: str) -> float:
-    """Refuse NaN and Infinity, which JSON has not: null stands for them."""
-    raise ValueError(f"{name} is no number of JSON")
-
-
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
     """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
     try:
-        regular(path)
-        text = path.read_text(encoding="utf-8")
-        data: dict[str, Any] = json.loads(text, parse_constant=_no_number)
+        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as trouble:
         also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""
         raise InputError(f"There is no {path}: give {form.file}{also}.") from trouble

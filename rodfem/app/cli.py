@@ -43,14 +43,8 @@ listen()
 
 ARGUMENT = re.compile(r"\b(?:Discretization|Plan|StepControl|run)\((\w+)=([^()]*)\)")
 """An :class:`~rodfem.errors.Argument` in a sentence: its name and its value."""
-
-
 NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$|-(inf|nan)$")
 """A negative number, which is the value of an option and none itself; argparse knows those without exponent."""
-
-
-UNKNOWN = re.compile(r"(?<!\S)--[\w-]+")
-"""An option in a complaint of argparse."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -78,7 +72,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print ``message``, of an unknown option with the nearest one there is, and leave with status 2."""
-        unknown = UNKNOWN.findall(message.partition("unrecognized")[2])
+        unknown = re.findall(r"(?<!\S)--[\w-]+", message.partition("unrecognized")[2])
         if near := [x for word in unknown for x in get_close_matches(word, self._option_string_actions, 1, 0.7)]:
             message += f" (did you mean {', '.join(near)}?)"
         complain(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
@@ -128,12 +122,15 @@ def complain(sentence: str) -> NoReturn:
     from rodfem.ranks import all_come
 
     comm = MPI.COMM_WORLD
-    if comm.rank == 0:
+
+    def write() -> None:
         sys.stderr.write(f"error: {sentence}\n")
         sys.stderr.flush()
+
+    if comm.rank == 0:
+        write()
     if not all_come(comm):
         if comm.rank:
-            sys.stderr.write(f"error: {sentence}\n")
-            sys.stderr.flush()
+            write()
         comm.Abort(2)
     sys.exit(2)

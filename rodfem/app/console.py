@@ -10,13 +10,12 @@ import os
 import signal
 import sys
 import webbrowser
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from difflib import get_close_matches
 from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import fill
-from typing import Any
 
 import rodfem
 from rodfem.app.cli import Parser, complain, folder, run_folder
@@ -31,12 +30,8 @@ Equilibria of nonlinearly elastic rods: which are stable, and at which load stab
 rodfem COMMAND --help lists the arguments of a command.
 """
 UNFIT = "{} lacks what a diagram has, or has something else there ({{}}): run the scene again."
-OF_INFO = ("scene", "parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
-"""Entries of a diagram that ``rodfem info`` prints."""
 HEADS = {"folder": 28, "scene": 16, "date": 10, "branches": 8, "special": 7}
 """Columns of ``rodfem list``, and their widths."""
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
-"""Variables of the environment, one of which is set where there is a display."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -46,7 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         lines = (f"  {each:<10}{_summary(command)}" for each, command in COMMANDS.items())
         print(HELP.format(commands="\n".join(lines)), end="")
     elif name == "--version":
-        print(_versions())
+        from rodfem.output.files import versions  # imports dolfinx, which takes a second
+
+        for library, version in {"rodfem": rodfem.__version__, **versions()}.items():
+            print(f"{library:<8}{version}")
     elif name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
@@ -57,13 +55,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
             COMMANDS[name](words)
         except (InputError, SetupError) as trouble:
             complain(str(trouble))
-
-
-def _versions() -> str:
-    """A line for the program, and one for each library that computes."""
-    from rodfem.output.files import versions  # imports dolfinx, which takes a second
-
-    return "\n".join(f"{name:<8}{version}" for name, version in {"rodfem": rodfem.__version__, **versions()}.items())
 
 
 def _summary(command: Callable[..., None]) -> str:
@@ -123,24 +114,20 @@ def info(words: Sequence[str]) -> None:
     parser = Parser(prog="rodfem info", description=_summary(info))
     parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
     path = parser.parse_args(words).folder / "diagram.json"
-    data = read_json(path, DIAGRAM, OF_INFO)
+    needs = ("scene", "parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
+    data = read_json(path, DIAGRAM, needs)
     with refusal(UNFIT.format(path)):
-        sentences = [f"  {sentence}" for sentence in in_sentences(data)]
-        print(printable("\n".join([*_tables(data, [*table_of(data)]), *sentences])))
-
-
-def _tables(data: Mapping[str, Any], rows: Sequence[Sequence[Any]]) -> list[str]:
-    """Lines of a diagram: constants, meshes, and branches with the ``rows`` of their special points."""
-    constants = ", ".join(f"{name} = {value:.6g}" for name, value in data["constants"].items())
-    lines = [f"{data.get('title', data['scene'])}: {constants or 'no constants'}"]
-    for mesh in data["meshes"]:
-        lines.append(f"  {mesh['elements']} elements of degree {mesh['degree']}, {mesh['unknowns']} unknowns")
-    lines.append(f"  {'branch':<12} {'kind':<13} {data['parameter']:<24} {data['ordinate'][:24]:<24} index")
-    for branch in data["branches"]:
-        for name, kind, load, ordinate, index, _ in (row for row in rows if row[0] == branch["name"]):
-            lines.append(f"  {name:<12} {kind:<13} {load:<24} {ordinate:<24} {index}")
-        lines.append(f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}")
-    return lines
+        constants = ", ".join(f"{name} = {value:.6g}" for name, value in data["constants"].items())
+        lines = [f"{data.get('title', data['scene'])}: {constants or 'no constants'}"]
+        for mesh in data["meshes"]:
+            lines.append(f"  {mesh['elements']} elements of degree {mesh['degree']}, {mesh['unknowns']} unknowns")
+        lines.append(f"  {'branch':<12} {'kind':<13} {data['parameter']:<24} {data['ordinate'][:24]:<24} index")
+        rows = [*table_of(data)]
+        for branch in data["branches"]:
+            for name, kind, load, ordinate, index, _ in (row for row in rows if row[0] == branch["name"]):
+                lines.append(f"  {name:<12} {kind:<13} {load:<24} {ordinate:<24} {index}")
+            lines.append(f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}")
+        print(printable("\n".join([*lines, *(f"  {sentence}" for sentence in in_sentences(data))])))
 
 
 def list_diagrams(words: Sequence[str]) -> None:
@@ -200,7 +187,8 @@ def view(words: Sequence[str]) -> None:
     given = parser.parse_args(words)
     path = write_report(given.folder, given.output)
     print(path)
-    if not given.no_open and (sys.platform in ("darwin", "win32") or any(map(os.environ.get, DISPLAYS))):
+    display = sys.platform in ("darwin", "win32") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if not given.no_open and display:
         webbrowser.open(path.resolve().as_uri())
 
 

@@ -24,12 +24,8 @@ if TYPE_CHECKING:
     from rodfem.fem.fields import Discretization
 
 Mesh = Callable[..., "Discretization"]
-KEPT = "the branches that were finished are in"
-"""What there is in the folder of a run that was interrupted."""
 NOTED = ("-rodfem_", "-mat_", "-vec_", "-eps_", "-st_", "-ksp_", "-pc_")
 """Beginnings of options of solvers, all of which have the prefix ``rodfem_`` here, of matrices and of vectors."""
-STEP = 0.1
-"""Largest step along a branch, in radian, by default."""
 HELP = """usage: rodfem run FILE.py [--scene NAME] [OPTIONS]
 
 Trace the rod of a file: a Scene, or a function with '-> Scene' whose arguments have defaults and are the rod's
@@ -52,24 +48,20 @@ def main(words: Sequence[str]) -> None:
     module = load(Path(file))
     statement, mesh = Statement(rod_of(module, name)), mesh_of(module)
     ours, petsc = (rest[: rest.index("--")], rest[rest.index("--") + 1 :]) if "--" in rest else (rest, [])
-    parser = parser_of(statement, statement.scene(), f"rodfem run {file}")
-    _refuse_the_load(statement.scene().load, ours, parser)
+    usual = statement.scene()
+    parser, option = parser_of(statement, usual, f"rodfem run {file}"), f"--{usual.load}"
+    if option in [word.split("=")[0] for word in ours] and option not in parser._option_string_actions:
+        complain(f"{usual.load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
     options = parser.parse_args(ours)
     start_petsc(petsc)
+    kept = f"the branches that were finished are in {options.output}"
     try:
         with sentences(parser):
             _run(statement, mesh, options, petsc, parser.in_options)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {KEPT} {options.output}: rodfem.load reads them") from None
+        raise KeyboardInterrupt(f"interrupted; {kept}: rodfem.load reads them") from None
     except MemoryError:
-        complain(f"Memory is exhausted: use fewer elements or a lower degree; {KEPT} {options.output}.")
-
-
-def _refuse_the_load(load: str, words: Sequence[str], parser: Parser) -> None:
-    """Complain of the load among the options, unless a constant has its name: a run varies it."""
-    option = f"--{load}"
-    if option in [word.split("=")[0] for word in words] and option not in parser._option_string_actions:
-        complain(f"{load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
+        complain(f"Memory is exhausted: use fewer elements or a lower degree; {kept}.")
 
 
 def unread(words: Sequence[str]) -> list[str]:
@@ -170,59 +162,49 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
     """Declare them; ``load`` is the name of the load, ``output`` the default folder."""
     from rodfem.fem import formulations
 
-    words = {
-        "--elements": "number of finite elements along the rod (default: the scene's own, or 8)",
-        "--degree": "polynomial degree; the error falls as h^(2K) (default: the scene's own, or 6)",
-        "--formulation": "; ".join(f"{made.name}: {made.words}" for made in formulations.FORMULATIONS.values())
-        + f"; {formulations.AUTO}: the first that the scene allows (default {formulations.AUTO})",
-        "--factors": "chain: compiled assembly and elimination along the rod, on one rank; petsc: the same numbers, "
-        "slower, by dolfinx, PETSc and MUMPS, as always on several ranks (default chain)",
-        "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
-        "error by less than EPS (relative to values greater than one)",
-        "--range": f"start at {load} = A, stay between A and B (default: the scene's)",
-        "--at": f"compute every branch also at exactly these values of {load}",
-        "--step": f"largest step along a branch, in radian of rotation (root mean square; default {STEP})",
-        "--depth": "follow what leaves from branch points of branches of a depth less than D; the first branch has "
-        "depth 0, what leaves from it 1, and so on (default 2)",
-        "--spectrum": "also compute the K left-most eigenvalues of every state with SLEPc",
-        "--method": "judge the states at the loads of --at, and print all that is said, by "
-        f"{', '.join((AUTO, *METHODS))}",
-        "--modes": "find and draw the K left-most modes of the states at the loads of --at",
-        "--search": "at each load of --at also look for equilibria that no branch has reached, with that many tries",
-        "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
-        "--output": f"folder for files and pictures (default {output})",
-        "--no-figures": "draw nothing",
-        "--verbose": "print what is technical, too: meshes, special points as they are found, times, methods",
-    }
-    groups: dict[str, dict[str, dict[str, Any]]] = {
-        "discretisation": {
-            "--elements": {"type": int, "metavar": "N"},
-            "--degree": {"type": int, "metavar": "K"},
-            "--formulation": {"metavar": f"{{{','.join(formulations.names())}}}"},
-            "--factors": {"default": "chain", "metavar": "{chain,petsc}"},
-            "--accuracy": {"type": float, "metavar": "EPS"},
-        },
-        "what to compute": {
-            "--range": {"dest": "span", "type": float, "nargs": 2, "metavar": ("A", "B")},
-            "--at": {"type": float, "nargs": "+", "default": [], "metavar": "LOAD"},
-            "--step": {"dest": "largest", "type": float, "metavar": "S"},
-            "--depth": {"type": int, "default": 2, "metavar": "D"},
-            "--spectrum": {"type": int, "default": 0, "metavar": "K"},
-            "--method": {"default": "", "metavar": "NAME"},
-            "--modes": {"type": int, "default": 0, "metavar": "K"},
-            "--search": {"dest": "tries", "type": int, "default": 0, "metavar": "TRIES"},
-            "--locus": {"nargs": 3, "metavar": ("NAME", "LOW", "HIGH")},
-        },
-        "output": {
-            "--output": {"type": folder, "default": output, "metavar": "DIR"},
-            "--no-figures": {"dest": "figures", "action": "store_false"},
-            "--verbose": {"action": "store_true"},
-        },
-    }
-    for title, options in groups.items():
-        group = parser.add_argument_group(title)
-        for option, how in options.items():
-            group.add_argument(option, help=words[option], **how)
+    made = "; ".join(f"{each.name}: {each.words}" for each in formulations.FORMULATIONS.values())
+    auto = f"{formulations.AUTO}: the first that the scene allows (default {formulations.AUTO})"
+    known = f"{{{','.join(formulations.names())}}}"
+    add = parser.add_argument_group("discretisation").add_argument
+    words = "number of finite elements along the rod (default: the scene's own, or 8)"
+    add("--elements", type=int, metavar="N", help=words)
+    words = "polynomial degree; the error falls as h^(2K) (default: the scene's own, or 6)"
+    add("--degree", type=int, metavar="K", help=words)
+    add("--formulation", metavar=known, help=f"{made}; {auto}")
+    words = "chain: compiled assembly and elimination along the rod, on one rank; petsc: the same numbers, slower, by "
+    words += "dolfinx, PETSc and MUMPS, as always on several ranks (default chain)"
+    add("--factors", default="chain", metavar="{chain,petsc}", help=words)
+    words = "instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by "
+    words += "less than EPS (relative to values greater than one)"
+    add("--accuracy", type=float, metavar="EPS", help=words)
+
+    add = parser.add_argument_group("what to compute").add_argument
+    words = f"start at {load} = A, stay between A and B (default: the scene's)"
+    add("--range", dest="span", type=float, nargs=2, metavar=("A", "B"), help=words)
+    words = f"compute every branch also at exactly these values of {load}"
+    add("--at", type=float, nargs="+", default=[], metavar="LOAD", help=words)
+    words = "largest step along a branch, in radian of rotation (root mean square; default 0.1)"
+    add("--step", dest="largest", type=float, default=0.1, metavar="S", help=words)
+    words = "follow what leaves from branch points of branches of a depth less than D; the first branch has depth 0, "
+    words += "what leaves from it 1, and so on (default 2)"
+    add("--depth", type=int, default=2, metavar="D", help=words)
+    words = "also compute the K left-most eigenvalues of every state with SLEPc"
+    add("--spectrum", type=int, default=0, metavar="K", help=words)
+    words = "judge the states at the loads of --at, and print all that is said, by "
+    add("--method", default="", metavar="NAME", help=words + ", ".join((AUTO, *METHODS)))
+    words = "find and draw the K left-most modes of the states at the loads of --at"
+    add("--modes", type=int, default=0, metavar="K", help=words)
+    words = "at each load of --at also look for equilibria that no branch has reached, with that many tries"
+    add("--search", dest="tries", type=int, default=0, metavar="TRIES", help=words)
+    words = "follow every special point in the plane of the load and the constant NAME from LOW to HIGH"
+    add("--locus", nargs=3, metavar=("NAME", "LOW", "HIGH"), help=words)
+
+    add = parser.add_argument_group("output").add_argument
+    words = f"folder for files and pictures (default {output})"
+    add("--output", type=folder, default=output, metavar="DIR", help=words)
+    add("--no-figures", dest="figures", action="store_false", help="draw nothing")
+    words = "print what is technical, too: meshes, special points as they are found, times, methods"
+    add("--verbose", action="store_true", help=words)
 
 
 def discretization_of(options: argparse.Namespace, own: Discretization | None) -> Discretization:
@@ -245,32 +227,16 @@ def plan_of(options: argparse.Namespace) -> Plan:
     from rodfem.continuation.step_control import StepControl
     from rodfem.diagram.plan import Plan
 
-    return Plan(
-        None if options.span is None else tuple(options.span),
-        tuple(options.at),
-        depth=options.depth,
-        spectrum=options.spectrum,
-        steps=StepControl(largest=STEP if options.largest is None else options.largest),
-        tries=options.tries,
-        locus=_pair(options.locus),
-        method=options.method,
-        modes=options.modes,
-        accuracy=options.accuracy,
-    )
-
-
-def _pair(words: Sequence[str] | None) -> tuple[str, float, float] | None:
-    """Name and interval of a second parameter; raises :class:`InputError` for what are no numbers."""
-    if words is None:
-        return None
-    try:
-        return words[0], float(words[1]), float(words[2])
-    except ValueError:
-        raise InputError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None
-
-
-KINDS = (bool, int, float, str)
-"""Types of a constant; a tuple has numbers."""
+    locus = options.locus
+    if locus is not None:
+        try:
+            locus = locus[0], float(locus[1]), float(locus[2])
+        except ValueError:
+            what = f"{locus[1]} to {locus[2]} is no interval"
+            raise InputError(f"{what}: give two numbers after {locus[0]}.") from None
+    same = {x: getattr(options, x) for x in ("depth", "spectrum", "tries", "method", "modes", "accuracy")}
+    steps, span = StepControl(largest=options.largest), None if options.span is None else tuple(options.span)
+    return Plan(span, tuple(options.at), steps=steps, locus=locus, **same)
 
 
 class Constant(NamedTuple):
@@ -289,17 +255,15 @@ class Constant(NamedTuple):
 
     def declare(self, group: Any) -> None:
         """Declare the option in a group of options of :mod:`argparse`."""
-        how: dict[str, Any] = {"dest": self.name, "default": self.default, "help": self._help()}
+        shown = " ".join(f"{x:g}" for x in self.default) if self.size else self.default
+        default = f"{shown:g}" if self.kind is float and not self.size else shown
+        words = f"{self.words} (default {default})".replace("%", "%%").strip()
+        how: dict[str, Any] = {"dest": self.name, "default": self.default, "help": words}
         if self.kind is bool:
             group.add_argument(self.option, action=argparse.BooleanOptionalAction, **how)
         else:
             how |= {} if self.size is None else {"nargs": self.size}
             group.add_argument(self.option, type=self.kind, metavar="X" if self.kind is float else "N", **how)
-
-    def _help(self) -> str:
-        shown = " ".join(f"{x:g}" for x in self.default) if self.size else self.default
-        default = f"{shown:g}" if self.kind is float and not self.size else shown
-        return f"{self.words} (default {default})".replace("%", "%%").strip()
 
 
 class Statement:
@@ -341,7 +305,7 @@ def _constant(owner: str, argument: Parameter, described: Mapping[str, str]) -> 
     kinds = set(map(type, default)) if size else {type(default)}
     number = kinds == {int} and "float" in str(argument.annotation)
     kind = float if number or kinds == {int, float} else kinds.pop()
-    if kind not in (KINDS if size is None else (int, float)):
+    if kind not in ((bool, int, float, str) if size is None else (int, float)):
         raise InputError(
             f"The argument {name} of {owner} has the default {default!r}: give a number, a word, or a tuple of numbers."
         )

@@ -58,29 +58,28 @@ def many(
     end_together()
     with locked(folder, comm):
         files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
-        return _shared(scenes, work, files, comm, progress)
+        on_first(comm, lambda: _check(files))
+        trouble: InputError | None = None
+        try:
+            for done, i in enumerate(range(comm.rank, len(scenes), comm.size), start=1):
+                if _saved(files[i], key_of(scenes[i])) is None:
+                    result = _result(scenes[i], work)
+                    with held():
+                        save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
+                if comm.rank == 0:
+                    progress(min(done * comm.size, len(scenes)), len(scenes))
+        except InputError as error:  # a result or a file cannot be written: the other ranks go on with theirs
+            trouble = error
+        for other in filter(None, comm.allgather(trouble)):
+            raise other
+        pairs = zip(files, scenes, strict=True) if comm.rank == 0 else ()
+        return comm.bcast([_saved(file, key_of(scene)) or {} for file, scene in pairs])
 
 
-def _shared(
-    scenes: Sequence[Scene], work: Work, files: Sequence[Path], comm: MPI.Comm, progress: Callable[[int, int], None]
-) -> list[dict[str, Any]]:
-    """Do the ``work`` on all ``scenes``, each with a file of its own, as :func:`many` does."""
-    on_first(comm, lambda: _check(files))
-    trouble: InputError | None = None
-    try:
-        for done, i in enumerate(range(comm.rank, len(scenes), comm.size), start=1):
-            if _saved(files[i], key_of(scenes[i])) is None:
-                result = _result(scenes[i], work)
-                with held():
-                    save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
-            if comm.rank == 0:
-                progress(min(done * comm.size, len(scenes)), len(scenes))
-    except InputError as error:  # a result or a file cannot be written: the other ranks go on with theirs
-        trouble = error
-    for other in filter(None, comm.allgather(trouble)):
-        raise other
-    found = [_saved(file, key_of(scene)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
-    return comm.bcast([{} if result is None else result for result in found])
+def _check(files: Sequence[Path]) -> None:
+    """Raise :class:`InputError` where a file has a format that is not to be written over."""
+    for file in files:
+        RESULT.check(_contents(file), file)
 
 
 def _result(scene: Scene, work: Work) -> dict[str, Any]:
@@ -90,24 +89,14 @@ def _result(scene: Scene, work: Work) -> dict[str, Any]:
             result = work(scene)
     except (InputError, ConvergenceError) as trouble:
         return {"error": str(trouble)}
-    if refused := _not_kept(result):
-        raise InputError(refused)
-    return result
-
-
-def _not_kept(result: Any) -> str:
-    """Sentence on a result that a file cannot hold, empty for one that it can."""
     try:
         json.dumps(result, allow_nan=False)
     except (TypeError, ValueError) as trouble:
-        return f"The work returns what no file can hold ({trouble}): return numbers, texts and lists, None for nan."
-    return "" if isinstance(result, dict) else f"The work returns {result!r}: return a dictionary."
-
-
-def _check(files: Sequence[Path]) -> None:
-    """Raise :class:`InputError` where a file has a format that is not to be written over."""
-    for file in files:
-        RESULT.check(_contents(file), file)
+        what = f"The work returns what no file can hold ({trouble})"
+        raise InputError(f"{what}: return numbers, texts and lists, None for nan.") from trouble
+    if not isinstance(result, dict):
+        raise InputError(f"The work returns {result!r}: return a dictionary.")
+    return result
 
 
 def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, suppress
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -23,18 +23,6 @@ _read: list[Path] = []
 
 class RunsItselfError(BaseException):
     """A file that is read for its rod asks for a run of its own: reading it ends there, the rod is stated."""
-
-
-@contextmanager
-def for_its_rod(file: Path) -> Iterator[None]:
-    """Read a ``file`` up to where it runs its rod itself: the range and the options are the command line's."""
-    _read.append(file)
-    try:
-        yield
-    except RunsItselfError:
-        pass
-    finally:
-        _read.pop()
 
 
 def leave_the_run() -> None:
@@ -54,37 +42,35 @@ def as_sentence(file: Path, remedy: str) -> Iterator[None]:
     except InputError:
         raise
     except (Exception, SystemExit) as trouble:  # whatever the file does
-        where = f"{file}{_line(file.resolve(), trouble)}"
+        frames = [f for f in extract_tb(trouble.__traceback__) if f.filename == str(file.resolve())]
+        line = trouble.lineno if isinstance(trouble, SyntaxError) else frames[-1].lineno if frames else None
+        where = f"{file}, line {line}" if line else f"{file}"
         raise InputError(f"{where}: {type(trouble).__name__}: {trouble}; {remedy}.") from trouble
 
 
 def load(file: Path, name: str | None = None) -> ModuleType:
-    """Module of a file, by the name of the file, with a stroke that no other module has, or by another one.
+    """Module of a file, read for the rod that it states, or by another ``name``.
 
-    Raises :class:`~rodfem.errors.InputError` where it is missing, ends the program, or fails: with the last of its own
-    lines that ran.
+    The name of the file gets a stroke that no other module has.  Where the file runs its rod itself, the rod is stated,
+    and reading ends: the range and the options are the command line's.  Raises :class:`~rodfem.errors.InputError` where
+    it is missing, ends the program, or fails: with the last of its own lines that ran.
     """
     if not file.is_file():
         raise InputError(f"{file} is no file: give the path of a Python program.")
     path = file.resolve()
-    stated = nullcontext() if name else for_its_rod(path)
+    for_its_rod = [] if name else [path]
     name = name or f"{file.stem}_"
     spec = spec_from_loader(name, SourceFileLoader(name, str(path)))
     assert spec is not None and spec.loader is not None
-    module, before = module_from_spec(spec), sys.modules.get(spec.name)
-    sys.modules[spec.name] = module  # where pickling, and dataclasses, look
+    module, before = module_from_spec(spec), sys.modules.get(name)
+    sys.modules[name] = module  # where pickling, and dataclasses, look
     sys.path.append(str(path.parent))
+    _read.extend(for_its_rod)
     try:
-        with stated, as_sentence(file, f"run {sys.executable} {file} to see more"):
+        with suppress(RunsItselfError), as_sentence(file, f"run {sys.executable} {file} to see more"):
             spec.loader.exec_module(module)
     finally:
+        del _read[len(_read) - len(for_its_rod) :]
         if before is not None:
-            sys.modules[spec.name] = before
+            sys.modules[name] = before
     return module
-
-
-def _line(path: Path, trouble: BaseException) -> str:
-    """Last line of a file that ran before it failed, or that is no Python, in words."""
-    lines = [frame.lineno for frame in extract_tb(trouble.__traceback__) if frame.filename == str(path)]
-    line = trouble.lineno if isinstance(trouble, SyntaxError) else lines[-1] if lines else None
-    return f", line {line}" if line else ""

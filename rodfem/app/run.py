@@ -27,22 +27,19 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder, typical_modes
-from rodfem.modes.modes import Modes, save_modes
+from rodfem.modes.modes import save_modes
 from rodfem.output.files import load_json, save_json, save_run
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
-from rodfem.stability.assessment import Assessor, Verdict
+from rodfem.stability.assessment import Assessor
 from rodfem.whole_files import locked, remove_earlier
 
 if TYPE_CHECKING:
     from rodfem.codim2.locus import Locus
 
 atexit.register(gc.freeze)  # what there is at the end goes with the process: a search for garbage in it takes 0.15 s
-
-GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
-"""Plain text for TeX names in the caption of a picture."""
 
 
 @checked(
@@ -116,10 +113,7 @@ class Terminal(Report):
     def __init__(
         self, plan: Plan, output: Path, comm: MPI.Comm, words: Callable[[str], str], *, quiet: bool, verbose: bool
     ) -> None:
-        """Write what the ``plan`` asks for into the folder ``output``, which there is, on the first rank of ``comm``.
-
-        With ``quiet`` nothing is printed, else what ``words`` makes of each line, if ``verbose`` of technical ones too.
-        """
+        """Write what the ``plan`` asks for into a folder ``output`` that there is, on the first rank of ``comm``."""
         super().__init__(comm, words=words, verbose=verbose)
         if quiet:
             self.on = self.live = False
@@ -145,6 +139,12 @@ class Terminal(Report):
             self.data = diagram.data | {"files": self.files}
             save_run(self.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
             self._saved = len(diagram)
+
+    def warn_of(self, diagram: Diagram, trouble: Exception, branch: Branch, special: SpecialPoint) -> None:
+        """Print a warning of a special point, and keep it with the diagram."""
+        remark = Remark(str(trouble), special.point.load, branch=branch.name)
+        diagram.warnings.append(remark)
+        self.warn(remark)
 
     def name(self, *files: str) -> None:
         """Name ``files`` in the diagram before they are written: the next run in the folder removes what is named."""
@@ -189,53 +189,38 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
         terminal.name()
 
 
-def _warn(diagram: Diagram, terminal: Terminal, remark: Remark) -> None:
-    """Print a warning, and keep it with the diagram."""
-    diagram.warnings.append(remark)
-    terminal.warn(remark)
-
-
 def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""
-    plan, output = terminal.plan, terminal.output
-    which = (
-        "left-most eigenvalues mu = omega^2" if diagram.scene.conservative else "eigenvalues mu = omega^2 nearest zero"
-    )
+    scene, plan, output = diagram.scene, terminal.plan, terminal.output
+    which = "left-most eigenvalues mu = omega^2" if scene.conservative else "eigenvalues mu = omega^2 nearest zero"
     terminal.say(f"\nIs it stable? ({which})")
+    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
+    about |= asdict(diagram.solvers[0].system.fields.discretization)
+    del about["vertices"]
     finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
     saved: list[tuple[str, int]] = []
     for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
-        where = f"{diagram.scene.load} = {special.point.load:.10g}"
+        where = f"{scene.load} = {special.point.load:.10g}"
         terminal.working(f"{branch.name} at {where}: stability{' and modes' if plan.modes else ''}")
+        finder, modes = finder_on(special.point.mesh), None
         try:
-            verdict, modes = _verdict(finder_on(special.point.mesh), special, plan)
+            if plan.modes:
+                verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
+            else:
+                verdict = finder.assessor(special.point.x, plan.method)
         except (InputError, ConvergenceError) as trouble:
-            _warn(diagram, terminal, Remark(str(trouble), special.point.load, branch=branch.name))
+            terminal.warn_of(diagram, trouble, branch, special)
             continue
         terminal.verdict(branch.name, where, verdict.at(special.point), modes)
         if modes is not None:
             terminal.name("modes.h5")
-            keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
-            on_first(terminal.comm, partial(keep, first=not saved, scene=diagram.scene))
+            keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, about)
+            on_first(terminal.comm, partial(keep, first=not saved, scene=scene))
             saved.append((branch.name, special.row))
     if saved:
         pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
         _draw_modes(saved, pictures, terminal)
         terminal.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
-
-
-def _verdict(finder: ModeFinder, special: SpecialPoint, plan: Plan) -> tuple[Verdict, Modes | None]:
-    """Verdict on a state, and its modes if the plan asks for them."""
-    if plan.modes:
-        return finder(special.point.x, plan.modes, plan.method or "auto")
-    return finder.assessor(special.point.x, plan.method), None
-
-
-def _about(diagram: Diagram) -> dict[str, Any]:
-    """What a file of modes says of its scene and its mesh."""
-    scene, mesh = diagram.scene, asdict(diagram.solvers[0].system.fields.discretization)
-    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
-    return about | {name: value for name, value in mesh.items() if name != "vertices"}
 
 
 def _draw_modes(saved: list[tuple[str, int]], pictures: list[str], terminal: Terminal) -> None:
@@ -255,7 +240,9 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
     saved: list[dict] = []
     for branch in diagram:
         near: list[Locus] = []
-        for special in _to_follow(branch):
+        # where it meets another branch, the locus is that one's
+        followed = (s for s in branch.special if s.connects_to is None and (s.kind.counted or s.kind.line))
+        for special in followed:
             which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
             if any(found.passes(special, diagram.solvers[0].units) for found in near):
                 terminal.say(f"\nThe {which} is on a locus above")
@@ -268,7 +255,7 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
             try:
                 near.append(diagram.locus(special, asked[0], asked[1:]))
             except (InputError, ConvergenceError) as trouble:
-                _warn(diagram, terminal, Remark(str(trouble), special.point.load, branch=branch.name))
+                terminal.warn_of(diagram, trouble, branch, special)
                 continue
             terminal.say(near[-1].text())
             saved.append(near[-1].data())
@@ -279,12 +266,6 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
 
         on_first(terminal.comm, lambda: draw_locus(saved, terminal.output / "locus.png"))
         terminal.say(f"Loci in {terminal.output}{os.sep}: locus-1.json ..., locus.png")
-
-
-def _to_follow(branch: Branch) -> list[SpecialPoint]:
-    """Special points of a branch that have a locus, but for those at which it meets another branch."""
-    found = (s for s in branch.special if s.connects_to is None)
-    return [s for s in found if s.kind.counted or s.kind.line]
 
 
 def draw(output: Path, report: Report) -> None:
@@ -302,7 +283,8 @@ def draw(output: Path, report: Report) -> None:
         report.say(f"Picture in {output}{os.sep}: diagram.png")
         return
     branch, row, words = typical_state(data)
-    caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"
+    name = "\N{GREEK SMALL LETTER LAMDA}" if data["parameter_label"] == r"\lambda" else data["parameter"]
+    caption = f"{data['title']}, {branch}, {name} = {words}"
     with ThreadPoolExecutor(1) as background:  # the shape is drawn by a process of its own, for which the thread waits
         shape = background.submit(
             draw_shape_safely, output / "states.h5", branch, row, output / "shape.png", caption=caption

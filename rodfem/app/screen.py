@@ -1,12 +1,7 @@
-"""A terminal, by rich: lines in colours that stay, and one below them that says what is done now.
-
-Colours are those of headings, codes of special points, warnings, and what is stable or not.  This module is imported
-where there is a terminal: rich takes some 12 ms to load.
-"""
+"""A terminal, by rich, which takes 12 ms to load: lines in colours, and one below them that says what is done now."""
 
 from __future__ import annotations
 
-import re
 from time import monotonic
 from typing import TextIO
 
@@ -18,10 +13,8 @@ from rich.text import Text
 from rodfem.continuation.kinds import KINDS
 
 CODES = "|".join(sorted({kind.code for kind in KINDS.values() if kind.code}))
-LINES = ((re.compile(r"^  ! "), "yellow"), (re.compile(r"^\S"), "bold"))
-"""Beginnings of lines that have one style, and the styles: the first that fits."""
 PARTS = ((rf"(?<=^  )(?:{CODES})\b", "cyan"), (r"\bunstable\b", "red"), (r"\bstable\b", "green"))
-"""Parts of other lines, and their styles."""
+"""Parts of lines, and their styles."""
 SHORT = 0.5
 """Seconds of a run without a line that changes."""
 
@@ -29,10 +22,9 @@ SHORT = 0.5
 def coloured(line: str) -> Text:
     """One line of text with its colours."""
     text = Text(line)
-    for beginning, style in LINES:
-        if beginning.match(line):
-            text.stylize(style)
-            return text
+    if line.startswith("  ! ") or line[:1].strip():
+        text.stylize("yellow" if line.startswith("  ! ") else "bold")
+        return text
     for part, style in PARTS:
         text.highlight_regex(part, style)
     return text
@@ -57,22 +49,15 @@ class Screen:
         self._console.print(coloured(line))
 
     def status(self, words: str, *, long: bool) -> None:
-        """Say what is done now, with the time since something was, until :meth:`close`.
-
-        At once where it takes ``long``; else only after a :data:`SHORT` time, so that a short run draws no such line.
-        """
-        if self._progress is None:
-            if not long and monotonic() - self._begun < SHORT:
-                return
-            text = TextColumn(
-                "{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis")
-            )
-            columns = SpinnerColumn(style="cyan"), text, TimeElapsedColumn()
-            self._progress = Progress(*columns, console=self._console, transient=True)
+        """Say what is done now, until :meth:`close`; a short run draws no such line unless it takes ``long``."""
+        if self._progress is not None:
+            self._progress.update(self._task, description=words)
+        elif long or monotonic() - self._begun > SHORT:
+            one_line = Column(no_wrap=True, overflow="ellipsis")
+            columns = TextColumn("{task.description}", markup=False, table_column=one_line), TimeElapsedColumn()
+            self._progress = Progress(SpinnerColumn(style="cyan"), *columns, console=self._console, transient=True)
             self._task = self._progress.add_task(words, total=None)
             self._progress.start()
-        else:
-            self._progress.update(self._task, description=words)
 
     def close(self) -> None:
         """Remove the line that changes, and show the cursor again."""

@@ -1,11 +1,9 @@
-"""A file that states a rod, run as a program: without options it is a lesson, with options ``rodfem run FILE OPTIONS``.
+"""A file that states a rod, run as a program: without options a lesson, with options ``rodfem run FILE OPTIONS``.
 
-A demo states its rod, and ends with a cell that traces it::
+A demo states its rod, and ends with a cell that traces it, which ``rodfem run`` leaves out::
 
     if script.lesson(__name__):
         diagram = rodfem.trace(cord(), mesh())
-
-``rodfem run`` imports the file: it takes the rod and the mesh, and leaves out the cell.
 """
 
 from __future__ import annotations
@@ -18,15 +16,9 @@ from rodfem.app.interrupts import end_quietly
 
 
 def lesson(name: str) -> bool:
-    """Whether the file's own cell is to run: it is the program, or a notebook, and has no options.
+    """Whether the cell of a file of this ``__name__`` is to run: it is the program, or a notebook, without options.
 
-    With options the file is ``rodfem run FILE OPTIONS``, with the errors and the status of that, and the cell does not
-    run.  What a lesson prints is printed by the first rank alone, until nobody reads it.
-
-    Parameters
-    ----------
-    name
-        ``__name__`` of the file.
+    What a lesson prints is printed by the first rank alone, until nobody reads it.
     """
     if name != "__main__":
         return False

@@ -46,7 +46,7 @@ STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
 def _mesh(system: System) -> str:
-    """Discretisation in words: elements, the smallest and the largest where they differ, degree, unknowns."""
+    """Discretisation in words."""
     d = system.fields.discretization
     words = f"{d.elements} elements of degree {d.degree}"
     if d.vertices is not None:
@@ -111,17 +111,14 @@ class Report(Observer):
         *,
         verbose: bool = True,
     ) -> None:
-        """Print what ``words`` makes of each line to ``stream``, by default the terminal, on rank 0 of ``comm``.
-
-        Technical lines are printed if ``verbose``.
-        """
+        """Print what ``words`` makes of each line, if ``verbose`` of technical ones too, to ``stream`` on rank 0."""
         self.verbose = verbose
         self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and comm.size == 1 and is_screen(self.stream)
         self.known: list[Branch] = []
-        self.load, self.told = "load", monotonic()
+        self.load, self.shown = "load", monotonic()
 
     @cached_property
     def screen(self) -> Screen:
@@ -234,9 +231,9 @@ class Report(Observer):
 
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced; elsewhere than on a terminal print it now and then."""
-        if not self.live and monotonic() - self.told < PAUSE:
+        if not self.live and monotonic() - self.shown < PAUSE:
             return
-        self.told, waiting = monotonic(), not_followed(self.known)
+        self.shown, waiting = monotonic(), not_followed(self.known)
         words = (
             f"{branch.name}, {len(self.known)} known, {many(waiting, 'branch point')} left to follow, "
             f"{self.load} = {in_decimals(point.load, 5, self.units.load)}, {self.count} {point.negative}, "
@@ -268,10 +265,7 @@ class Report(Observer):
         self.detail(f"  {len(branch.points)} points; ended: {branch.ended}")
 
     def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
-        """Print every special point of a diagram, with its error bar, and what was not followed.
-
-        ``data`` are the contents of ``diagram.json``, ``branches`` the same ones, ``most`` the plan's number of them.
-        """
+        """Print every special point of the ``data`` of diagram.json, and what was not followed of its ``branches``."""
         load, ordinate = (with_unit(data[x], data.get(f"{x}_unit") or "") for x in ("parameter", "ordinate"))
         rows = list(table_of(data))
         bars = "in parentheses a bound of the error" if is_estimated(data) else "no estimate of the errors"
