@@ -168,15 +168,14 @@ class Meshes:
         start of a branch keeps its load; a branch point from which one leaves is not carried.  Raises
         :class:`ConvergenceError` if no point is left.
         """
-        starts = history[0].arclength == 0.0
-        first = 1 if starts and from_branch_point else 0
-        pairs: list[tuple[Point, Point]] = []
-        for number in range(len(history) - 1, first - 1, -1):
-            old = history[number]
-            new = self._carried(old, target, fixed_load=starts and number == 0)
-            if new is not None and (pairs or number == first or new.negative == old.negative):
+        rows, pairs = list(history), list[tuple[Point, Point]]()
+        del rows[: int(from_branch_point and rows[0].arclength == 0.0)]
+        while rows and len(pairs) < 4:
+            old = rows.pop()
+            new = self._carried(old, target, fixed_load=old.arclength == 0.0)
+            if new is not None and (pairs or not rows or new.negative == old.negative):
                 pairs.insert(0, (old, new))
-            if pairs and (pairs[0][0] is not old or len(pairs) == 4):
+            elif pairs:
                 break
         if not pairs:
             raise ConvergenceError(

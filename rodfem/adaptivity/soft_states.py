@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import compress, groupby
 from math import inf, isfinite
 
@@ -81,13 +82,8 @@ class SoftStates:
         least = self._differing(point, fixed_load) if compare and self._richer else 0
         if clear and not least:
             return False
-        near = near_zero(inertia.at(point.x), least=least)
-        branch = [point.tangent] if family and point.tangent is not None else []
-        if branch:  # its own eigenvalue is a zero, and none of those that are judged
-            kept = [i for i, v in enumerate(near.vectors) if across(metric, [v], branch)]
-            near = near.at(kept, near.rest + len(near.vectors) - len(kept))
-        modes = self._modes(point, near)
-        others = [i for i, v in enumerate(near.vectors) if across(metric, [v], vanishing)]
+        near, branch = self._near(point, least, family)
+        modes, others = self._modes(point, near), _across(metric, near.vectors, vanishing)
         for i in set(range(len(modes))).difference(others):
             modes[i] = replace(modes[i], uncertainty=max(abs(modes[i].value), modes[i].uncertainty))
         if others and self._richer:
@@ -97,6 +93,14 @@ class SoftStates:
                 modes[i] = mode
         self._record(point, judge(near, modes, inertia.tolerance))
         return bool(point.soft)
+
+    def _near(self, point: Point, least: int, family: bool) -> tuple[NearZero, list[PETSc.Vec]]:
+        """Eigenvalues near zero, but for that of a ``family`` itself, and its tangent."""
+        near = near_zero(self.solver.inertia.at(point.x), least=least)
+        if not family or point.tangent is None:
+            return near, []
+        kept = _across(self.solver.system.metric, near.vectors, [point.tangent])
+        return near.at(kept, near.rest + len(near.vectors) - len(kept)), [point.tangent]
 
     def _modes(self, point: Point, near: NearZero) -> list[SoftMode]:
         """Eigenvalues ``near`` zero as soft modes; without a richer mesh undecided within the tolerance of a count."""
@@ -169,8 +173,7 @@ class SoftStates:
             richer = self._companion(level)
             try:
                 point, again = _on(richer, point, fixed_load, soft=soft)
-                zeros = [richer.transfer(v, state=False) for v in zeros]
-                zeros = [v / richer.system.norm(v) for v in zeros]
+                zeros = [v / richer.system.norm(v) for v in map(partial(richer.transfer, state=False), zeros)]
                 finer, rounding = _nearest(richer.solver, point, len(modes), zeros)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
@@ -193,6 +196,11 @@ class SoftStates:
         if level == len(self._companions):
             self._companions.append(Enriched(self._companions[-1].solver) if level else self._richer[0]())
         return self._companions[level]
+
+
+def _across(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], others: Sequence[PETSc.Vec]) -> list[int]:
+    """Numbers of the vectors that are no combination of others."""
+    return [i for i, v in enumerate(vectors) if across(metric, [v], others)]
 
 
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
@@ -261,24 +269,22 @@ class SoftRows:
         if compare:
             self._leave_out_doubtful(branch, family=family)
         for fold in branch.special:
-            if fold.kind == FOLD and fold.multiplicity == 1 and fold.negative_before == fold.negative_after:
+            if fold.kind == FOLD and fold.multiplicity == 1:
                 _change_at_fold(fold, branch.points)
 
     def _examine_given(self, branch: Branch, family: bool) -> bool:
         """The same at loads asked for, at ends and events; whether one is undecided, or not on the richer mesh."""
         given = _given(branch)
-        doubtful = any(s.kind.singular and s.error_estimate == inf for s in branch.special)
         counted = {id(s.point): s.point.negative for s in given}
         for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
             states = self._of(s.point)
             states.examine(s.point, fixed_load=s.kind.given, compare=self.error_bars, family=family)
             if states.uncompared and isfinite(s.error_estimate) and s.resolved:  # else the special point says so
                 self._uncompared.setdefault(branch.name, (s.point.load, states.uncompared))
-            doubtful |= s.point.undecided > 0
         for s in given:
             if s.negative_before == s.negative_after == counted[id(s.point)]:
                 s.negative_before = s.negative_after = s.point.negative
-        return doubtful
+        return _is_doubtful(branch, given)
 
     def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
         """Make rows of special points that are zeros of the mesh, not of the rod."""
@@ -332,6 +338,12 @@ def _given(branch: Branch) -> list[SpecialPoint]:
     return [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
 
 
+def _is_doubtful(branch: Branch, given: Sequence[SpecialPoint]) -> bool:
+    """Whether the index is undecided at one of some special points, or one is not on the richer mesh."""
+    lost = (s.kind.singular and s.error_estimate == inf for s in branch.special)
+    return any(s.point.undecided for s in given) or any(lost)
+
+
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
     """Whether a ``special`` point is the mesh's, by the ``rows``: on one side the next two are undecided.
 
@@ -347,8 +359,9 @@ def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
 
 def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
     """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
-    decided = [p for p in rows if not p.undecided and p is not fold.point]
-    left = [p.negative for p in decided if p.arclength < fold.point.arclength][-1:]
-    right = [p.negative for p in decided if p.arclength > fold.point.arclength][:1]
-    if left and right and abs(left[0] - right[0]) == 1:
-        fold.negative_before, fold.negative_after = left[0], right[0]
+    here, decided = fold.point.arclength, [p for p in rows if not p.undecided]
+    both = [p.negative for p in decided if p.arclength < here][-1:] + [
+        p.negative for p in decided if p.arclength > here
+    ][:1]
+    if fold.negative_before == fold.negative_after and len(both) == 2 and abs(both[0] - both[1]) == 1:
+        fold.negative_before, fold.negative_after = both

@@ -10,10 +10,8 @@ the widths of their bounds, and the state in its metric.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -54,8 +52,6 @@ STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000
 REACH = 1e-6
 """Distance, in the metric, that a point on a line of parameters may move by, however short the step."""
 NEAREST = "the index is that of the frequencies nearest zero: the mesh has too many unknowns to find all of them"
-COLUMNS = "ordinate", "omega2", "located_to"
-"""Of the points of a curve what its rows have."""
 
 
 def criterion_of(solver: BranchSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
@@ -262,29 +258,31 @@ def locus(
     """
     plane = Plane(solver.system, parameter, bounds)
     with solver.system.clock.scope("locus"), plane.kept():
-        curve = _Curve(solver, special, plane)
+        curve = _Curve(solver, special, plane, doubtful=doubtful or special.resolved is False)
         curve.follow(steps)
-        rows = np.linspace(0, len(curve.nodes) - 1, error_bars).round().astype(int).tolist()
-        error, unresolved = curve.errors({*rows, *curve.marks} if error_bars else ())
-        if doubtful or special.resolved is False:
-            unresolved = list(range(len(curve.nodes)))
-        found = curve.locus(error, unresolved)
+        found = curve.locus(*curve.errors(error_bars))
         found.crossings = [(n.load, n.ordinate) for n in curve.rows(1, float(curve.first.p[1]))]
-        notes = curve.not_integrated(error), curve.nearest()
-    found.solve = curve.rows
-    found.note = " ".join(f"Locus of the {special.kind}: {words}" for words in notes if words)
+        notes = filter(None, (curve.not_integrated(found.error), curve.nearest()))
+    found.note = " ".join(f"Locus of the {special.kind}: {words}" for words in notes)
     return found
 
 
 class _Curve:
     """The curve of a special point of a diagram, the ``first`` one, in a plane: ``nodes`` with ``marks`` by number."""
 
-    def __init__(self, solver: BranchSolver, special: SpecialPoint, plane: Plane) -> None:
-        """Find the point again; raises :class:`InputError` where it has no locus and :class:`ConvergenceError`."""
+    def __init__(self, solver: BranchSolver, special: SpecialPoint, plane: Plane, *, doubtful: bool) -> None:
+        """Find the point again; of a ``doubtful`` one no row is resolved.
+
+        Raises :class:`InputError` where it has no locus, and :class:`ConvergenceError`.
+        """
         load, parameter = plane.names
         p = np.array([special.point.load, solver.system.scene.parameters[parameter].value])
-        _check(solver, special, plane, p)
-        self.solver, self.special, self.plane = solver, special, plane
+        if plane.outside(p) is not None:
+            raise InputError(
+                f"The special point at {load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
+            )
+        _check(solver, special)
+        self.solver, self.special, self.plane, self.doubtful = solver, special, plane, doubtful
         guess = self._guess(p)
         self.criterion = criterion_of(solver, plane, special.kind, guess)
         self.points = Codim2Points(self.criterion)
@@ -322,14 +320,16 @@ class _Curve:
         self.marks = {self.start - i: kind for i, kind in back.marks.items()}
         self.marks |= {self.start + i: kind for i, kind in onwards.marks.items()}
 
-    def errors(self, rows: Iterable[int]) -> tuple[np.ndarray, list[int]]:
-        """Bounds (n, 2) of the errors of ``rows``, nan at others, inf if a richer mesh finds no point; rows unresolved.
+    def errors(self, number: int) -> tuple[np.ndarray, list[int]]:
+        """Bounds (n, 2) of the errors of marked rows and a ``number`` of others, and which rows are not resolved.
 
-        These are those whose state, or null vectors, the mesh does not resolve.
+        They are nan at rows that were not compared, and inf where the richer mesh finds no point.
         """
-        error, rows, unresolved = np.full((len(self.nodes), 2), np.nan), sorted(rows), set[int]()
-        if not rows:
-            return error, []
+        error = np.full((len(self.nodes), 2), np.nan)
+        unresolved = set(range(len(error))) if self.doubtful else set[int]()
+        if not number:
+            return error, sorted(unresolved)
+        rows = sorted({*np.linspace(0, len(error) - 1, number).round().astype(int).tolist(), *self.marks})
         richer = RicherMesh(self.criterion, self.special.kind, self.nodes[rows[0]])
         for row in rows:
             try:
@@ -394,8 +394,7 @@ class _Curve:
     def locus(self, error: np.ndarray, unresolved: list[int]) -> Locus:
         """The curve, with what a file of it says about the scene."""
         scene, nodes, names = self.solver.system.scene, self.nodes, self.plane.names
-        load, other = (scene.parameters[name] for name in names)
-        columns: dict[str, Any] = {name: np.array([getattr(n, name) for n in nodes]) for name in COLUMNS}
+        load, other = scene.parameters[names[0]], scene.parameters[names[1]]
         return Locus(
             scene=scene.name,
             title=scene.title or scene.name,
@@ -404,8 +403,10 @@ class _Curve:
             labels=(load.label or names[0], other.label or names[1]),
             ordinate_name=scene.ordinate.name,
             bounds=self.plane.intervals,
-            values=np.array([n.p for n in nodes]),
-            **columns,
+            values=self._column("p"),
+            ordinate=self._column("ordinate"),
+            omega2=self._column("omega2"),
+            located_to=self._column("located_to"),
             natural=self.solver.units.ordinate,
             index=np.array([self._index(n) for n in nodes]),
             lower=self._lower_side(),
@@ -420,7 +421,11 @@ class _Curve:
             states=[n.x for n in nodes],
             words=(load.words, other.words),
             units=(load.unit, other.unit),
+            solve=self.rows,
         )
+
+    def _column(self, name: str) -> np.ndarray:
+        return np.array([getattr(n, name) for n in self.nodes])
 
     def _index(self, node: LocusPoint) -> tuple[int, int]:
         """Index on the two sides of the curve, -1 where it was not counted."""
@@ -446,13 +451,8 @@ class _Curve:
         return int(-np.sign(change * special.point.slope))
 
 
-def _check(solver: BranchSolver, special: SpecialPoint, plane: Plane, p: np.ndarray) -> None:
-    """Raise :class:`InputError` for a special point that has no locus, or is not in the ``plane``."""
-    if plane.outside(p) is not None:
-        (load, parameter), (here, value) = plane.names, p
-        raise InputError(
-            f"The special point at {load} = {here:g}, {parameter} = {value:g} is outside the bounds: widen them."
-        )
+def _check(solver: BranchSolver, special: SpecialPoint) -> None:
+    """Raise :class:`InputError` for a special point that has no locus."""
     if special.kind.line is None:
         kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)
         raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")

@@ -24,6 +24,7 @@ A search can show that there are more equilibria, and never that there are no mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
@@ -307,10 +308,9 @@ def _along(solver: BranchSolver, branch: Branch, points: Sequence[Point], load: 
 
     At a fold or a branch point Newton's method at the load itself has nothing to go by: they are what was located.
     """
-    singular = {id(s.point.x) for s in branch.special if s.kind.singular}
-    if branch.parent:
-        singular.add(id(branch.points[0].x))
-    for a, b in zip(points, [*points[1:], None], strict=True):
+    located = [s.point for s in branch.special if s.kind.singular] + branch.points[: int(bool(branch.parent))]
+    singular = {id(point.x) for point in located}
+    for a, b in pairwise([*points, points[-1]]):
         if a.load == load and id(a.x) in singular:
             yield solver.point(a.x, a.arclength, a.tangent)
         elif a.load == load:
@@ -321,5 +321,5 @@ def _along(solver: BranchSolver, branch: Branch, points: Sequence[Point], load: 
                     "elements, or another load."
                 )
             yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)
-        if b is not None and (a.load - load) * (b.load - load) < 0:
+        if (a.load - load) * (b.load - load) < 0:
             yield Arc(solver, a, b).at_load(load)
