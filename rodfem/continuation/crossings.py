@@ -127,8 +127,10 @@ def fourth(a: Node, b: Node, c: Node) -> np.ndarray:
     return out
 
 
-def clear(a: Node, b: Node, off: np.ndarray) -> bool:
+def clear(a: Node, b: Node, off: np.ndarray | None) -> bool:
     """Whether ``H``, from which the cubic is ``off`` at most, is regular between two nodes, by a cheap test."""
+    if off is None or a.far != b.far:
+        return False
     h = (b.s - a.s) / 3
     control = np.stack([a.H, a.H + h * a.slope, b.H - h * b.slope, b.H])
     values, vectors = np.linalg.eigh(a.H + b.H)
@@ -158,14 +160,14 @@ class Zeros:
         ``size`` is that of the :func:`fourth` derivative; None if it is not known.
         """
         off = None if size is None else SAFE * (b.s - a.s) ** 4 / 16 * size
-        if off is not None and a.far == b.far and clear(a, b, off):
+        if clear(a, b, off):
             return []
         found = roots(a, b)
         groups = together(a, b, found, self.tolerance)
         t, miss = _division(a, b, found, groups, off)
-        if t is None or depth >= DEEPEST or b.s - a.s <= SHORTEST:
-            return _passed(a, b, groups)
-        if (middle := self.solve(a, b, a.s + t * (b.s - a.s))) is None:
+        short = depth >= DEEPEST or b.s - a.s <= SHORTEST
+        middle = None if t is None or short else self.solve(a, b, a.s + t * (b.s - a.s))
+        if middle is None:
             return _passed(a, b, groups)
         known, size = len(self.misses), fourth(a, b, middle)
         out = [*self.between(a, middle, size, depth + 1), *self.between(middle, b, size, depth + 1)]
@@ -192,16 +194,16 @@ def _division(
 
     All ``found`` roots of the cubic are given, the ``groups`` of real ones, and how far it may be ``off``.
     """
-    near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0) & (found.real < 1)]
     if a.far == b.far and len(groups) > 1:
         _, last, first = max((q[0] - p[-1], p[-1], q[0]) for p, q in pairwise(groups))
         return float(np.clip((last + first) / 2, 0.01, 0.99)), False
+    near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0) & (found.real < 1)]
     if a.far == b.far and len(near):
         return float(np.clip(near[abs(near.imag).argmin()].real, 0.02, 0.98)), True
     if a.far != b.far or off is None or not groups:
         return 0.47, False
     place = float(np.mean(groups[0]))
-    return None if _alone(a, b, groups[0], off) else (place + (1 if place < 0.5 else 0)) / 2, False
+    return None if _alone(a, b, groups[0], off) else (place + float(place < 0.5)) / 2, False
 
 
 def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:

@@ -136,23 +136,21 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
     """
     best, clear, half = Located(load, np.inf, cluster, *3 * (np.nan,), load), load, width
     for _ in range(12):
-        nodes = [float(node) for node in load + half * NODES]
-        found = [at(node, cluster) for node in nodes]
-        clearest, node = max(zip(found, nodes, strict=True), key=lambda pair: pair[0].spread)
+        found = [(at(node, cluster), node) for node in (load + half * NODES).tolist()]
+        clearest, node = max(found, key=lambda pair: pair[0].spread)
         if clearest.spread > RANK:
             cluster, clear = clearest.cluster, node
-        series, means = interpolant([f.discriminant for f in found]), interpolant([f.cluster.mean for f in found])
+        series, means = _series(found)
         root = real_root(series)
         if root is None:
-            first, last = found[0].discriminant, found[-1].discriminant  # of a line, at most two half lengths away
-            load += half * (2 * float(np.clip((first + last) / 2 / (first - last), -1, 1)) if first != last else 0.0)
+            load += half * _secant(found[0][0].discriminant, found[-1][0].discriminant)
             continue
         load += half * root
         cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, means)))
         uncertainty = max(half * zero_uncertainty(series, root, in_doubt(series)), ROUND_OFF * abs(load))
         better = abs(root) < 1 and uncertainty < best.uncertainty
         if better:
-            slope, drift = (float(chebyshev.chebval(root, chebyshev.chebder(f))) / half for f in (series, means))
+            slope, drift = _rate(series, root) / half, _rate(means, root) / half
             best = Located(load, uncertainty, cluster, slope, drift, in_doubt(means), clear)
         if best.uncertainty < (SHARP if better else ENOUGH) * abs(load):
             break
@@ -160,6 +158,21 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
     if not np.isfinite(best.uncertainty):
         raise ConvergenceError(f"The flutter load near {load:.6g} could not be located: use a smaller range.")
     return best
+
+
+def _series(found: Sequence[tuple[Measured, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Series of ``D``, and of the mean of the cluster."""
+    return interpolant([f.discriminant for f, _ in found]), interpolant([f.cluster.mean for f, _ in found])
+
+
+def _secant(first: float, last: float) -> float:
+    """Zero of a line with these values at -1 and 1, at most 2 away from the middle; there where it is level."""
+    return 2 * float(np.clip((first + last) / 2 / (first - last), -1, 1)) if first != last else 0.0
+
+
+def _rate(series: np.ndarray, at: float) -> float:
+    """Derivative of a Chebyshev series."""
+    return float(chebyshev.chebval(at, chebyshev.chebder(series)))
 
 
 def interpolant(values: Sequence[float]) -> np.ndarray:
@@ -176,7 +189,7 @@ def real_root(series: np.ndarray) -> float | None:
 
 def zero_uncertainty(series: np.ndarray, root: float, doubt: float) -> float:
     """How far a ``doubt`` about values of a Chebyshev series can move its ``root``."""
-    slope = float(chebyshev.chebval(root, chebyshev.chebder(series)))
+    slope = _rate(series, root)
     return doubt / abs(slope) if slope else float("inf")
 
 

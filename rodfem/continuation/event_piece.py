@@ -28,32 +28,21 @@ from rodfem.tolerances import ROUND_OFF, TINY
 
 DIFFERENCE, GENERIC = 1e-5, 1e-2
 """Steps of differences along the tangent, in the metric, and in a generic direction, in natural sizes."""
-EXACT = 1e-13
-"""Distance, in the metric, to which a zero is located that round-off leaves open no farther."""
-HALVED = 4
-"""Each time of so many a piece with a zero is halved: the cubic of a jump may come no nearer."""
 REACH = 0.02
 """Distance along the branch, in the metric, to which an event is sought again on another mesh."""
 
 
 class End(NamedTuple):
-    """An end of a piece, and what the functions of events receive there.
-
-    It is the state ``x`` with its ``arclength`` and its unit ``tangent``; the ``samples`` are those of the state and of
-    three next to it: ahead, behind, and in a generic direction.
-    """
+    """An end of a piece: a state with its unit tangent."""
 
     arclength: float
     x: PETSc.Vec
     tangent: PETSc.Vec
-    samples: list[dict[str, Any]]
+    samples: list[dict[str, Any]]  # what the functions of events receive: there, ahead, behind, and aside
 
 
 def end(solver: BranchSolver, arclength: float, x: PETSc.Vec, direction: PETSc.Vec) -> End:
-    """End of a piece at a state ``x`` at an ``arclength``, with the ``direction`` of the branch.
-
-    ``solver`` has the mesh.
-    """
+    """End of a piece at a state ``x`` at an ``arclength``, with the ``direction`` of the branch."""
     tangent = direction * (1.0 / solver.system.norm(direction))
     states = x, x + tangent * DIFFERENCE, x - tangent * DIFFERENCE, x + _aside(solver.system, GENERIC)
     return End(arclength, x, tangent, [solver.shape.sample(state) for state in states])
@@ -67,7 +56,6 @@ class EventPiece(Chord):
     """
 
     def __init__(self, solver: BranchSolver, event: Event, a: End, b: End) -> None:
-        """Evaluate the number of the ``event`` at both ends, ``a`` and ``b``; ``solver`` has the mesh."""
         super().__init__(solver, a, b)
         self.event = event
         self.first, self.last = (self.node(end.x, end.tangent, end.samples) for end in (a, b))
@@ -95,10 +83,9 @@ class EventPiece(Chord):
         return [self._located(p, q, 1) for p, q in pairwise(nodes) if p.slope.item() * q.slope.item() < 0]
 
     def zeros(self) -> list[Node]:
-        """Nodes at which the number is zero, in order, both ends among them.
+        """Nodes at which the number is zero, in order; neighbours among ends and turns are one place: the end.
 
-        Neighbours among ends and turns that are both zero are one place: the end.  Raises :class:`ConvergenceError`
-        where an equilibrium is not found.
+        Raises :class:`ConvergenceError` where an equilibrium is not found.
         """
         first, last = self.first, self.last
         known, out = [first, *([] if clear(first, last, np.zeros((1, 1))) else self.turns()), last], list[Node]()
@@ -133,10 +120,10 @@ class EventPiece(Chord):
 
     def _located(self, p: Node, q: Node, order: int) -> Node:
         """Node between two others at which the number, or its derivative of an ``order``, changes its sign."""
-        within, tries = (EXACT, LEAST)[order], 0
+        within, tries = (1e-13, LEAST)[order], 0  # in the metric: what round-off leaves open
         while True:
-            tries += 1
-            known = places(p, q, order) if tries % HALVED else []
+            tries += 1  # each fourth time the piece is halved: the cubic of a jump may come no nearer
+            known = places(p, q, order) if tries % 4 else []
             node = self._solved(p, q, known[0] if known else 0.5)
             if min(node.s - p.s, q.s - node.s) <= within or (order == 0 and self.is_zero(node)):
                 return node
@@ -155,8 +142,7 @@ def nearest(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec
     """Node at which an ``event`` happens nearest to a state ``x``, and how far its place is uncertain.
 
     A number that touches zero on another mesh may not reach it on that of the ``solver``: then it is where it turns.
-    The piece is as long as :data:`REACH` to either side along the ``tangent``.  Raises :class:`ConvergenceError` where
-    the event does not happen there.
+    Raises :class:`ConvergenceError` where the event does not happen there.
     """
     row, both = solver.row(tangent), list[End]()
     for s in (-REACH, REACH):

@@ -17,15 +17,8 @@ from rodfem.stability.symmetric import SymmetricSolver
 
 STILL = 1e-6
 """Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
-HOLDS = 1e6
-"""Damping that holds a state while the multipliers of its constraints are found, over the lowest bending eigenvalue."""
 STRAYED = 0.3
-"""If Newton's method moves the initial guess farther than this (metric norm), the result is not accepted as the first
-state; an equilibrium nearer than this to the start is the one that is meant."""
-HELD = 1e-8
-"""Drift scalar, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
-ASIDE = 0.1
-"""How far from a saddle the way down goes on, in the metric."""
+"""Distance from the start, in the metric, up to which an equilibrium is the one that is meant."""
 
 
 def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
@@ -37,31 +30,45 @@ def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, New
     nowhere near the start.  Of a family of equilibria it is the one next to the start, whatever round-off would make of
     it.
     """
-    if (natural := solver.natural(load)) is not None:
-        x, outcome = solver.at_load(natural, load, reach=1.0)
-        if _turned(solver.system, natural, x) < STRAYED and examined(solver, x, outcome)[1]:
-            return x, outcome
+    system = solver.system
+    if (rest := _at_rest(solver, load)) is not None:
+        return rest
     guess = solver.start(load)
     x, outcome = solver.at_load(guess, load)
-    if not (outcome.converged and _turned(solver.system, guess, x) < STRAYED):
-        near, found = solver.at_load(_balanced(solver, guess), load)
-        if found.converged and _turned(solver.system, guess, near) < STRAYED:
-            x, outcome = near, found
-    if outcome.converged and _turned(solver.system, guess, x) >= STRAYED:
-        outcome, good = examined(solver, x, outcome)
-    else:
-        good = outcome.converged
+    if not _near(system, guess, x, outcome):
+        other = solver.at_load(_balanced(solver, guess), load)
+        if _near(system, guess, *other):
+            x, outcome = other
+    outcome, good = (outcome, True) if _near(system, guess, x, outcome) else examined(solver, x, outcome)
     if good and not _may_move(solver, x):
         return x, outcome
-    damping, solver.system.damping = solver.system.damping, STILL * solver.system.stiffness_scale
-    still, found = solver.at_load(guess, load)  # the start may be one of a family, along which it need not move
-    solver.system.damping = damping
-    if found.converged and _turned(solver.system, guess, still) < STRAYED:
-        return still, found
-    if good:
-        return x, outcome
-    other = downhill(solver, load)
-    return other if other[1].converged else (x, outcome)
+    damping, system.damping = system.damping, STILL * system.stiffness_scale
+    other = solver.at_load(guess, load)  # the start may be one of a family, along which it need not move
+    system.damping = damping
+    if _near(system, guess, *other):
+        return other
+    if not good and (down := downhill(solver, load))[1].converged:
+        return down
+    return x, outcome
+
+
+def _at_rest(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult] | None:
+    """The rod at rest, if its shape fits between the ends and is a stable equilibrium there."""
+    natural = solver.natural(load)
+    if natural is None:
+        return None
+    x, outcome = solver.at_load(natural, load, reach=1.0)
+    return (x, outcome) if _near(solver.system, natural, x, outcome) and examined(solver, x, outcome)[1] else None
+
+
+def _near(system: System, guess: PETSc.Vec, x: PETSc.Vec, outcome: NewtonResult) -> bool:
+    """Whether an equilibrium is the one that a guess means: but for strains, as a straight rod may stretch far."""
+    difference, f = x - guess, system.fields
+    if "v" in f.dofs:
+        begin, end = difference.getOwnershipRange()
+        strains = f.number[f.dofs["v"]].ravel()
+        difference.array[strains[(begin <= strains) & (strains < end)] - begin] = 0.0
+    return outcome.converged and system.norm(difference) < STRAYED
 
 
 def _balanced(solver: BranchSolver, x: PETSc.Vec) -> PETSc.Vec:
@@ -72,18 +79,8 @@ def _balanced(solver: BranchSolver, x: PETSc.Vec) -> PETSc.Vec:
     """
     system = solver.system
     system.set_phase(x)
-    step = linear_step(system, x, solver.axis, HOLDS * system.stiffness_scale)
+    step = linear_step(system, x, solver.axis, 1e6 * system.stiffness_scale)
     return x.copy() if step is None else x - step
-
-
-def _turned(system: System, guess: PETSc.Vec, x: PETSc.Vec) -> float:
-    """Distance of two states without that of their strains, in the metric: a straight rod may stretch far."""
-    difference, f = x - guess, system.fields
-    if "v" in f.dofs:
-        begin, end = difference.getOwnershipRange()
-        strains = f.number[f.dofs["v"]].ravel()
-        difference.array[strains[(begin <= strains) & (strains < end)] - begin] = 0.0
-    return system.norm(difference)
 
 
 def downhill(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
@@ -128,22 +125,18 @@ def _relaxed(
     load = solver.system.scalar(x)
     outcome = relax(solver.system, x, solver.axis, longest=longest, accepts=accepts)
     for _ in range(3):  # phase conditions taken far away may hold a state off the equilibrium
-        if outcome.converged and solver.system.drift(x) > HELD * solver.system.stiffness_scale:
+        if outcome.converged and solver.system.drift(x) > 1e-8 * solver.system.stiffness_scale:  # clearly not zero
             x, outcome = solver.at_load(x, load)
     return x, outcome
 
 
 def is_stable(solver: BranchSolver, x: PETSc.Vec) -> bool:
-    """Whether the index of an equilibrium is zero, as far as there is one: of loads with a potential.
-
-    A search asks that of states that may be far from all others: their round-off is that of no other.
-    """
-    if not solver.conservative:
-        return True
+    """Whether the index of an equilibrium is zero, as far as there is one: of loads with a potential."""
     try:
-        return decide(solver.inertia.at(x)).index.negative == 0
+        return not solver.conservative or decide(solver.inertia.at(x)).index.negative == 0
     finally:
-        solver.inertia.forget_band()
+        if solver.conservative:
+            solver.inertia.forget_band()  # it may be far from all others: its round-off is that of no other
 
 
 def _may_move(solver: BranchSolver, x: PETSc.Vec) -> bool:
@@ -161,7 +154,7 @@ def displaced_saddle(solver: BranchSolver, x: PETSc.Vec, start: PETSc.Vec) -> tu
     """
     modes = SymmetricSolver(solver.inertia).at(x).leftmost(1)
     displaced, mode = x.copy(), modes.vectors[0]
-    size = ASIDE / solver.system.norm(mode)
+    size = 0.1 / solver.system.norm(mode)
     displaced.axpy(size if solver.row(mode).dot(start - x) >= 0 else -size, mode)
     solver.system.set_load(displaced, solver.system.scalar(x))
     return displaced, 0.5 / abs(float(modes.values[0]))

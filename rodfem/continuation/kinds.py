@@ -16,27 +16,13 @@ Line = tuple[int, Any]
 
 
 class Kind(str):
-    """Name of a kind of special point.
+    """Name of a kind of special point, with what is to be known of it."""
 
-    Attributes
-    ----------
-    code
-        Two letters for the terminal, AUTO's where it has some.
-    test
-        Test function; empty for none.
-    branches
-        Whether other branches leave there.
-    marker
-        Style of its mark in a picture, in matplotlib's words; empty for none.
-    line
-        Place in the palette and dashes of its locus in the plane of two parameters; None where it has none.
-    """
-
-    code: str
-    test: str
-    branches: bool
-    marker: Mapping[str, Any]
-    line: Line | None
+    code: str  # two letters for the terminal, AUTO's where it has some
+    test: str  # test function; empty for none
+    branches: bool  # whether other branches leave there
+    marker: Mapping[str, Any]  # style of its mark in a picture, in matplotlib's words; empty for none
+    line: Line | None  # place in the palette and dashes of its locus in the plane of two parameters
 
     def __new__(
         cls,

@@ -23,14 +23,10 @@ from rodfem.problem.quaternions import CONJUGATE, directors, of_vector, product
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE
 
-SAMPLES = 33
-"""Arclengths at which natural strains are computed, if they vary."""
 STEPS = 2000
 """Steps of the integration along the rod."""
 SETTLED, STEP = 1e-8, 1e-5
 """Change of the natural strains, in natural units, at which Newton's method ends; step of its difference quotients."""
-FITS = 0.05
-"""Distance from the ends, over the rod's length and in radian, within which a shape fits: Newton's method mends it."""
 
 
 class NaturalShape(NamedTuple):
@@ -60,7 +56,7 @@ def natural_shape(scene: Scene, load: float) -> NaturalShape | None:
 
 def _natural_strains(scene: Scene, load: float) -> Callable[[np.ndarray], np.ndarray] | None:
     """Natural strains (m, 6) as a function of arclengths (m,); None if they are the undeformed ones."""
-    places = np.linspace(*scene.interval, SAMPLES) if scene.depends_on_s() else np.array([scene.interval[0]])
+    places = np.linspace(*scene.interval, 33) if scene.depends_on_s() else np.array([scene.interval[0]])
     found = [x for x in (_least(scene, load, float(s)) for s in places) if x is not None]
     if len(found) < len(places) or not np.array(found).any():
         return None
@@ -74,24 +70,25 @@ def _natural_strains(scene: Scene, load: float) -> Callable[[np.ndarray], np.nda
 
 def _least(scene: Scene, load: float, s: float) -> np.ndarray | None:
     """Change (6,) of the undeformed strains that minimises the energy at ``s``; None if Newton's method finds none."""
-    every, normal = [*scene.free_strains, 3, 4, 5], scene.normal
-    free = [i for i in every if normal is None or (i - 3 == normal if i > 2 else i != normal)]  # in its plane
-    chosen = [every.index(i) for i in free]
-    c, unit = scene.constants(load, s), np.where(np.arange(6) < 3, 1.0, 1.0 / scene.length)
+    c, unit, free = scene.constants(load, s), np.where(np.arange(6) < 3, 1.0, 1.0 / scene.length), _free(scene)
+    chosen = [[*scene.free_strains, 3, 4, 5].index(i) for i in free]
     stiffness = scene.stiffness(s if scene.depends_on_s() else None)[np.ix_(chosen, chosen)]
     x = np.zeros(6)
     for _ in range(20):
         try:
-            slope = [_slope(scene, x, i, unit[i], c) for i in free]
+            step = np.linalg.solve(stiffness, [_slope(scene, x, i, unit[i], c) for i in free])
         except SceneError:  # the energy is not defined there
             return None
-        step = np.linalg.solve(stiffness, slope)
         x[free] -= step
-        if not np.isfinite(x).all():
-            return None
         if (abs(step) <= SETTLED * unit[free]).all():
             return np.where(abs(x) <= SETTLED * unit, 0.0, x)
     return None
+
+
+def _free(scene: Scene) -> list[int]:
+    """Numbers of the strains that the energy depends on: of a planar rod those in its plane."""
+    every, normal = [*scene.free_strains, 3, 4, 5], scene.normal
+    return [i for i in every if normal is None or (i - 3 == normal if i > 2 else i != normal)]
 
 
 def _slope(scene: Scene, x: np.ndarray, i: int, h: float, c: Any) -> float:
@@ -102,22 +99,19 @@ def _slope(scene: Scene, x: np.ndarray, i: int, h: float, c: Any) -> float:
 
 
 def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> np.ndarray | None:
-    """Quaternions of a shape turned to where the ends are held; None if it does not fit."""
-    frames = [rotation_of(scene, load, side) for side in range(2)]
-    held = [_positions(scene, load, side) for side in range(2)]
-    chord = np.array([np.nan if a is None or b is None else b - a for a, b in zip(*held, strict=True)])
-    if frames[0] is not None:
-        turn = frames[0]
-    elif frames[1] is not None:
-        turn = product(frames[1], q[-1] * CONJUGATE)
+    """Quaternions of a shape turned to where the ends are; None if it is more off than Newton's method mends."""
+    (first, last), c = [rotation_of(scene, load, side) for side in range(2)], scene.constants(load)
+    places = [[np.nan if x is None else plain(x) for x in side.held(c)] for side in scene.sides]
+    chord = np.subtract(places[1], places[0])
+    if first is not None:
+        turn = first
     else:
-        turn = _aligned(r[-1], chord)
+        turn = _aligned(r[-1], chord) if last is None else product(last, q[-1] * CONJUGATE)
     turned = product(turn, q)
-    far = directors(turn) @ r[-1] - chord
-    off = abs(far[np.isfinite(far)]).max(initial=0.0) / scene.length
-    if frames[0] is not None and frames[1] is not None:
-        off = max(off, 2 * np.sqrt(max(1.0 - float(turned[-1] @ frames[1]) ** 2, 0.0)))
-    return turned if off < FITS else None
+    off = np.nanmax(abs(directors(turn) @ r[-1] - chord), initial=0.0) / scene.length
+    if first is not None and last is not None:
+        off = max(off, 2 * np.sqrt(max(1.0 - float(turned[-1] @ last) ** 2, 0.0)))
+    return turned if off < 0.05 else None
 
 
 def _aligned(chord: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -138,10 +132,6 @@ def rotation_of(scene: Scene, load: float, side: int) -> np.ndarray | None:
         return None
     q = np.array([plain(x) for x in frame])
     return np.asarray(q / np.linalg.norm(q))
-
-
-def _positions(scene: Scene, load: float, side: int) -> list[float | None]:
-    return [None if x is None else plain(x) for x in scene.sides[side].held(scene.constants(load))]
 
 
 def uniform_turn(scene: Scene, load: float) -> Callable[[np.ndarray], np.ndarray] | None:

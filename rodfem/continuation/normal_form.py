@@ -175,11 +175,15 @@ def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -
         other = best is not None and not alike(form, best)
         if other and (form.of == DISTANCE or odd * change <= seen):
             break  # what the ordinate changes by, or what is odd, or even, is round-off
-        if best is None or other or form.uncertainty < best.uncertainty:
-            best = form
-        if change <= seen or (min(odd, 1 - odd) < RESOLVED and form.resolved(RESOLVED)):
+        best = form if best is None or other else min(best, form, key=lambda form: form.uncertainty)
+        if _resolved(form, odd, change <= seen):
             break
     return best
+
+
+def _resolved(form: NormalForm, odd: float, least: bool) -> bool:
+    """Whether no smaller scale is tried: the series is resolved, the load ``odd`` or even, or its change ``least``."""
+    return least or (min(odd, 1 - odd) < RESOLVED and form.resolved(RESOLVED))
 
 
 def alike(a: NormalForm, b: NormalForm) -> bool:

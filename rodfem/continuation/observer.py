@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
 
 class Observer:
-    """Hears every event, and does nothing.
-
-    Nothing that is handed over may be changed.
-    """
+    """Hears every event, and does nothing.  Nothing that is handed over may be changed."""
 
     def compiling(self) -> None:
         """Forms are compiled, which takes some seconds."""
@@ -64,16 +61,13 @@ class Observer:
 
 
 class Remark(str):
-    """A sentence with the ``branch`` that it is about, by name, and the least and the greatest of the ``loads`` there.
-
-    Either is None if it is about all.
-    """
+    """A sentence with the ``branch`` and the least and greatest of the ``loads`` that it is about; None: about all."""
 
     branch: str | None
     loads: list[float] | None
 
     def __new__(cls, sentence: str, *loads: float, branch: str | None = None) -> Remark:
-        """Keep what a ``sentence`` is about: the ``loads`` of a range, of one state, or none."""
+        """Make a string that knows more than its letters."""
         made = super().__new__(cls, sentence)
         made.branch, made.loads = branch, [min(loads), max(loads)] if loads else None
         return made
@@ -87,15 +81,14 @@ class Recorder(Observer):
     """
 
     def __init__(self, listener: Observer) -> None:
-        """Nothing is recorded yet."""
         self.listener = listener
         self.warnings: list[Remark] = []
         self.notes: list[Remark] = []
         self._branch: str | None = None
 
-    def _kept(self, sentence: str) -> Remark:
+    def _keep(self, remarks: list[Remark], sentence: str) -> None:
         loads, name = getattr(sentence, "loads", None) or (), getattr(sentence, "branch", None)
-        return Remark(sentence.strip(), *loads, branch=name or self._branch or None)
+        remarks.append(Remark(sentence.strip(), *loads, branch=name or self._branch or None))
 
     def branch(self, branch: Branch) -> None:
         """Hand it on; what follows is about that branch."""
@@ -112,12 +105,12 @@ class Recorder(Observer):
 
     def note(self, sentence: str) -> None:
         """Keep it and hand it on."""
-        self.notes.append(self._kept(sentence))
+        self._keep(self.notes, sentence)
         self.listener.note(sentence)
 
     def warn(self, sentence: str) -> None:
         """Keep it and hand it on."""
-        self.warnings.append(self._kept(sentence))
+        self._keep(self.warnings, sentence)
         self.listener.warn(sentence)
 
 
