@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
     from rodfem.fem.shape import Shape
     from rodfem.fem.state import NodalValues
-    from rodfem.modes.perturbation import Motions
+    from rodfem.modes.finder import Motions
     from rodfem.problem.functions import Constants, Place
     from rodfem.problem.scene import Scene
 

@@ -50,7 +50,7 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
 from rodfem.kumar_healey.null_space import kernel
 from rodfem.linalg.orthogonal import generic
-from rodfem.stability.assessment import Assessor, Found, Interval, Method, SymmetricMethod
+from rodfem.stability.assessment import Assessor, Found, Method, SymmetricMethod
 from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.spectrum import FINITE, krylov
 
@@ -182,7 +182,7 @@ class Reduction(Method):
         super().__init__(work)
         self.coordinates = Coordinates(work.system)
 
-    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """With a shift below the spectrum."""
         below = self.work.below(x)
         found = self.reduced(x).near(number, below.solver.shift)
@@ -213,7 +213,7 @@ class Cayley(Reduction, SymmetricMethod):
         super().__init__(work)
         self._shift: float | None = None
 
-    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """With the shift of the last state; with a new one where a count finds some missing."""
         below, reduced = self.work.below(x), self.reduced(x)
         made, note = 0, ""

@@ -52,40 +52,26 @@ LEFT = ("left_displacement", "left_rotation", "weight_displacement", "weight_rot
 class Modes:
     """Modes of one state, K of them, at the m nodes of the mesh; nondimensional, or in the units of the scene.
 
-    Attributes
-    ----------
-    s, r, q, load
-        The state: arclength (m,), centreline (m, 3), unit quaternions (m, 4), and the load.
-    value
-        Eigenvalues ``mu = omega^2`` (K,); those of symmetries, zero, come last.  Complex under non-conservative loads.
-    residual, error
-        Backward errors of the eigenpairs, and estimated errors of the discretisation (K,); nan where not estimated,
-        and for symmetries.
-    motion
-        What each does: :data:`SYMMETRY`, bending about a director, torsion, or a mixture.
-    displacement, rotation
-        In the space frame, (K, m, 3).
-    left_displacement, left_rotation, weight_displacement, weight_rotation
-        What takes forces to the mode's amplitude, and motions to it, (K, m, 3).
-    note
-        Why errors that were asked for are not estimated; empty where they are.
+    Motions are in the space frame, (K, m, 3).
     """
 
     load: float
-    s: np.ndarray
-    r: np.ndarray
-    q: np.ndarray
-    value: np.ndarray
-    residual: np.ndarray
-    error: np.ndarray
-    motion: tuple[str, ...]
+    s: np.ndarray  #: arclength (m,)
+    r: np.ndarray  #: centreline (m, 3)
+    q: np.ndarray  #: unit quaternions (m, 4)
+    value: (
+        np.ndarray
+    )  #: eigenvalues mu = omega^2 (K,), complex without a potential; zeros of symmetries last
+    residual: np.ndarray  #: backward errors of the eigenpairs (K,); nan for symmetries
+    error: np.ndarray  #: estimated errors of the discretisation (K,); nan where not estimated, and for symmetries
+    motion: tuple[str, ...]  #: what each does: SYMMETRY, bending about a director, torsion, or a mixture
     displacement: np.ndarray
     rotation: np.ndarray
-    left_displacement: np.ndarray
+    left_displacement: np.ndarray  #: with the next, what takes forces to the mode's amplitude
     left_rotation: np.ndarray
-    weight_displacement: np.ndarray
+    weight_displacement: np.ndarray  #: with the next, what takes motions to the mode's amplitude
     weight_rotation: np.ndarray
-    note: str = ""
+    note: str = ""  #: why errors that were asked for are not estimated; empty where they are
 
     def __repr__(self) -> str:
         """Load, and each eigenvalue with its motion."""
@@ -95,8 +81,7 @@ class Modes:
     @property
     def rotation_body(self) -> np.ndarray:
         """Rotations by their components along the directors, (K, m, 3)."""
-        frames = directors(self.q)
-        return np.einsum("mji,kmj->kmi", frames, self.rotation)
+        return np.einsum("mji,kmj->kmi", directors(self.q), self.rotation)
 
     def amplitude(self, displacement: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         """Amplitudes (K,) of the modes in a small motion (m, 3), (m, 3) of the rod; :class:`InputError` without one."""
@@ -152,11 +137,6 @@ def load_modes(path: Path | str, branch: str, row: int) -> Modes:
     with MODES.opened(path, ("branches",), unfit) as file:
         group = file[f"branches/{branch}/{row}"]
         names = [name for name in Modes.__dataclass_fields__ if name != "note"]
-        if missing := [name for name in names if name not in group]:
-            raise InputError(
-                f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another version "
-                "of rodfem wrote it; run the scene again."
-            )
         arrays = {name: group[name][()] for name in names if name != "motion"}
         motion, note = tuple(group["motion"].asstr()[()]), str(group.attrs.get("note", ""))
     _check_arrays(arrays, motion, path)
@@ -165,18 +145,14 @@ def load_modes(path: Path | str, branch: str, row: int) -> Modes:
 
 
 def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path | str) -> None:
-    """Raise :class:`InputError` where arrays of a file are not of the shapes of :class:`Modes`."""
+    """Raise :class:`InputError` where arrays of a file are not of the shapes of :class:`Modes`, or not finite."""
     m, k = len(np.atleast_1d(arrays["s"])), len(motion)
     shapes = {"load": (), "s": (m,), "r": (m, 3), "q": (m, 4), **dict.fromkeys(("value", "residual", "error"), (k,))}
     for name, array in arrays.items():
-        wanted = shapes.get(name, (k, m, 3))
-        if np.shape(array) != wanted or np.asarray(array).dtype.kind not in "fciu":
-            raise InputError(
-                f"{path} has the {name} of the shape {np.shape(array)}, where numbers of the shape {wanted} were "
-                "expected: run the scene again."
-            )
-        if name not in ("residual", "error") and not np.isfinite(array).all():
-            raise InputError(f"{path} has a {name} that is not finite: run the scene again.")
+        wanted, given = shapes.get(name, (k, m, 3)), np.asarray(array)
+        finite = given.dtype.kind in "fciu" and (name in ("residual", "error") or np.isfinite(given).all())
+        if given.shape != wanted or not finite:
+            raise InputError(f"{path} has no {name} of {wanted} finite numbers: run the scene again.")
 
 
 def rows_with_modes(path: Path) -> list[tuple[str, int]]:
@@ -234,29 +210,24 @@ def write_typical(group: h5py.Group, typical: Sequence[Typical]) -> None:
     """Write modes into the ``group`` of a branch; nothing without any state."""
     if not typical:
         return
-    own, text = group.create_group(TYPICAL), h5py.string_dtype()
+    own, words = group.create_group(TYPICAL), {"dtype": h5py.string_dtype()}
     own["row"] = [each.row for each in typical]
-    own.create_dataset("trouble", data=[each.trouble for each in typical], dtype=text)
+    own.create_dataset("trouble", data=[each.trouble for each in typical], **words)
     for name in Few._fields:
-        rows = [each.found and getattr(each.found, name) for each in typical]
-        if name == "motion":
-            own.create_dataset(name, data=_stacked(rows, ""), dtype=text)
-        else:
-            own[name] = _stacked(rows, np.nan)
+        rows = [None if each.found is None else np.asarray(getattr(each.found, name)) for each in typical]
+        named = name == "motion"
+        own.create_dataset(name, data=_stacked(rows, "" if named else np.nan), **(words if named else {}))
 
 
-def _stacked(rows: Sequence[Any], nothing: Any) -> np.ndarray:
+def _stacked(rows: Sequence[np.ndarray | None], nothing: Any) -> np.ndarray:
     """Arrays, some of them None, as the rows of one, filled up with ``nothing``."""
-    given = [np.asarray(row) for row in rows if row is not None]
-    if not given:
-        return np.full((len(rows), 0), nothing, dtype=object if nothing == "" else float)
-    shape = tuple(np.max([row.shape for row in given], axis=0).astype(int))
-    dtype = object if nothing == "" else np.result_type(*given)
+    given = [row for row in rows if row is not None]
+    shape = np.max([row.shape for row in given], axis=0).astype(int) if given else (0,)
+    dtype = object if nothing == "" else np.result_type(float, *given)
     out = np.full((len(rows), *shape), nothing, dtype=dtype)
     for place, row in zip(out, rows, strict=True):
         if row is not None:
-            array = np.asarray(row)
-            place[tuple(map(slice, array.shape))] = array
+            place[tuple(map(slice, row.shape))] = row
     return out
 
 
@@ -267,12 +238,11 @@ def typical_of(group: Mapping[str, Any]) -> Iterator[Typical]:
     own = group[TYPICAL]
     arrays = {name: own[name][()] for name in ("row", "trouble", *Few._fields)}
     for i, row in enumerate(arrays["row"]):
-        trouble, value = _text(arrays["trouble"][i]), arrays["value"][i]
-        count = int(np.isfinite(value).sum())
-        if trouble:
+        if trouble := _text(arrays["trouble"][i]):
             yield Typical(int(row), None, trouble)
             continue
-        nodes = int(np.isfinite(arrays["rotation"][i][0, :, 0]).sum())
+        value, rotation = arrays["value"][i], arrays["rotation"][i]
+        count, nodes = (int(np.isfinite(each).sum()) for each in (value, rotation[0, :, 0]))
         moved = (arrays[name][i][:count, :nodes] for name in ("displacement", "rotation"))
         names = tuple(_text(name) for name in arrays["motion"][i][:count])
         yield Typical(int(row), Few(value[:count], arrays["residual"][i][:count], names, *moved))

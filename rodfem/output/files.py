@@ -26,8 +26,8 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import InputError
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, read_json, refusal
+from rodfem.modes.finder import Motion, Motions
 from rodfem.modes.modes import Typical, write_typical
-from rodfem.modes.perturbation import Motion, Motions
 from rodfem.output.table import COLUMNS, branch_data
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path

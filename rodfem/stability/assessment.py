@@ -38,50 +38,35 @@ COUNT, DENSE = "count", "dense"
 LARGEST = 3000
 """Unknowns that dense matrices may have."""
 
-Interval = tuple[float, float]
-
 
 @dataclass(frozen=True, repr=False)
 class Verdict:
-    """Stability of one state: what :meth:`rodfem.Solver.assess` returns."""
+    """Stability of one state: what :meth:`rodfem.Solver.assess` returns.
 
-    negative: int
-    """Index; under loads without a potential the number of eigenvalues with a negative real part or an imaginary part,
-    of all that the mesh has (of those found, if it is too large)."""
-    zero: int
-    """Number of zero eigenvalues, symmetry modes included; of free motions, under loads without a potential."""
-    values: np.ndarray
-    """Left-most eigenvalues ``mu = omega^2`` without symmetry modes; those nearest zero, without a potential."""
-    vectors: list[PETSc.Vec]
-    """Their vectors, without multipliers if constraints were reduced; none without a potential."""
-    errors: np.ndarray
-    """Their backward errors."""
-    band: float
-    """Half width of the interval about zero, in the metric, in which inertia alone decides nothing."""
-    inside: np.ndarray
-    """Rayleigh quotients of the eigenvalues in that band."""
-    uncertainty: np.ndarray
-    """Round-off of those."""
-    certified: bool
-    """Whether counts prove that none is missing among the values."""
-    seconds: float
-    """What it cost."""
-    factorisations: int
-    """So many of matrices."""
-    method: str
-    """How it was done."""
-    reason: str
-    """Why so."""
-    undecided: int = 0
-    """Number of eigenvalues whose sign is not decided, which are not among the negative ones."""
-    soft: tuple[SoftMode, ...] = ()
-    """Eigenvalues near zero in the metric, by name."""
-    kink: str = ""
-    """What has a kink at the very state, where the numbers are those of one side."""
-    uncompared: str = ""
-    """Why the index was not compared with that of a richer mesh."""
-    negative_in_space: int | None = None
-    """Of a planar rod the index in space, if it is known."""
+    Under loads without a potential unstable eigenvalues are those with a negative real part or an imaginary part, of
+    all that the mesh has (of those found, if it is too large), and zero ones those of free motions.
+    """
+
+    negative: int  #: index, or number of unstable eigenvalues
+    zero: int  #: number of zero eigenvalues, symmetry modes included
+    values: (
+        np.ndarray
+    )  #: left-most mu = omega^2 (nearest zero, without a potential), without symmetry modes
+    vectors: list[PETSc.Vec]  #: without multipliers if constraints were reduced; none without a potential
+    errors: np.ndarray  #: backward errors
+    band: float  #: half width of the interval about zero, in the metric, in which inertia alone decides nothing
+    inside: np.ndarray  #: Rayleigh quotients of the eigenvalues in that band
+    uncertainty: np.ndarray  #: their round-off
+    certified: bool  #: whether counts prove that none is missing among the values
+    seconds: float  #: cost of the verdict
+    factorisations: int  #: of matrices
+    method: str  #: how it was done
+    reason: str  #: why so
+    undecided: int = 0  #: number of eigenvalues whose sign is not decided, which are not among the negative ones
+    soft: tuple[SoftMode, ...] = ()  #: eigenvalues near zero in the metric, by name
+    kink: str = ""  #: what has a kink at the very state, where the numbers are those of one side
+    uncompared: str = ""  #: why the index was not compared with that of a richer mesh
+    negative_in_space: int | None = None  #: index in space of a planar rod, if it is known
 
     @property
     def stable(self) -> bool | None:
@@ -165,12 +150,11 @@ class Assessor:
         """Whether there are so few unknowns that the mesh may have no such ``number`` of eigenvalues."""
         return self.system.fields.unknowns < 12 * number
 
-    def __call__(self, x: PETSc.Vec, method: str = AUTO, number: int = 4, interval: Interval | None = None) -> Verdict:
+    def __call__(self, x: PETSc.Vec, method: str = AUTO, number: int = 4) -> Verdict:
         """Assess the equilibrium ``x`` by a ``method`` of :data:`rodfem.stability.METHODS`, or ``auto``.
 
-        ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
-        :class:`InputError` for a method that does not exist or apply, for dependent constraints, and for more
-        eigenvalues than a small mesh has, :class:`ConvergenceError` if an eigensolver fails.
+        Raises :class:`InputError` for a method that does not exist or apply, for dependent constraints, and for more
+        than the ``number`` of eigenvalues that a small mesh has, :class:`ConvergenceError` if an eigensolver fails.
         """
         name, reason = self.choose(method, number)
         if number < 0:
@@ -181,7 +165,7 @@ class Assessor:
             counts = decision.index.negative, decision.index.zero
             inside = decision.band, decision.inside, decision.uncertainty
             made -= self._factorisations() - 2
-            found = self._leftmost(x, name if number else COUNT, number, interval)
+            found = self._leftmost(x, name if number else COUNT, number)
             made += self._factorisations()
         else:
             with as_failure(self.system.comm):
@@ -193,26 +177,26 @@ class Assessor:
             *(perf_counter() - started, made + found.factorisations, name, reason + found.note),
         )
 
-    def _leftmost(self, x: PETSc.Vec, name: str, number: int, interval: Interval | None) -> Found:
+    def _leftmost(self, x: PETSc.Vec, name: str, number: int) -> Found:
         """By a method; of a small mesh with fewer than ``number`` eigenvalues LAPACK has the sentence on that."""
         try:
             with as_failure(self.system.comm):
-                found = self._method(name).leftmost(x, number, interval)
-            if interval is None and len(found.values) < number and name != COUNT:
+                found = self._method(name).leftmost(x, number)
+            if len(found.values) < number and name != COUNT:
                 raise ConvergenceError(
                     f"The method {name} found {len(found.values)} of {number} eigenvalues: ask for fewer of them, "
                     "or choose another method."
                 )
         except ConvergenceError:
             if self._few(number) and not find(DENSE).refusal(self.system):
-                self._method(DENSE).leftmost(x, number, None)
+                self._method(DENSE).leftmost(x, number)
             raise
         return found
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """The ``number`` left-most eigenpairs of the conservative state ``x`` alone, without its index."""
         with as_failure(self.system.comm):
-            return self._method(self.choose(AUTO, number)[0]).leftmost(x, number, None)
+            return self._method(self.choose(AUTO, number)[0]).leftmost(x, number)
 
     def _factorisations(self) -> int:
         """Number of those of the symmetric pencil, so far."""
@@ -256,8 +240,8 @@ class Method:
         """Why it does not apply to a system, in words that follow its name; empty where it does."""
         return ""
 
-    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
-        """Left-most eigenvalues of a conservative state, ``number`` of them or those in an interval."""
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+        """The ``number`` left-most eigenvalues of a conservative state."""
         raise NotImplementedError
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
@@ -280,7 +264,7 @@ class Count(SymmetricMethod):
 
     finds_modes = False
 
-    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """Nothing."""
         return Found(np.zeros(0), [], np.zeros(0), certified=True)
 
@@ -288,7 +272,7 @@ class Count(SymmetricMethod):
 class ShiftInvert(Method):
     """SLEPc on the singular pencil: one sparse factorisation serves eigenvalues and count."""
 
-    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """By the Lanczos method, with a shift below the spectrum."""
         return self.work.symmetric.at(x).leftmost(number)
 
@@ -306,7 +290,7 @@ class Dense(Method):
         unknowns = system.fields.unknowns
         return "" if unknowns <= LARGEST else f"is for at most {LARGEST} unknowns, not {unknowns}"
 
-    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """By the symmetric ``T`` of :mod:`rodfem.stability.spectrum`, positive for a shift below all eigenvalues.
 
         Raises :class:`InputError` if fewer than ``number`` are finite.
@@ -342,37 +326,31 @@ def _nearest(found: Frequencies, number: int) -> Found:
 
 
 class Slicing(SymmetricMethod):
-    """SLEPc's spectrum slicing: all eigenvalues in an interval."""
+    """SLEPc's spectrum slicing: all eigenvalues in an interval, found by counting, with the left-most and few more."""
 
-    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
-        """In the ``interval``, or in one found by counting that holds ``number`` of them and few more.
-
-        Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` if an end is an eigenvalue.
-        """
-        pencil, one = self.work.below(x), self.work.one
-        low, high = (interval[0] / one, interval[1] / one) if interval else enclosed(pencil, number)
-        if not low < high:
-            raise InputError(f"An interval from {one * low:g} to {one * high:g} is empty: give its lower end first.")
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+        """Those in an interval from below the spectrum."""
+        pencil, own = self.work.below(x), self.work.symmetric
+        # no simple factor: an end on an eigenvalue is unlikely
+        low, width = own.shift, max(abs(own.shift), own.scale) * 1.0371
+        while pencil.below(low + width) < number:
+            width *= 2
+        high = low + width
         for wider in (0.0, 1e-9, 1e-7, 1e-5):  # an end on an eigenvalue is moved off it
             low, high = low - wider * (high - low), high + wider * (high - low)
-            wanted = pencil.below(high) - pencil.below(low)
             if (solver := sliced(pencil, low, high)) is not None:
                 break
         else:
-            ends = f"{one * low:.6g} to {one * high:.6g}"
-            raise ConvergenceError(f"An end of the interval from {ends} is an eigenvalue: move it.")
-        values, vectors = pencil.converged(solver, solver.getConverged() if interval else number)
-        complete = solver.getConverged() == wanted
+            raise ConvergenceError(f"{low:.6g} or {high:.6g} is an eigenvalue: choose another method.")
+        complete = solver.getConverged() == pencil.below(high) - pencil.below(low)
+        values, vectors = pencil.converged(solver, number)
         solver.destroy()
         errors = pencil.backward_errors(values, vectors)
-        return Found(one * values, pencil.unscaled(vectors), errors, complete, 3)  # SLEPc's own, at least
+        return Found(self.work.one * values, pencil.unscaled(vectors), errors, complete, 3)  # SLEPc's own, at least
 
 
 def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None:
-    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None if they do not match the counts at these ends.
-
-    Raises :class:`PETSc.Error` where PETSc gives up.
-    """
+    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None if they do not match the counts at these ends."""
     rooms = 100, 400, 1600  # where rotations have no mass many pivots of the pencil are delayed
     for room in rooms:
         try:
@@ -381,7 +359,7 @@ def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None
                 solver.solve()
         except PETSc.Error as trouble:
             if trouble.ierr == 77:  # PETSC_ERR_PLIB: what it finds does not match the counts at the ends
-                return None
+                break
             if trouble.ierr != PETSC_ERR_LIB or room == rooms[-1]:
                 raise
         else:
@@ -410,12 +388,3 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, roo
         with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
             solver.setUp()
     return solver
-
-
-def enclosed(pencil: SymmetricPencil, number: int) -> Interval:
-    """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
-    # no simple factor: an end on an eigenvalue is unlikely
-    low, step = pencil.solver.shift, max(abs(pencil.solver.shift), pencil.solver.scale) * 1.0371
-    while pencil.below(low + step) < number:
-        step *= 2
-    return low, low + step

@@ -24,9 +24,8 @@ from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
-from rodfem.modes.finder import ModeFinder
+from rodfem.modes.finder import ModeFinder, Motions
 from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
-from rodfem.modes.perturbation import Motions
 from rodfem.output.plot_modes import FRAMES, RISING, amplitude, draw_modes, main
 from rodfem.problem.scene import Scene
 

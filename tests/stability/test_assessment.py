@@ -168,20 +168,6 @@ def test_reference_values(method: str) -> None:
     np.testing.assert_allclose(assessor(x, method, 3).values, REFERENCE, rtol=1e-9)
 
 
-def test_interval() -> None:
-    """An end on an eigenvalue belongs to the interval or not, what is inside is found."""
-    assessor, x = at("cord", "reduced", 20.0, False)
-    every = assessor(x, "shift-invert", 8).values
-    low, high = (every[1] + every[2]) / 2, (every[5] + every[6]) / 2
-    found = assessor(x, "slicing", interval=(low, high))
-    np.testing.assert_allclose(found.values, every[2:6], rtol=1e-9)
-    assert found.certified
-    with pytest.raises(InputError, match="is empty"):
-        assessor(x, "slicing", interval=(high, low))
-    values = assessor(x, "slicing", interval=(every[1], every[4])).values
-    assert {2, 3} <= {int(np.argmin(abs(every - v))) for v in values} <= {1, 2, 3, 4}
-
-
 # --- nasty -----------------------------------------------------------------------------------------------------
 
 
