@@ -7,10 +7,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import demo_cases
 import numpy as np
 import pytest
+import scipy.linalg
+from scipy.optimize import brentq
 from small_states import plain
 
+import rodfem
+from rodfem import Discretization, Plan
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import cayley_shift
 from rodfem.stability.dependence import smallest_singular
@@ -26,12 +31,12 @@ Rule = list[tuple[float, float]]
 RULES = MIDPOINT, EXACT
 
 
-def nodal(n: int, stretch: float, rule: Rule, directors: tuple[int, ...]) -> np.ndarray:
-    """``C`` of (18): ``int (eta' - psi x r') . d_a lambda_a ds`` of a straight rod of length 6 between clamps.
+def nodal(n: int, stretch: float, rule: Rule, directors: tuple[int, ...], length: float = 6.0) -> np.ndarray:
+    """``C`` of (18): ``int (eta' - psi x r') . d_a lambda_a ds`` of a straight rod.
 
     Shape (n + 1, 2, 3, n + 1, directors): ``eta`` and ``psi`` at each node by multipliers at each node.
     """
-    h, r_s = 6 / n, stretch * np.eye(3)[2]
+    h, r_s = length / n, stretch * np.eye(3)[2]
     C = np.zeros((n + 1, 2, 3, n + 1, len(directors)))
     for x, weight in rule:
         hats, slopes = (1 - x, x), (-1 / h, 1 / h)
@@ -48,9 +53,9 @@ def hemitropic(n: int, stretch: float, rule: Rule) -> np.ndarray:
     return nodal(n, stretch, rule, (0, 1))[1:-1].reshape(6 * (n - 1), 2 * (n + 1))
 
 
-def cord(n: int, rule: Rule) -> np.ndarray:
+def cord(n: int, rule: Rule, length: float = 6.0) -> np.ndarray:
     """``C`` of section 5.1, (6n - 5) x (3n + 2): the end may move along e3, where the axial force is known."""
-    C = nodal(n, 1.0, rule, (0, 1, 2)).reshape(n + 1, 6, 3 * (n + 1))[..., :-1]
+    C = nodal(n, 1.0, rule, (0, 1, 2), length).reshape(n + 1, 6, 3 * (n + 1))[..., :-1]
     return np.vstack([C[1:-1].reshape(6 * (n - 1), 3 * n + 2), C[-1, 2:3]])
 
 
@@ -76,6 +81,33 @@ def test_the_midpoint_rule_does_not_see_alternating_multipliers() -> None:
     for midpoint, exact in ((hemitropic(n, 2 / 3, r) for r in RULES), (cord(n, r) for r in RULES)):
         assert np.linalg.matrix_rank(exact) == exact.shape[1]
         assert np.linalg.matrix_rank(midpoint) == midpoint.shape[1] - 2
+
+
+def test_matrices_of_the_cord_have_the_load_of_rodfem_s_mesh() -> None:
+    """(19) on 40 elements by the midpoint rule: ``K`` on the null space of ``C^t`` is singular at rodfem's load."""
+    n, tension, moment = 40, cross([0.0, 0.0, 1.0]), cross([0.0, -3 * np.pi, 0.0])
+    mean, slope = np.full(2, 0.5), np.array([-n, n])
+    fixed, scaled = np.zeros((2, n + 1, 2, 3, n + 1, 2, 3))  # rows, columns: node, (r, theta), component
+    for e in range(n):
+        nodes = slice(e, e + 2)
+        spins = np.einsum("i,j,ab->iajb", slope, slope, np.eye(3)) - np.einsum("i,j,ab->iajb", slope, mean, moment)
+        fixed[nodes, 1, :, nodes, 1, :] += spins / n
+        scaled[nodes, 0, :, nodes, 1, :] -= np.einsum("i,j,ab->iajb", slope, mean, tension) / n
+        scaled[nodes, 1, :, nodes, 0, :] += np.einsum("i,j,ab->iajb", mean, slope, tension) / n
+        scaled[nodes, 1, :, nodes, 1, :] += np.einsum("i,j,ab->iajb", mean, mean, tension @ tension) / n
+    kept = np.append(np.arange(6, 6 * n), 6 * n + 2)
+    K0, K1 = (A.reshape(6 * (n + 1), -1)[np.ix_(kept, kept)] for A in (fixed, scaled))
+    Z = scipy.linalg.null_space(cord(n, MIDPOINT, length=1.0).T)
+    assert Z.shape == (6 * n - 5, 3 * n - 5)
+    np.testing.assert_allclose(Z.T @ (K0 + 40 * K1) @ Z, Z.T @ (K0 + 40 * K1).T @ Z, atol=1e-10)
+    load = brentq(lambda lam: np.linalg.eigvalsh(Z.T @ (K0 + lam * K1) @ Z)[0], 45.0, 52.0, xtol=1e-10)
+    diagram = rodfem.trace(demo_cases.scene("cord"), Discretization("pointwise", n, 1), Plan((52.0, 45.0), depth=0))
+    assert load == pytest.approx(diagram.special("branch point")[0].point.load, abs=1e-7)
+
+
+def cross(a: list[float]) -> np.ndarray:
+    """Matrix of ``a x``."""
+    return np.cross(a, np.eye(3)).T
 
 
 def test_multipliers_in_each_element_have_the_stretch() -> None:

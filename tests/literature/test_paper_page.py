@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from math import pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -83,6 +84,14 @@ def test_150_linear_elements(name: str, text: str) -> None:
     load = next(s.point.load for s in diagram.branches[0].special if s.kind in ("branch point", "flutter"))
     assert text in (HOME / "docs" / "paper.md").read_text()
     assert abs(float(text) - load) <= 0.51 * 10.0 ** -len(text.partition(".")[2])
+
+
+def test_the_page_maps_every_equation_and_table() -> None:
+    page = (HOME / "docs" / "paper.md").read_text()
+    cells = re.findall(r"^\| ([^|]*) \|", page[: page.index("**Signs.**")], re.M)
+    spans = [re.findall(r"\d+", part) for cell in cells if cell[0] == "(" for part in cell.split(",")]
+    assert sorted(i for span in spans for i in range(int(span[0]), int(span[-1]) + 1)) == list(range(1, 46))
+    assert {"Tables 1-4", "Table 5", "figures"} <= set(cells)
 
 
 def test_ziegler_and_beck() -> None:
