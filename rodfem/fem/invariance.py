@@ -267,21 +267,26 @@ def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_mul
     """
     fields, scene = equations.fields, equations.fields.scene
     values, part = derived(equations, ("generic values", seed, decay), lambda: _generic_values(fields, seed, decay))
-    named = {block.name: scene.units.of_field(block) * values[block.name] for block in fields.blocks}
-    named |= {unknown.name: values[unknown.name] * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
+    units = {block.name: scene.units.of_field(block) for block in fields.blocks}
+    units |= {unknown.name: scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
     if no_multipliers:
-        multipliers = [block.name for block in fields.blocks if block.multiplier]
-        multipliers += [x.name for x in fields.unknown_scalars if x.group.motion is not Motion.POSITION]
-        named |= {name: 0.0 * named[name] for name in multipliers}
+        units |= dict.fromkeys(_multipliers(fields), 0.0)
+    named = {name: unit * values[name] for name, unit in units.items()}
     low, high = sorted(scene.span)
     named[LOAD] = low + (high - low) * part
-    r = named.get("r", 0.0)
     for size in (1.0, 0.1, 0.01, 1e-3):  # of displacements: a barrier admits no large ones
-        state = Evaluation(equations, fields.filled(named | {"r": size * r} if "r" in named else named), equations.line)
-        known = equations.loads is None or np.isfinite(state.integral(equations.loads))
-        if fields.comm.allreduce(bool(known and np.isfinite(state.covector()).all()), op=MPI.LAND):
+        moved = {"r": size * named["r"]} if "r" in named else {}
+        state = Evaluation(equations, fields.filled(named | moved), equations.line)
+        loads = 0.0 if equations.loads is None else state.integral(equations.loads)
+        if fields.comm.allreduce(bool(np.isfinite(loads) and np.isfinite(state.covector()).all()), op=MPI.LAND):
             break
     return state
+
+
+def _multipliers(fields: Fields) -> list[str]:
+    """Names of fields and scalars that are multipliers."""
+    scalars = [x.name for x in fields.unknown_scalars if x.group.motion is not Motion.POSITION]
+    return scalars + [block.name for block in fields.blocks if block.multiplier]
 
 
 def _generic_values(fields: Fields, seed: int, decay: float) -> tuple[dict[str, Any], float]:
@@ -307,13 +312,10 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
     values = wave()
     if block.name == "q":
         values = fields.turning.normalised(_rotated(scene, values, wave, x, rng))
-    if block.name == fields.turning.name and not closed:
-        values = _toward_clamps(fields, values, x)
-    if block.name == "angle" and closed:
-        first, last = fields.turning.start(scene.start, np.array(scene.interval), scene.interval)
-        values = values + (last - first) * x
+    if block.name == fields.turning.name:
+        return _turned(fields, values, x)
     if block.name == "v":
-        values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
+        return np.asarray(0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains])
     return values
 
 
@@ -333,9 +335,17 @@ def _rotated(
     return np.asarray((u + 0.3 * values) * np.cos(np.pi * x) + (v + 0.3 * wave()) * np.sin(np.pi * x))
 
 
-def _toward_clamps(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Rotations (..., size) that are those of clamps at the ends: a jump there would be a curvature without bound."""
+def _turned(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Rotations (..., size) that are those of clamps at the ends: a jump there would be a curvature without bound.
+
+    The angle of a ring turns in all as its start does.
+    """
     scene, turning = fields.scene, fields.turning
+    if scene.closed:
+        if turning.name == "q":
+            return values
+        first, last = turning.start(scene.start, np.array(scene.interval), scene.interval)
+        return np.asarray(values + (last - first) * x)
     for end, s, at_end in zip(scene.sides, scene.interval, ((1 - x) ** 3, x**3), strict=True):
         if end.fixed_rotation is not None:
             clamp = turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)

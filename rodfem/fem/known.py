@@ -55,18 +55,21 @@ class Known:
         self.lines = np.zeros((len(self.paths), 2))
         self.rows = [np.hstack([t.knots[:-1, None], t.pieces.reshape(len(t.pieces), -1)]) for t, _ in self.paths]
         self.along, self._dofs = np.zeros((cells, 0)), np.zeros((cells, 0), dtype=int)
+        if found:
+            self._make(cells)
+
+    def _make(self, cells: int) -> None:
+        """Make the function and its components, with the tables along the rod in it."""
         sizes = sum(len(t.rows[0]) for t in self.tables), sum(rows.shape[1] for rows in self.rows)
-        if not any(sizes):
-            return
-        parts = [(False, d, size) for d, size in zip((degree, 0), sizes, strict=True) if size]
-        space = compat.mixed_space(fields.mesh, parts)
+        parts = [(False, d, size) for d, size in zip((self._degree, 0), sizes, strict=True) if size]
+        space = compat.mixed_space(self._fields.mesh, parts)
         self.function = compat.fem.Function(space, name=self.name, dtype=compat.REAL)
         self._dofs = compat.cell_dofs(space, cells)
         self._values = []
         for part, (_, _, size) in zip(ufl.split(self.function), parts, strict=True):
             self._values += [part] if size == 1 else [part[i] for i in range(size)]
         if self.tables:
-            self.along = np.array([self._at_nodes(a, b, degree) for a, b in fields.vertices.tolist()])
+            self.along = np.array([self._at_nodes(a, b, self._degree) for a, b in self._fields.vertices.tolist()])
         self.function.x.array[self._dofs[:, : self.along.shape[1]]] = self.along
 
     def rough(self) -> str:

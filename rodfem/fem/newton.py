@@ -68,6 +68,10 @@ class Limits:
     still: float = STALLED
     lost: Callable[[], bool] = lambda: False
 
+    def stalled(self, size: float, previous: float) -> bool:
+        """Whether a correction by fresh factors is round-off, as it no longer shrinks."""
+        return size > 0.5 * previous and (size < self.still or self.lost())
+
 
 @dataclass(frozen=True)
 class NewtonResult:
@@ -100,8 +104,7 @@ def newton(iteration: Iteration, limits: Limits) -> NewtonResult:
             break
         # chord steps converge linearly: their rate, doubled for safety, says what the next correction would be
         left = size if fresh else min(2.0 * size / previous, 1.0) * size
-        stalled = fresh and size > 0.5 * previous and (size < limits.still or limits.lost())
-        if size < limits.small or stalled:
+        if size < limits.small or (fresh and limits.stalled(size, previous)):
             return NewtonResult(True, number, left, distance)
         # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
         fresh = size > 0.02 or size > 0.1 * previous
@@ -176,7 +179,6 @@ def relax(
     system: System,
     x: PETSc.Vec,
     row: PETSc.Vec,
-    most: int = 300,
     longest: float = inf,
     accepts: Callable[[PETSc.Vec], bool] = lambda x: True,
 ) -> NewtonResult:
@@ -192,25 +194,35 @@ def relax(
     finds.  As ``mu`` grows on the way a step that is uphill, ``dx.(K + M/tau) dx < 0``, is made again, half as long.
     """
     system.set_phase(x)
-    tau, trial = 0.01 / system.stiffness_scale, x.copy()
+    tau, most = 0.01 / system.stiffness_scale, 300
     for iteration in range(most):
         step = linear_step(system, x, row, 1.0 / tau)
-        size = inf if step is None else system.norm(step)
-        if step is None or not isfinite(size):
+        if step is None or not isfinite(size := system.norm(step)):
             break
         if isfinite(longest) and along(system, x, step) < 0:
             tau *= 0.5
             continue
-        x.axpy(-(1.0 if size < LARGEST else LARGEST / size), step)  # constraints are mended in one step, however long
-        # switched evolution: longer time steps while the motion is slow, shorter where it is fast
-        tau = min(tau * (2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0), longest)
-        if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
-            x.copy(trial)
-            outcome = correct(system, trial, row, reach=0.3)
-            if outcome.converged and accepts(trial):
-                trial.copy(x)
+        x.axpy(-LARGEST / max(size, LARGEST), step)  # constraints are mended in one step, however long
+        tau = min(tau * _pace(size), longest)
+        if size < (0.1 if iteration % 5 == 4 else 1e-3):  # not earlier: it might jump to a state uphill
+            if (outcome := _arrival(system, x, row, accepts)) is not None:
                 return outcome
     return NewtonResult(False, most, inf, inf)
+
+
+def _pace(size: float) -> float:
+    """Switched evolution: longer time steps while the motion is slow, shorter where it is fast."""
+    return 2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0
+
+
+def _arrival(system: System, x: PETSc.Vec, row: PETSc.Vec, accepts: Callable[[PETSc.Vec], bool]) -> NewtonResult | None:
+    """What Newton's method makes of ``x``, in place, where it converges to what is accepted; None where it does not."""
+    trial = x.copy()
+    outcome = correct(system, trial, row, reach=0.3)
+    if not (outcome.converged and accepts(trial)):
+        return None
+    trial.copy(x)
+    return outcome
 
 
 def along(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:

@@ -195,5 +195,10 @@ def missing_compiler() -> str:
         if command is None:
             return NO_COMPILER
         os.environ |= {"CC": command, "LDSHARED": f"{command} -shared"}
+    return missing_header()
+
+
+def missing_header() -> str:
+    """Sentence on a Python without header files; empty for one that has them."""
     header = Path(sysconfig.get_path("include"), "Python.h")
     return "" if header.is_file() else NO_HEADERS.format(header)
