@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle, pairwise, product
+from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,29 +21,11 @@ from scipy.spatial import KDTree
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
 from rodfem.file_format import DIAGRAM, read_json
-from rodfem.output.pieces import COUNTED, STABLE, Piece, endings, pieces_of
-from rodfem.output.style import (
-    END,
-    FONT,
-    HALO,
-    LINES,
-    PALETTE,
-    RIM,
-    STYLE,
-    THIN,
-    WARNING,
-    at_most,
-    axis_label,
-    entries_of,
-    explain,
-    mesh_in_words,
-    ordinate_in_words,
-    save,
-    sheet,
-    status_of,
-    tex,
-)
-from rodfem.output.view import POINT
+from rodfem.output import style
+from rodfem.output.pieces import COUNTED, Piece, endings, pieces_of
+from rodfem.output.style import END, FONT, HALO, LINES, PALETTE
+from rodfem.stability.soft_mode import STABLE
+from rodfem.tolerances import TINY
 
 __all__ = ["draw_diagram", "main"]
 
@@ -54,15 +36,13 @@ UNEXPLAINED = "index change unexplained"
 SINGULAR = "singular first state, not located"
 MARKERS: dict[str, Mapping[str, Any]] = {
     **{name: kind.marker for name, kind in KINDS.items() if kind.marker},
-    UNEXPLAINED: {"marker": "^", **WARNING},
-    SINGULAR: {"marker": "s", **WARNING},
+    UNEXPLAINED: {"marker": "^", **style.WARNING},
+    SINGULAR: {"marker": "s", **style.WARNING},
 }
-ENDS, IMAGE = "ends: ", "image, not traced: "
-"""Beginnings of the words for the end of a branch before the range ends, and for an image."""
-SHAPES = ("", "^", "<", "v", ">", "p", "h")
-"""Marks along the curves of branches, another one whenever the hues are used up."""
-HUES = 7
-"""Hues of the palette that differ at a glance."""
+ENDS = "ends: "
+"""Beginning of the words for the end of a branch before the range ends."""
+SHAPES, HUES = ("", "^", "<", "v", ">", "p", "h"), 7
+"""Marks along the curves of branches, another one whenever the hues that differ at a glance are used up."""
 GAP = 11.0
 """Pixels between an index and lines."""
 SEEN = 2e-4
@@ -90,79 +70,64 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
     200 dpi.  Its suffix decides the format (.png, .pdf, .svg).  Raises :class:`InputError` for another format of file.
     """
-    return save(figure_of(diagram), path)
+    return style.save(figure_of(diagram), path)
 
 
 def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
     """Figure of a diagram, as :func:`draw_diagram` writes it, or that of axes that are ``given``: it is drawn there."""
     DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = diagram["branches"]
-    with matplotlib.rc_context(STYLE):
-        figure, axes = sheet(diagram["title"], _about(diagram), given)
+    with matplotlib.rc_context(style.STYLE):
+        figure, axes = style.sheet(diagram["title"], _about(diagram), given)
         handles, lines = draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
-        if given is None and _is_flat(branches):
-            axes.set_ylim(-1.0, 1.0)
+        bars = [point.get("ordinate_error_estimate") for branch in branches for point in branch.get("special", [])]
+        error = max((bar for bar in bars if bar is not None), default=0.0)
+        if given is None and all(abs(x) <= error for branch in branches for x in branch["columns"]["ordinate"]):
+            axes.set_ylim(-1.0, 1.0)  # as of a straight rod
             if len(branches) > 1:
                 words = "the ordinate is zero all over: another one tells branches apart"
                 axes.annotate(words, (0.5, 0.25), xycoords="axes fraction", ha="center", color="0.4")
-        axes.set_xlabel(axis_label(diagram), fontsize=FONT + 1)
-        axes.set_ylabel(tex(ordinate_in_words(diagram)))
-        explain(axes, handles)
+        axes.set_xlabel(style.axis_label(diagram), fontsize=FONT + 1)
+        axes.set_ylabel(style.tex(style.ordinate_in_words(diagram)))
+        style.explain(axes, handles)
         _write_indices(axes, lines, [tuple(place) for handle in handles for place in handle.get_xydata()])
     return figure
 
 
-def _is_flat(branches: Branches) -> bool:
-    """Whether the ordinate is zero all over, to the error bars that special points have of it: as of a straight rod."""
-    bars = [point.get("ordinate_error_estimate") for branch in branches for point in branch.get("special", [])]
-    error = max((bar for bar in bars if bar is not None), default=0.0)
-    return all(abs(x) <= error for branch in branches for x in branch["columns"]["ordinate"])
-
-
 def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Line]]:
     """Draw all curves and special points; return the legend's handles and the lines."""
-    handles, lines = list[Line2D](), list[Line]()
+    handles, lines, images = list[Line2D](), list[Line](), list[Line2D]()
     hues, behind = _free(axes, branches[0]["name"])
     for number, (branch, colour) in enumerate(zip(branches, cycle(hues), strict=False)):
         new = [Line(piece, colour, curve) for piece, curve in drawn(branch)]
         lines += new
-        shape, places = SHAPES[number // HUES % len(SHAPES)], _places(branch)
+        shape = SHAPES[number // HUES % len(SHAPES)]
         handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"] + behind))
         if shape or not new:
-            axes.plot(*places.T, ls="", marker=shape or "o", ms=5.0, color=colour, markevery=0.08, zorder=3)
+            places = _places(branch).T
+            axes.plot(*places, ls="", marker=shape or "o", ms=5.0, color=colour, markevery=0.08, zorder=3)
+        if branch.get("image") and not is_traced(branch, branches):
+            for piece, _, curve in new:
+                axes.plot(*(curve * [1.0, -1.0]).T, color=colour, **LINES[piece.kind] | style.THIN)
+            images.append(Line2D([], [], color="0.45", label=f"image, not traced: {branch['image']}", **style.THIN))
     for line in sorted(lines, key=lambda line: line.piece.kind != STABLE):
-        upper = {} if line.piece.kind == STABLE else {"path_effects": RIM, "zorder": 2.5}  # seen where two lines lie
+        upper = {} if line.piece.kind == STABLE else {"path_effects": style.RIM, "zorder": 2.5}  # where two lines lie
         axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind] | upper)
-    return handles + _kinds(lines) + _draw_images(axes, branches, hues) + _draw_marks(axes, branches), lines
+    kinds = {line.piece.kind for line in lines}
+    handles += [Line2D([], [], color="0.45", label=kind, **LINES[kind]) for kind in LINES if kind in kinds]
+    if lines:
+        words = "negative eigenvalues" + " in the plane (in space)" * any(x.piece.in_space is not None for x in lines)
+        handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words))
+    return handles + images + _draw_marks(axes, branches), lines
 
 
 def _free(axes: Axes, name: str) -> tuple[Sequence[str], str]:
     """Hues that no other diagram in the axes has, and a number for the names of branches, the first of a ``name``."""
     used, times = {line.get_color() for line in axes.get_lines()}, 1
-    while name + f" ({times})" * (times > 1) in entries_of(axes):
+    while name + f" ({times})" * (times > 1) in style.entries_of(axes):
         times += 1
     return [colour for colour in PALETTE if colour not in used] or PALETTE, f" ({times})" * (times > 1)
-
-
-def _kinds(lines: Sequence[Line]) -> list[Line2D]:
-    """Handles of the legend for the kinds of lines, and for their indices."""
-    kinds = {line.piece.kind for line in lines}
-    out = [Line2D([], [], color="0.45", label=kind, **style) for kind, style in LINES.items() if kind in kinds]
-    in_space = any(line.piece.in_space is not None for line in lines)
-    words = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
-    return out + [Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words)] * bool(lines)
-
-
-def _draw_images(axes: Axes, branches: Branches, hues: Sequence[str]) -> list[Line2D]:
-    """Draw the images of branches by a symmetry, of the opposite ordinate, that are no branches themselves."""
-    out = []
-    for branch, colour in zip(branches, cycle(hues), strict=False):
-        if branch.get("image") and not is_traced(branch, branches):
-            for piece, curve in drawn(branch):
-                axes.plot(*(curve * [1.0, -1.0]).T, color=colour, **LINES[piece.kind] | THIN)
-            out.append(Line2D([], [], color="0.45", label=f"{IMAGE}{branch['image']}", **THIN))
-    return out
 
 
 def is_traced(branch: Mapping[str, Any], branches: Branches) -> bool:
@@ -189,8 +154,9 @@ def _draw_marks(axes: Axes, branches: Branches) -> list[Line2D]:
     handles = list[Line2D]()
     for kind, places in found.items():
         if places and (kind in MARKERS or kind.startswith(ENDS)):
-            style = {"linestyle": "none", "zorder": 5, "label": _words(kind, branches), **MARKERS.get(kind, END)}
-            handles += axes.plot(*np.unique(places, axis=0).T, path_effects=HALO, **style)
+            look = {"linestyle": "none", "zorder": 5, **MARKERS.get(kind, END)}
+            look["label"] = look.get("label", kind) + (_unfolding(branches) if kind == IMPERFECT else "")
+            handles += axes.plot(*np.unique(places, axis=0).T, path_effects=HALO, **look)
     return handles
 
 
@@ -205,13 +171,35 @@ def _marks(branch: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float, float]
         yield SINGULAR, tuple(places[0])
 
 
-def _words(kind: str, branches: Branches) -> str:
-    """Return the legend's words for a kind of mark; of imperfect bifurcations with their unfolding."""
-    words = str(MARKERS.get(kind, END).get("label", kind))
-    points = [point for branch in branches for point in branch.get("special", []) if kind == IMPERFECT == point["kind"]]
+def _unfolding(branches: Branches) -> str:
+    """Unfolding of imperfect bifurcations for the legend."""
+    points = [point for branch in branches for point in branch.get("special", []) if point["kind"] == IMPERFECT]
     values = [abs(point["unfolding"]) for point in points if point.get("unfolding") is not None]
     sizes = dict.fromkeys(f"{value:.0e}" for value in (min(values), max(values))) if values else ()
-    return f"{words}, unfolding {' to '.join(sizes)}" if sizes else words
+    return f", unfolding {' to '.join(sizes)}" if sizes else ""
+
+
+# --- words
+
+
+def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[float, float]]) -> None:
+    """Write the index of each line where there is most room: a short line has none, unless it is the only one."""
+    curves = [dense(axes, line.curve) for line in lines]
+    taken, written = [*curves, *([axes.transData.transform(marks)] if marks else [])], set[tuple[str, str]]()
+    for line, curve in sorted(zip(lines, curves, strict=True), key=lambda pair: -len(pair[1])):
+        half = np.array([0.33 * len(line.piece.label) + 0.1, 0.45]) * FONT * axes.figure.dpi / 72
+        places, tree = _label_places(curve, half), KDTree(np.concatenate(taken))
+        corner = np.array([*product((-1, 0, 1), repeat=2)]) * half
+        room = np.array([min(tree.query(place + corner)[0].min(), GAP) for place in places])
+        inside = np.all((places - half > axes.bbox.min) & (places + half < axes.bbox.max), axis=1)
+        best = int(np.argmax(np.where(inside, room, -1.0)))
+        name = line.colour, line.piece.label
+        if (inside[best] and room[best] > GAP / 2 and len(curve) > 15) or name not in written:
+            written.add(name)
+            taken.append(places[best] + corner)
+            at = axes.transData.inverted().transform(places[best])
+            look = {"ha": "center", "va": "center", "weight": "bold", "zorder": 6, "path_effects": HALO}
+            axes.annotate(line.piece.label, tuple(at), color=line.colour, in_layout=False, **look)
 
 
 def dense(axes: Axes, curve: Floats) -> Floats:
@@ -222,34 +210,11 @@ def dense(axes: Axes, curve: Floats) -> Floats:
     return np.column_stack([np.interp(along, lengths, pixels[:, k]) for k in (0, 1)])
 
 
-def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[float, float]]) -> None:
-    """Write the index of each line where there is most room: a short line has none, unless it is the only one."""
-    curves = [dense(axes, line.curve) for line in lines]
-    corners = [axes.transData.transform(marks)] if marks else []
-    taken, written = [*curves, *corners], set[tuple[str, str]]()
-    for number in sorted(range(len(lines)), key=lambda number: -len(curves[number])):
-        line, curve = lines[number], curves[number]
-        half = np.array([0.33 * len(line.piece.label) + 0.1, 0.45]) * FONT * axes.figure.dpi / 72
-        places = _label_places(curve, half)
-        tree = KDTree(np.concatenate(taken))
-        corner = np.array([*product((-1, 0, 1), repeat=2)]) * half
-        room = np.array([min(tree.query(place + corner)[0].min(), GAP) for place in places])
-        inside = np.all((places - half > axes.bbox.min) & (places + half < axes.bbox.max), axis=1)
-        best = int(np.argmax(np.where(inside, room, -1.0)))
-        name = line.colour, line.piece.label
-        if (inside[best] and room[best] > GAP / 2 and len(curve) > 15) or name not in written:
-            written.add(name)
-            taken.append(places[best] + corner)
-            at = axes.transData.inverted().transform(places[best])
-            style = {"ha": "center", "va": "center", "weight": "bold", "zorder": 6, "path_effects": HALO}
-            axes.annotate(line.piece.label, tuple(at), color=line.colour, in_layout=False, **style)
-
-
 def _label_places(curve: Floats, half: Floats) -> Floats:
     """Places (k, 2) for a word of ``half`` (2,) pixels next to a curve (n, 2), those in its middle first."""
     rows = ((0.5 + np.array([0, 0.15, -0.15, 0.3, -0.3, 0.4, -0.4])) * (len(curve) - 1)).round().astype(int)
     tangent = curve[np.minimum(rows + 4, len(curve) - 1)] - curve[np.maximum(rows - 4, 0)]
-    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(*tangent.T), POINT)[:, None]
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.maximum(np.hypot(*tangent.T), TINY)[:, None]
     normal *= np.where(normal[:, 1] < 0, -1.0, 1.0)[:, None]
     away = normal * (abs(normal) @ half + GAP)[:, None]
     return np.stack([curve[rows] + away, curve[rows] - away], axis=1).reshape(-1, 2)
@@ -257,22 +222,17 @@ def _label_places(curve: Floats, half: Floats) -> Floats:
 
 def _about(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
-    d = diagram.get("discretization")
-    parts = [mesh_in_words(d)] if d else []
+    d, special = diagram.get("discretization"), [s for b in diagram["branches"] for s in b.get("special", [])]
+    parts = [style.mesh_in_words(d)] if d else []
     if d and diagram.get("accuracy"):
         parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
-    special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
+    counted = [point for point in special if point["kind"] in COUNTED]
+    bars = [point.get("error_estimate") for point in counted if point.get("resolved") is not False]
+    if known := [abs(bar) for bar in bars if bar is not None and isfinite(bar)]:
+        share = f" (of {len(known)} out of {len(counted)})" if len(known) < len(counted) else ""
+        parts.append(f"error of the loads of special points at most {style.at_most(max(known))}{share}")
     coarse = sum(point.get("resolved") is False for point in special)
-    parts += [f"{coarse} of {len(special)} special points not resolved by the mesh"] * bool(coarse)
-    return "; ".join([*parts[:1], *_accuracy([point for point in special if point["kind"] in COUNTED]), *parts[1:]])
-
-
-def _accuracy(special: Branches) -> list[str]:
-    """Greatest bound of the errors of special points in words; nothing where none is known."""
-    bars = [point.get("error_estimate") for point in special if point.get("resolved") is not False]
-    known = [abs(bar) for bar in bars if bar is not None and math.isfinite(bar)]
-    share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
-    return [f"error of the loads of special points at most {at_most(max(known))}{share}"] if known else []
+    return "; ".join(parts + [f"{coarse} of {len(special)} special points not resolved by the mesh"] * bool(coarse))
 
 
 # --- branches between their rows
@@ -302,8 +262,7 @@ def between(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
 
 def drawn(branch: Mapping[str, Any]) -> list[tuple[Piece, Floats]]:
     """Pieces of a branch, each with its curve (k, 2) of loads and ordinates, with points between rows."""
-    rows = np.column_stack([np.asarray(branch["columns"][key], dtype=float) for key in ("load", "ordinate")])
-    more, found = between(branch, "ordinate"), []
+    rows, more, found = _places(branch), between(branch, "ordinate"), []
     for piece in pieces_of(branch):
         parts = [part for i in range(piece.first, piece.last) for part in (rows[i : i + 1], more.get(i, rows[:0]))]
         found.append((piece, np.vstack([*parts, rows[piece.last]])))
@@ -323,7 +282,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         diagram = read_json(given.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
         return draw_diagram(diagram, given.output or given.diagram.with_suffix(".png"))
 
-    return status_of(draw, given.diagram)
+    return style.status_of(draw, given.diagram)
 
 
 if __name__ == "__main__":

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.modes.modes import RIGID
-from rodfem.output.pieces import STABLE, Interval, intervals_of
+from rodfem.output.pieces import Interval, intervals_of
 from rodfem.output.style import HALO, PALETTE, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
+from rodfem.stability.soft_mode import STABLE
 
 Member = tuple[float, int, complex, str]
 """Load, row, eigenvalue and motion of a point of a curve."""
@@ -38,18 +39,16 @@ RANGES = ("#E9E4F3", "#FBE6D9", "#F3D3C6")
 """Shades of ranges of divergence, of flutter, and of both."""
 REAL = 1e-6
 """An imaginary part smaller than this, relative to the root, is round-off."""
-PAIR, GROWTH, DIVERGED = "complex pair, real part", "complex pair, imaginary part", "diverged, growth rate"
 LEAST = 1e-3
 """Least frequency at the top of a picture; distance of eigenvalues that have met from their mean, relative to it."""
 SHARES = np.array([0.001, *np.linspace(0.125, 0.875, 7)]) ** 2
 """Where the step next to a flutter load has points, in parts of it from there: at the first one the pair has parted."""
-PARTS = dict(zip((PAIR, GROWTH, DIVERGED), (("x", "-"), ("+", "--"), ("+", ":")), strict=True))
+PARTS = {
+    "complex pair, real part": ("x", "-"),
+    "complex pair, imaginary part": ("+", "--"),
+    "diverged, growth rate": ("+", ":"),
+}
 """Marker and line of roots that are not real."""
-ENTRIES: dict[str, dict[str, Any]] = {
-    what: {"color": "0.3", "marker": marker, "ls": style, "lw": 0.8, "label": what}
-    for what, (marker, style) in PARTS.items()
-} | {kind: {"ls": "none", "label": kind, **style} for kind, style in SPECIAL.items()}
-"""Entries of the legend for what is not a line."""
 
 
 def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> Path:
@@ -64,16 +63,18 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
 
 
 def figure_of(diagram: Mapping[str, Any], given: Axes | None = None, most: int = 3) -> Figure:
-    """Figure of the frequencies, as :func:`draw_frequencies` writes it; raises :class:`ValueError` as that does.
-
-    It is drawn into axes that are ``given``.
-    """
+    """Figure of the frequencies, as :func:`draw_frequencies` writes it, or that of axes that are ``given``."""
     DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
     if not branches:
         raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")
+    about = mesh_in_words(diagram["discretization"])
+    found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
+    if found:
+        kinds = " and ".join(kind for kind in SPECIAL if any(s["kind"] == kind for s in found))
+        about += f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}"
     with matplotlib.rc_context(STYLE):
-        figure, axes = sheet(str(diagram["title"]), _about(diagram, branches), given)
+        figure, axes = sheet(str(diagram["title"]), about, given)
         handles = draw_into(axes, branches, most)
         axes.set_xlabel(axis_label(diagram))
         explain(axes, handles)
@@ -89,21 +90,20 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
             axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
             ranges[found.words] = Patch(color=found.shade, label=found.words)
         for curve in curves(branch["columns"], branch["special"]):
-            shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
+            color = motions.setdefault(curve.motion, curve.colour)
+            axes.plot(curve.loads, curve.real, "-", color=color, lw=1.8)
+            for what, part in curve.parts.items():
+                if not np.isnan(part).all():
+                    axes.plot(curve.loads, part, "".join(PARTS[what]), color=color, ms=4, lw=0.8, markevery=0.03)
+                    shown.add(what)
         shown |= _marked(axes, branch["special"])
+    looks: dict[str, dict[str, Any]] = {
+        **{what: {"color": "0.3", "marker": marker, "ls": line, "lw": 0.8} for what, (marker, line) in PARTS.items()},
+        **{kind: {"ls": "none", **marker} for kind, marker in SPECIAL.items()},
+    }
     lines = [Line2D([], [], color=color, lw=1.8, label=motion) for motion, color in motions.items()]
-    return [*lines, *(Line2D([], [], **ENTRIES[what]) for what in ENTRIES if what in shown), *ranges.values()]
-
-
-def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
-    """Draw one curve; returns which :data:`PARTS` it has."""
-    axes.plot(curve.loads, curve.real, "-", color=color, lw=1.8)
-    drawn = set()
-    for (what, part), (marker, style) in zip(curve.parts.items(), PARTS.values(), strict=True):
-        if not np.isnan(part).all():
-            axes.plot(curve.loads, part, marker + style, color=color, ms=4, lw=0.8, markevery=0.03)
-            drawn.add(what)
-    return drawn
+    others = [Line2D([], [], **{"label": what} | look) for what, look in looks.items() if what in shown]
+    return [*lines, *others, *ranges.values()]
 
 
 def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
@@ -121,25 +121,15 @@ def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
     return {special["kind"] for special in found}
 
 
-def _about(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:
-    """Discretisation, and the greatest bound of the errors of the special loads."""
-    text = mesh_in_words(diagram["discretization"])
-    found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
-    if found:
-        kinds = " and ".join(kind for kind in SPECIAL if any(s["kind"] == kind for s in found))
-        text += f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}"
-    return text
-
-
 # --- curves and ranges
 
 
 @dataclass(frozen=True)
 class FrequencyCurve:
-    """A curve of frequencies, named by its ``motion``.
+    """A curve of frequencies, named by its ``motion``: ``loads``, ``rows`` of the branch and ``roots``, all (n,).
 
-    ``loads``, ``rows`` of the branch and ``roots`` with non-negative real part have the shape (n,).
-    A conjugate pair is two curves, of which one has its roots left out of ``real`` and ``parts``.
+    Roots have a non-negative real part.  A conjugate pair is two curves, of which one has its roots left out of
+    ``real`` and ``parts``.
     """
 
     motion: str
@@ -160,13 +150,11 @@ class FrequencyCurve:
     @property
     def parts(self) -> dict[str, NDArray[np.float64]]:
         """Real and imaginary part of a complex pair, and growth rate of what has diverged, (n,), nan where none is."""
-        w = self.roots
-        straight, lower = abs(w.imag) <= REAL * abs(w), w.imag < -REAL * abs(w)
-        sideways = (w.real <= REAL * abs(w)) & ~straight
-        pair = ~straight & ~lower & ~sideways
-        values = (pair, w.real), (pair, w.imag), (sideways, abs(w.imag))
-        named = zip((PAIR, GROWTH, DIVERGED), values, strict=True)
-        return {what: np.where(chosen, part, np.nan) for what, (chosen, part) in named}
+        w, least = self.roots, REAL * abs(self.roots)
+        sideways = (w.real <= least) & (abs(w.imag) > least)
+        pair = (w.imag > least) & ~sideways
+        values = ((pair, w.real), (pair, w.imag), (sideways, abs(w.imag)))
+        return {what: np.where(there, part, np.nan) for what, (there, part) in zip(PARTS, values, strict=True)}
 
 
 class Range(NamedTuple):
@@ -184,15 +172,18 @@ def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()
     With its ``special`` points curves have points between rows where two frequencies meet.
     """
     found: dict[int, list[Member]] = {}
-    for row, (load, *modes) in enumerate(
-        zip(*(columns[name] for name in ("load", "omega2", "motion", "curve")), strict=True)
-    ):
+    rows = zip(*(columns[name] for name in ("load", "omega2", "motion", "curve")), strict=True)
+    for row, (load, *modes) in enumerate(rows):
         for pair, motion, number in zip(*modes, strict=True):
             mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
             found.setdefault(number, []).append((load, row, mu, motion))
     met = {p["row"]: float(p["omega2"]) for p in special if p["kind"] == FLUTTER and p.get("omega2") is not None}
-    each = (_curve(_with_roots(members, met)) for members in found.values())
-    return sorted(each, key=lambda curve: (curve.motion, abs(curve.roots[0])))
+    out = []
+    for each in found.values():
+        loads, places, values, motions = zip(*sorted(_with_roots(each, met), key=lambda x: x[0]), strict=True)
+        roots = np.sqrt(np.array(values, dtype=np.complex128))
+        out.append(FrequencyCurve(Counter(motions).most_common(1)[0][0], np.array(loads), np.array(places), roots))
+    return sorted(out, key=lambda curve: (curve.motion, abs(curve.roots[0])))
 
 
 def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Member]:
@@ -201,7 +192,7 @@ def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Mem
     for i, (load, row, mu, motion) in enumerate(members):
         mean = met.get(row, np.inf)
         if abs(mu - mean) <= LEAST * abs(mean) < np.inf:
-            out[out.index(members[i])] = (load, row, complex(mean), motion)
+            out[i] = (load, row, complex(mean), motion)
             sides = [*members[max(i - 1, 0) : i], *members[i + 1 : i + 2]]
             for other, near, value, _ in (side for side in sides if side[1] not in met):
                 drift = (value - mean).real if value.imag else 0.0  # of the mean of a complex pair
@@ -209,12 +200,6 @@ def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Mem
                 places = load + SHARES * (other - load), np.where(SHARES > 0.5, near, row), values
                 out += [(*place, motion) for place in zip(*places, strict=True)]
     return out
-
-
-def _curve(members: Sequence[Member]) -> FrequencyCurve:
-    loads, rows, values, motions = zip(*sorted(members, key=lambda member: member[0]), strict=True)
-    motion = Counter(motions).most_common(1)[0][0]
-    return FrequencyCurve(motion, np.array(loads), np.array(rows), np.sqrt(np.array(values, dtype=np.complex128)))
 
 
 def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:
@@ -231,15 +216,12 @@ def _unstable(interval: Interval) -> list[frozenset[str]]:
     """Kinds of instability in each step: of either end, as at critical loads eigenvalues are still real, or zero."""
     rows = interval.branch["columns"]["omega2"][interval.first : interval.last + 1]
     values = [[complex(*v) for v in row] for row in rows]
-    least = REAL * max(abs(v) for row in values for v in row)
-    return [a | b for a, b in pairwise(_kinds(row, least) for row in values)]
-
-
-def _kinds(values: Sequence[complex], least: float) -> frozenset[str]:
-    """Kinds of instability among eigenvalues, of which those below ``least`` are zero."""
-    flutter = any(abs(v.imag) > REAL * abs(v) for v in values)
-    divergence = any(v.real < -least and abs(v.imag) <= REAL * abs(v) for v in values)
-    return frozenset([FLUTTER] * flutter + [DIVERGENCE] * divergence)
+    least, kinds = REAL * max(abs(v) for row in values for v in row), []
+    for row in values:
+        flutter = any(abs(v.imag) > REAL * abs(v) for v in row)
+        divergence = any(v.real < -least and abs(v.imag) <= REAL * abs(v) for v in row)
+        kinds.append(frozenset([FLUTTER] * flutter + [DIVERGENCE] * divergence))
+    return [a | b for a, b in pairwise(kinds)]
 
 
 def top(branch: Mapping[str, Any], most: int) -> float:

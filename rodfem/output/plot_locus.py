@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,27 +15,24 @@ from numpy.typing import NDArray
 from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, KINDS, USER
 from rodfem.file_format import LOCUS
 from rodfem.output.style import FONT, HALO, PALETTE, STYLE, at_most, explain, mesh_in_words, named, save, sheet
-from rodfem.output.view import POINT
+from rodfem.tolerances import TINY
 
 Floats = NDArray[np.float64]
+Locus = Mapping[str, Any]
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
 """Colour and dashes by kind."""
+OPEN: dict[str, Any] = {"mfc": "white", "mec": "black", "mew": 1.4}
 POINTS: dict[str, dict[str, Any]] = {
     "start": {**USER.marker, "label": "start"},
-    "turns": {"marker": "|", "ms": 9.0, "mec": "black", "mew": 1.4, "label": "turning point"},
-    "cusp": {"marker": "^", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "cusp"},
-    "ends": {"marker": "o", "ms": 6.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "fold meets branch point"},
+    "turns": {**OPEN, "marker": "|", "ms": 9.0, "label": "turning point"},
+    "cusp": {**OPEN, "marker": "^", "ms": 7.5, "label": "cusp"},
+    "ends": {**OPEN, "marker": "o", "ms": 6.5, "label": "fold meets branch point"},
 }
 """Markers of rows by the first word of what happens there."""
 
-STABLE_SIDE = "#CDE9DF"
-"""Colour of the stable side of a curve."""
-AFTER, ASIDE = 0.3, 11.0
-"""Share of its rows after which the indices of a curve stand, and their distance from it in points."""
 
-
-def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
+def draw_locus(loci: Sequence[Locus], path: Path) -> Path:
     """Draw loci of one scene in the plane of its two parameters, one over the other.
 
     The first parameter, the load, is upwards.  Next to each curve stand the indices of the equilibria on its two sides
@@ -56,57 +52,51 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(loci[0]["title"], _about(loci))
         axes.margins(0.04, 0.12)
-        _draw_curves(axes, loci)
+        for one in loci:
+            _draw_curve(axes, one)
         for one in loci:
             if region := stable_region(one, loci):
-                axes.fill_between(*region, color=STABLE_SIDE, lw=0, zorder=-1, label=in_words(one))
+                axes.fill_between(*region, color="#CDE9DF", lw=0, zorder=-1, label=in_words(one))
         words, units = (loci[0].get(name, ("", "")) for name in ("words", "units"))
         load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
         axes.set_xlabel(other, fontsize=FONT + 1)
         axes.set_ylabel(load, fontsize=FONT + 1)
-        explain(axes, [*axes.get_lines(), *axes.collections, *_indices(loci)])
+        handles = [*axes.get_lines(), *axes.collections]
+        if any(pair[0] >= 0 for one in loci for pair in one["columns"]["index"]):
+            look = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
+            handles.append(Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **look))
+        explain(axes, handles)
         for one in loci:
             _write_indices(axes, one)
     return save(figure, path)
 
 
-def _draw_curves(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
-    """Draw the curves with the marks of their rows."""
-    for one in loci:
-        kind, columns = one["kind"], one["columns"]
-        x, y = (np.asarray(columns[name], dtype=float) for name in reversed(one["parameters"]))
-        colour, dashes = LINES[kind]
-        axes.plot(x, y, color=colour, linestyle=dashes, linewidth=2.2, label=kind)
-        for row, what in [(one["start"], "start"), *((m["row"], m["kind"]) for m in one["marks"])]:
-            style = POINTS.get("ends" if BRANCH_POINT in what else what.split()[0])
-            if style:
-                axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
+def _draw_curve(axes: Axes, one: Locus) -> None:
+    """Draw a curve with the marks of its rows."""
+    (x, y), (colour, dashes) = _curve(one), LINES[one["kind"]]
+    axes.plot(x, y, color=colour, linestyle=dashes, linewidth=2.2, label=one["kind"])
+    for row, what in [(one["start"], "start"), *((m["row"], m["kind"]) for m in one["marks"])]:
+        if look := POINTS.get("ends" if BRANCH_POINT in what else what.split()[0]):
+            axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **look)
 
 
-def _indices(loci: Sequence[Mapping[str, Any]]) -> list[Line2D]:
-    """Entry of the legend for the indices of the curves, if there are any."""
-    pairs = [pair for one in loci for pair in one["columns"]["index"] if pair[0] >= 0]
-    style = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
-    return [Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **style)] if pairs else []
-
-
-def _write_indices(axes: Axes, one: Mapping[str, Any]) -> None:
-    """Write the indices on both sides of a curve, away from its start."""
-    row = round(AFTER * (len(one["columns"]["index"]) - 1))
+def _write_indices(axes: Axes, one: Locus) -> None:
+    """Write the indices on both sides of a curve, away from its start: after three tenths of its rows."""
+    row = round(0.3 * (len(one["columns"]["index"]) - 1))
     low, high = one["columns"]["index"][row]
     if low < 0:
         return
-    rows = np.column_stack([one["columns"][name] for name in reversed(one["parameters"])])
+    rows = np.column_stack(_curve(one))
     places = axes.transData.transform(rows)
     tangent = places[min(row + 1, len(places) - 1)] - places[max(row - 1, 0)]
-    normal = np.array([-tangent[1], tangent[0]]) / max(np.hypot(*tangent), POINT)
-    away = ASIDE * np.array([1.5, 1.0]) * normal * (-1.0 if normal[1] < 0.0 else 1.0)
-    style = {"weight": "bold", "ha": "center", "va": "center", "zorder": 6, "path_effects": HALO}
+    normal = np.array([-tangent[1], tangent[0]]) / max(np.hypot(*tangent), TINY)
+    away = np.array([16.5, 11.0]) * normal * (-1.0 if normal[1] < 0.0 else 1.0)  # in points
+    look = {"weight": "bold", "ha": "center", "va": "center", "zorder": 6, "path_effects": HALO}
     colour = LINES[one["kind"]][0]
-    axes.annotate(f"{low}|{high}", tuple(rows[row]), away, textcoords="offset points", color=colour, **style)
+    axes.annotate(f"{low}|{high}", tuple(rows[row]), away, textcoords="offset points", color=colour, **look)
 
 
-def _about(loci: Sequence[Mapping[str, Any]]) -> str:
+def _about(loci: Sequence[Locus]) -> str:
     """Return the line that names the discretisation and the estimated error, and at how many points it was."""
     errors = [max(e) for one in loci for e in one["columns"]["error"] if e[0] is not None]
     text = mesh_in_words(loci[0]["discretization"])
@@ -131,7 +121,7 @@ class StableRegion(NamedTuple):
     end: Floats
 
 
-def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> StableRegion | None:
+def stable_region(one: Locus, loci: Sequence[Locus]) -> StableRegion | None:
     """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
 
     ``one`` is the file of the locus, whose stable side is that on which its index is zero, and ``loci`` are all of the
@@ -143,37 +133,28 @@ def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> 
     monotone = len(x) > 1 and abs(np.sign(np.diff(x)).sum()) == len(x) - 1
     if crossed or not side or not monotone or any(next(zip(*one["columns"]["index"], strict=True))):
         return None
-    order = np.argsort(x)
-    grid = np.linspace(x.min(), x.max(), 400)
+    order, grid = np.argsort(x), np.linspace(x.min(), x.max(), 400)
     edge = np.interp(grid, x[order], y[order])
     end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
-    others = (_levels(another, grid) for another in loci if another is not one)
-    for level in chain.from_iterable(others):
-        nearer = (side * (level - edge) > 0) & (side * (level - end) < 0)
-        end = np.where(nearer, level, end)
+    for a, b in (_curve(another) for another in loci if another is not one):
+        for i in np.flatnonzero(np.diff(a) != 0):  # segments of another locus
+            share = (grid - a[i]) / (a[i + 1] - a[i])
+            level = np.where((share >= 0) & (share <= 1), b[i] + share * (b[i + 1] - b[i]), np.nan)
+            end = np.where((side * (level - edge) > 0) & (side * (level - end) < 0), level, end)
     return StableRegion(grid, edge, end)
 
 
-def _levels(one: Mapping[str, Any], grid: Floats) -> list[Floats]:
-    """Loads (len(grid),) at which each segment of a locus has these values of the second parameter; nan where none."""
-    (x, y), found = _curve(one), []
-    for i in np.flatnonzero(np.diff(x) != 0):
-        share = (grid - x[i]) / (x[i + 1] - x[i])
-        found.append(np.where((share >= 0) & (share <= 1), y[i] + share * (y[i + 1] - y[i]), np.nan))
-    return found
-
-
-def _curve(one: Mapping[str, Any]) -> tuple[Floats, Floats]:
+def _curve(one: Locus) -> tuple[Floats, Floats]:
     """Second parameter and load of all rows of a locus."""
     x, y = (np.asarray(one["columns"][name], dtype=float) for name in reversed(one["parameters"]))
     return x, y
 
 
-def plane_of(one: Mapping[str, Any]) -> str:
+def plane_of(one: Locus) -> str:
     """Words after ``stable`` or ``index`` of a locus: of a rod that is kept in a plane it is that in the plane."""
     return " in its plane" if one.get("planar") else ""
 
 
-def in_words(one: Mapping[str, Any]) -> str:
+def in_words(one: Locus) -> str:
     """What the region of a locus is, for legends."""
     return f"stable{plane_of(one)}, as far as these curves tell"
