@@ -117,16 +117,6 @@ def test_ring(mesh: tuple[int, int]) -> None:
         check(s.point.load, sqrt(n * n - 1) / 1.5, s.error_estimate)
 
 
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("mesh", [(8, 2), (4, 4), (4, 6), (6, 6)])
-def test_deep_arch(mesh: tuple[int, int]) -> None:
-    """On few elements one degree more may lower an error by a third only, or turn its sign."""
-    (branch,) = explored(classics.deep_arch(), mesh)
-    fold = next(s for s in branch.special if s.kind == FOLD)
-    check(fold.point.load, DEEP, fold.error_estimate)
-
-
 @pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])
@@ -134,25 +124,6 @@ def test_deep_arch_to_an_accuracy(accuracy: float) -> None:
     (branch,) = explored(classics.deep_arch(), accuracy)
     fold = next(s for s in branch.special if s.kind == FOLD)
     assert abs(fold.point.load - DEEP) <= fold.error_estimate <= accuracy * DEEP
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_arithmetic_of_many_elements() -> None:
-    """Where the discretisation is exact the eigenvalue that vanishes has the round-off of a stiff matrix."""
-    for mesh in ((64, 4), (64, 6), (128, 4)):
-        (branch,) = explored(classics.elastica(3.0), mesh)
-        (s,) = [s for s in branch.special if s.kind == BRANCH_POINT]
-        assert abs(s.point.load - pi**2 / 4) <= s.located_to <= s.error_estimate < 1e-8
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_highest_degree() -> None:
-    """Of the highest degree there is none richer: halves of the elements do."""
-    (branch,) = explored(classics.elastica(3.0), (4, 12))
-    (s,) = [s for s in branch.special if s.kind == BRANCH_POINT]
-    assert abs(s.point.load - pi**2 / 4) <= s.error_estimate < 1e-10
 
 
 # --- meshes that do not resolve the rod -----------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from io import StringIO
 from itertools import combinations
 from math import pi
 
@@ -16,7 +15,6 @@ from rescaled import DNA, rescaled
 from shooting_solver import Problem, Rod
 
 from rodfem import pinned, trace
-from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
@@ -77,16 +75,6 @@ def test_cord() -> None:
         assert (end[10], 1 - end[9]) == pytest.approx((p.energy, p.ordinate), abs=1e-4)
     assert search.tries.count(NEW) == len(new)
     assert len(search.tries) == 24
-
-
-@pytest.mark.alone
-def test_cord_beyond_what_was_explored() -> None:
-    """With all explored states given, only others are found: they are on branches that exploring did not reach."""
-    found = cord()
-    known = equilibria_at(found.follower, found.branches, 40.0)
-    for p in Deflation(found.follower, 40.0, known).run(12):
-        assert min(abs(p.energy - k.energy) for k in known) > 1e-3
-        assert (p.load, p.error < 1e-9) == (40.0, True)
 
 
 @pytest.mark.long
@@ -158,24 +146,6 @@ def test_ruler() -> None:
     assert up.points[-1].ordinate == pytest.approx(found["branch 1"].points[-1].ordinate, abs=1e-9)
     assert down.ended.startswith("meets another branch")
     assert down.points[-1].load == pytest.approx(4.42594840243, abs=1e-9)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_nothing_to_find() -> None:
-    """Under a small load there is one equilibrium: it is found, nothing else is, and the report says so."""
-    follower = Solver(scene("ruler", direction="e2"), Discretization()).equilibria
-    out = StringIO()
-    (only_one,) = Deflation(follower, 0.2).run(1)
-    search = Deflation(follower, 0.2, [only_one])
-    assert search.run(10) == []
-    assert len(search.tries) == 10
-    assert search.tries.count(NEW) == 0
-    report = Report(follower.system.comm, stream=out)
-    report.say(str(search))
-    if follower.system.comm.rank == 0:
-        assert "10 tries: 0 new" in out.getvalue()
-        assert "no proof" in out.getvalue()
 
 
 @pytest.mark.few(1)

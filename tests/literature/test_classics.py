@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from math import cos, pi, sin, sqrt, tan
 from typing import Any
 
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 from classics import FORMULATIONS, column, explore, sweep
 from numpy.polynomial import Legendre, Polynomial
-from scipy.integrate import quad
 from scipy.linalg import eigvals, expm
 from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk, jv
@@ -218,22 +216,6 @@ def test_helix_of_any_pitch(formulation: str) -> None:
 
 
 @pytest.mark.long
-def test_helix_as_the_degree_grows() -> None:
-    """Its error falls to round-off."""
-    errors, t = [], 2.0
-    for degree in (2, 4, 6, 8, 10):
-        solver = Solver(classics.helix(3.0), Discretization("reduced", 6, degree)).equilibria
-        x = solver.start(0.0)
-        for load in (0.0, 0.5, 1.0, 1.5, t):
-            x, outcome = solver.at_load(x, load)
-            assert outcome.converged
-        state = solver.shape.sample(x)
-        errors.append(abs(state["q"] - helix(state["s"], 3.0, t)).max())
-    assert errors[-1] < 1e-13
-    assert all(b < a / 50 or b < 1e-13 for a, b in pairwise(errors))
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_extension_of_a_helical_spring(formulation: str) -> None:
     """A helix under every force along its axis, of curvature and torsion that its two equilibrium equations give."""
@@ -321,23 +303,6 @@ def test_planar_column(formulation: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("kind", ["moment", "follower_moment"])
-def test_rolled_up(kind: str, formulation: str) -> None:
-    """Bending stiffness 2: an arc of angle P/2, four turns of it at most; by a potential, and stable."""
-    found = explore(classics.rolled(kind), formulation, stops=(3.0,))
-    (branch,) = found.branches
-    assert {(p.negative, p.negative_in_space) for p in branch.points} == {(0, None)}
-    assert branch.points[-1].load == pytest.approx(8 * pi)
-    for load, angle in ((3.0, 1.5), (None, 4 * pi)):
-        sample = found.sample(load=load)
-        s = sample["s"]
-        assert sample["angle"][:, 0] == pytest.approx(angle * s, abs=1e-11)
-        arc = np.stack([1 - np.cos(angle * s), 0 * s, np.sin(angle * s)], axis=1) / angle
-        assert sample["r"] == pytest.approx(arc, abs=1e-7)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("planar", ["e2", None])
 def test_hanging_cable(planar: str | None) -> None:
     """Straight and too long at first, it finds down; but for what its stiffness does it is a catenary."""
@@ -352,36 +317,6 @@ def test_hanging_cable(planar: str | None) -> None:
 
 
 # --- a material that loses its convexity ----------------------------------------------------------------------------
-
-
-@pytest.mark.long
-@pytest.mark.short
-def test_loss_of_convexity() -> None:
-    """``W = k^2/2 - k^4/4`` is convex to ``k^2 = 1/3``, which the clamped end reaches first: by quadrature.
-
-    The curvature has a vertical tangent there, so that the error of a uniform mesh falls like h only.
-    """
-    largest = 1 / 12  # of k W' - W, which is P (sin(angle of the tip) - sin(angle))
-
-    def length(P: float) -> float:
-        tip = np.arcsin(largest / P)
-
-        def slope(x: float) -> float:  # angle = tip (1 - x^2): the curvature vanishes at the tip as x does
-            h = 12 * P * (np.sin(tip) - np.sin(tip * (1 - x * x)))
-            return 2 * tip * x / sqrt(h / 3 / (1 + sqrt(max(1 - h, 0.0))))
-
-        return quad(slope, 1e-9, 1.0, epsabs=1e-12)[0]
-
-    P = root(lambda P: length(P) - 1, largest + 1e-6, 1.0)
-    late = []
-    for elements in (8, 16):
-        (branch,) = explore(classics.softening(), elements=elements).branches
-        beyond = float(branch.ended.rpartition(" ")[2])
-        assert branch.ended == f"the stored energy is not convex any more at P = {beyond:g}"
-        assert 0.98 * P < branch.points[-1].load < beyond
-        assert {p.negative for p in branch.points} == {0}
-        late.append(beyond / P - 1)
-    assert late[1] < 0.6 * late[0] < 0.6 * 0.005
 
 
 # --- loads without a potential --------------------------------------------------------------------------------------

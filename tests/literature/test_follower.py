@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
 import runpy
-import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -51,16 +48,6 @@ def swept(span: tuple[float, float], rotary_inertia: tuple[float, float, float] 
 def test_where_eigenvalues_meet() -> None:
     assert double(20.0, 120.0) == pytest.approx([20.0509536189738, 121.342510140494], rel=1e-9)
     assert double(20.0, 120.0, J=1e-3)[0] == pytest.approx(19.8391305740585, rel=1e-9)
-
-
-@pytest.mark.long
-def test_two_flutters_in_a_coarse_sweep() -> None:
-    """A step of two in the load, within which an eigenvalue of the strong plane passes by the pair that meets."""
-    found = specials(swept((0.0, 200.0)), "flutter")
-    assert len(found) == 2
-    for s, expected in zip(found, (double(20.0, 120.0), double(128.0, 1370.0)), strict=True):
-        assert abs(s.point.load - expected[0]) <= s.error_estimate <= 3e-5
-    assert found[0].error_estimate < 1e-9
 
 
 @pytest.mark.long
@@ -115,16 +102,6 @@ def test_two_planes(P: float) -> None:
             assert column(expected, P) == pytest.approx(expected, rel=1e-11)
 
 
-@pytest.mark.few(1)
-@pytest.mark.short
-@pytest.mark.parametrize(("P", "near"), [(40.0, 10 - 11j), (100.0, 9.4 - 35j)])
-def test_past_flutter(P: float, near: complex) -> None:
-    expected = column(near**2, P)
-    assert abs(expected.imag) > 100
-    for values in (vibration(P).near(8, expected.real).values, vibration(P).spectrum.values):
-        assert max(abs(values - v).min() for v in (expected, expected.conjugate())) < 1e-8 * abs(expected)
-
-
 def test_mass_and_inertia() -> None:
     heavy = vibration(10.0, mass=2.0).near(2, 10.0).values
     assert abs(heavy - 26.7885149853 / 2).min() < 1e-9
@@ -157,37 +134,6 @@ def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: f
         for mu in values[:2]:
             exact = [column(mu, P), column(mu, P, EI=10)]
             assert np.nanmin([abs(mu - e) for e in exact]) < (1e-6 if elements * degree > 8 else 0.1) * abs(mu)
-
-
-@pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts a process of its own")
-def test_complex_petsc(tmp_path: Path) -> None:
-    """With the complex build, where it is installed beside the real one, the demo gives the same numbers."""
-    builds = [sorted(Path("/usr/lib").glob(f"{x}dir/{x}*/*-complex")) for x in ("petsc", "slepc")]
-    if not all(builds) or not _complex_works(builds):
-        pytest.skip("no complex build of dolfinx, petsc4py and slepc4py")
-    environment = os.environ | {"PETSC_DIR": str(builds[0][-1]), "SLEPC_DIR": str(builds[1][-1])}
-    command = [sys.executable, str(DEMO), "--no-figures", "--output", str(tmp_path)]
-    subprocess.run(command, env=environment, check=True, timeout=300, capture_output=True)
-    branch = json.loads((tmp_path / "diagram.json").read_text())["branches"][0]
-    (flutter,) = [s for s in branch["special"] if s["kind"] == "flutter"]
-    assert flutter["load"] == pytest.approx(20.0509536189738, abs=1e-9)
-    (p,) = [p for p in swept((0.0, 25.0)).points if p.load == 25.0]
-    np.testing.assert_allclose(branch["columns"]["omega2"][-1], p.omega2, rtol=1e-9, atol=1e-6)
-    hemitropic = [sys.executable, str(DEMO.with_name("hemitropic.py")), "--output", str(tmp_path)]
-    refused = subprocess.run(hemitropic, env=environment, timeout=300, capture_output=True, text=True)
-    assert refused.returncode == 2
-    assert refused.stderr.startswith("error: This PETSc was built for complex numbers")
-
-
-def _complex_works(builds: list[list[Path]]) -> bool:
-    environment = os.environ | {"PETSC_DIR": str(builds[0][-1]), "SLEPC_DIR": str(builds[1][-1])}
-    check = "from petsc4py import PETSc; import dolfinx, slepc4py.SLEPc; assert PETSc.ScalarType(1j)"
-    return subprocess.run([sys.executable, "-c", check], env=environment, capture_output=True).returncode == 0
-
-
-@pytest.mark.short
-def test_asymmetry_has_low_rank() -> None:
-    assert [vibration(P).asymmetry()[0] for P in (0.0, 10.0, 40.0)] == [0, 4, 4]
 
 
 def test_reduced_formulation_is_refused(

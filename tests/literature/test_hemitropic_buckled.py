@@ -26,7 +26,7 @@ from rodfem.problem.scene import Ordinate, Scene
 pytestmark = pytest.mark.alone
 
 AT = (0.2, 0.325, 0.5, 0.7, 0.9)
-RICH, PLAIN = (16, 8), (8, 6)
+RICH = (16, 8)
 
 
 def branches(
@@ -141,77 +141,6 @@ def test_states_have_the_flip_symmetry_of_the_paper() -> None:
             F = 2 * np.outer(axis, axis) - np.eye(3)
             np.testing.assert_allclose(r[::-1], r @ F, atol=1e-9)
             np.testing.assert_allclose(R[::-1], F @ R @ F, atol=1e-9)
-
-
-def test_coupling_tells_folds_from_branch_points() -> None:
-    both = [
-        s for constants in (DEFAULT, (0.0, 1.0, 1.0, 3.0)) for b in branches(constants=constants) for s in b.special
-    ]
-    assert min(s.coupling for s in both if s.kind == "fold") > 1e-2
-    assert max(s.coupling for s in both if s.kind == "branch point") < 1e-8
-
-
-def errors(found: list[Branch]) -> list[tuple[str, float, float]]:
-    """Name, true error and estimate of all that is known of the special points of the default rod."""
-    first, second = from_point(found, "straight", 0), from_point(found, "straight", 1)
-    out = []
-    for load, (ordinate, _) in reference_values.FIRST.items():
-        (s,) = [s for s in first.special if s.point.load == load]
-        out.append((f"first branch at {load}", abs(s.point.ordinate - ordinate), s.error_estimate))
-    (fold,) = specials(second, "fold")
-    out.append(("load of fold", abs(fold.point.load - reference_values.FOLD[0]), fold.error_estimate))
-    out.append(("ordinate of fold", abs(fold.point.ordinate - reference_values.FOLD[1]), fold.ordinate_error))
-    for load, ordinates in reference_values.AROUND_FOLD.items():
-        near = [s for s in second.special if s.kind == "user" and s.point.load == load]
-        if fold.point.load < load:  # on the coarsest mesh the fold is beyond this load
-            for s, ordinate in zip(near, ordinates, strict=True):
-                out.append((f"second branch at {load}", abs(s.point.ordinate - ordinate), s.error_estimate))
-    end = second.special[-1]
-    out.append(("load of zero stretch", abs(end.point.load - reference_values.ZERO_STRETCH[0]), end.error_estimate))
-    out.append(
-        ("ordinate of zero stretch", abs(end.point.ordinate - reference_values.ZERO_STRETCH[1]), end.ordinate_error)
-    )
-    for s, load in zip(specials(found[0], "branch point"), [0.114304214520030, 0.332039079723330], strict=True):
-        out.append(("buckling load", abs(s.point.load - load), s.error_estimate))
-    return out
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("formulation", "elements", "degree"),
-    [
-        ("reduced", 24, 1),
-        pytest.param("reduced", 16, 2, marks=pytest.mark.long),
-        ("pointwise", 12, 2),
-        pytest.param("reduced", 8, 4, marks=pytest.mark.long),
-        ("reduced", 8, 6),
-    ],
-)
-def test_error_estimates_bound_the_error(formulation: str, elements: int, degree: int) -> None:
-    for name, true, estimate in errors(branches(formulation, elements, degree)):
-        assert true <= estimate, name
-        most = 30 if "stretch" in name else 3  # no scaremongering either
-        assert estimate <= most * true + 2e-11, name
-
-
-@pytest.mark.long
-def test_formulations_agree_within_their_estimates() -> None:
-    both = [branches(formulation, *PLAIN) for formulation in ("reduced", "pointwise")]
-    for a, b in zip(*both, strict=True):
-        assert (a.name, a.ended) == (b.name, b.ended)
-        for s, t in zip(a.special, b.special, strict=True):
-            assert s.kind == t.kind
-            assert abs(s.point.load - t.point.load) <= s.error_estimate + t.error_estimate
-            assert abs(s.point.ordinate - t.point.ordinate) <= s.ordinate_error + t.ordinate_error
-            assert (s.negative_before, s.negative_after, s.multiplicity) == (
-                t.negative_before,
-                t.negative_after,
-                t.multiplicity,
-            )
-    assert sum(len(b.special) for b in both[0]) > 15
-    np.testing.assert_allclose(
-        [b.points[-1].energy for b in both[0]], [b.points[-1].energy for b in both[1]], rtol=1e-9
-    )
 
 
 @pytest.mark.long

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import pi, sqrt
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -185,17 +184,3 @@ def test_sides_that_differ_across_the_plane() -> None:
     ends_at = {np.sign(b.points[-1].ordinate): b.points[-1] for b in diagram.branches[1:]}
     assert {side: (p.negative, p.negative_in_space) for side, p in ends_at.items()} == {1.0: (0, 0), -1.0: (0, 1)}
     assert ends_at[1.0].ordinate == pytest.approx(-ends_at[-1.0].ordinate, rel=1e-6)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("planar", [None, "e2"])
-def test_states_beside_a_pitchfork(planar: str | None, folder: Path) -> None:
-    """At loads just above the critical one the straight state and the bent one, ``x = sqrt(8 (P - pi^2)) / pi^2``."""
-    energy = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
-    diagram = traced((9.0, 10.5), energy, {}, planar=planar)
-    for known in (diagram, rodfem.load(diagram.save(folder), diagram.scene)):
-        for above in (1e-7, 1e-5, 1e-3):
-            straight, bent = known.at(pi**2 * (1 + above))
-            assert (straight.negative, bent.negative) == (1, 0)
-            assert abs(straight.ordinate) < 1e-9
-            assert abs(bent.ordinate) == pytest.approx(sqrt(8 * above) / pi, rel=1e-5 + 2 * above)
