@@ -260,12 +260,6 @@ def chain(planar: str | None) -> Scene:
     )  # fmt: skip
 
 
-def softening() -> Scene:
-    """A cantilever whose moment 1 k - k^3 has a largest value."""
-    return column(
-        "softening", (clamped(), free(lambda c: (0.0, c.P, 0.0))), (0.0, 3.0), planar="e1",
-        energy=lambda v, k, c: bending_and_twist(k, (c.B1, c.B2, c.C)) - 0.25 * k[0] ** 4,
-    )  # fmt: skip
 
 
 # --- torques --------------------------------------------------------------------------------------------------------
