@@ -104,7 +104,7 @@ TABLE = {
         "loci-count-what-is-nearest": (
             "[: len(own) - size]",
             "[: len(own) - size]\n    chosen = np.intersect1d(chosen, np.argsort(abs(spectrum.values))[:10])",
-            "diagram/test_slow_and_far_frequencies.py"),
+            "diagram/test_light_and_slow_rods.py"),
         "locus-of-a-mean-with-the-bar-of-one": ("split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI),
         "flutter-locus-of-a-mean-with-the-bar-of-one": ("+ SPLIT * here.split", "+ 0.0 * here.split", LOCI),
         "flutter-locus-of-a-mean": ("if here.split > FEWER", "if False and here", LOCI),
@@ -118,7 +118,7 @@ TABLE = {
         "places-of-one-mesh": (
             "there, located_to = sought.p, sought.dp", "there, located_to = node.p, sought.dp",
             "codim2/test_places.py"),
-        "loci-have-bars-at-kinks": ("                error[row] = np.nan\n", "", "diagram/test_sharp_in_state.py"),
+        "loci-have-bars-at-kinks": ("                error[row] = np.nan\n", "", "diagram/test_kinks.py"),
         "locus-across-a-gap": ("if node.orientation != last.orientation and not", "if False and not", LOCI),
         "stable-in-a-plane-is-stable": ("planar=bool(scene.planar)", "planar=False", IN_WORDS),
         "loci-of-unresolved-points-are-resolved": (
@@ -291,10 +291,10 @@ TABLE = {
         "two-that-cross-may-meet": (
             "(products[:, i, j].real < -rounded) | ", "np.ones_like(D[:2], bool) | ",
             "diagram/test_all_frequencies.py"),
-        "divergence-numbered-across-collisions": ("if (passed and negative) or", "if", "literature/test_rods.py"),
+        "divergence-numbered-across-collisions": ("if passed and not negative:", "if passed:", "literature/test_rods.py"),
         "divergence-of-rigid-motions": ("[self._still :]", "[0:]", "literature/test_free_rods.py"),
         "steps-are-not-parted": ("if self._parted == PARTS or", "if True or", "diagram/test_close_critical_loads.py"),
-        "a-pole-is-a-divergence": ("        if pole:", "        if False:", "diagram/test_light_rods.py"),
+        "a-pole-is-a-divergence": ("        if pole:", "        if False:", "diagram/test_light_and_slow_rods.py"),
     },
     "rodfem/diagram/diagram.py": {
         "special-at": (
@@ -312,7 +312,7 @@ TABLE = {
     },
     "rodfem/diagram/equilibria.py": {
         "sweeps-leave-their-path": ("(off > np.maximum(ASTRAY * step, FLOOR)).any()", "False", HARD),
-        "sweeps-go-in-one-step": ("for parts in (1, 2, 4, 8)", "for parts in (1,)", "diagram/test_held.py"),
+        "sweeps-go-in-one-step": ("for parts in (1, 2, 4, 8)", "for parts in (1,)", "diagram/test_load_steps.py"),
     },
     "rodfem/diagram/equivalence.py": {
         "zeros-of-a-mesh-make-two-branches-of-an-oval": (
@@ -330,7 +330,7 @@ TABLE = {
     "rodfem/diagram/explorer.py": {
         "names-twice": (
             '(name := f"{before}{number}{after}") in names', '(name := f"{before}{number}{after}") in ()',
-            "diagram/test_first_name.py"),
+            "diagram/test_first_state.py"),
         "mirror-images-by-what-richer-meshes-decide": (
             "firsts.append(replace(first))", "firsts.append(first)", "continuation/test_degenerate_pitchforks.py"),
         "detached-through-nothing": ("and point.stretch > 0 and not", "and not", "hard/test_fuzz.py"),
@@ -354,7 +354,7 @@ TABLE = {
         "what-turns-back-near-zero-is-passed": (
             "            self._missed(piece, p, resolved=True)", "            pass", "continuation/test_unfolding.py"),
         "steps-are-short-from-where-a-branch-goes-back-to": (
-            "max(largest, since - s)", "largest", "diagram/test_many_returns.py"),
+            "max(largest, since - s)", "largest", "diagram/test_branches.py"),
     },
     "rodfem/diagram/sweep.py": {
         "bars-of-loads-by-those-of-ordinates": (
@@ -433,7 +433,7 @@ TABLE = {
             "if (!(newton->size > in_metric)) newton->size", "newton->size", "continuation/test_compiled_newton.py"),
         "round-off-of-forces": (
             "double moved = step[i] / rod->sizes[i], value = x[i] / rod->sizes[i];",
-            "double moved = step[i], value = x[i];", "diagram/test_stiff_units.py"),
+            "double moved = step[i], value = x[i];", "diagram/test_first_state.py"),
     },
     "rodfem/fem/newton.py": {
         "ways-down-that-go-uphill": (
@@ -483,7 +483,7 @@ TABLE = {
             "others[:] = [found.values[np.argmin(abs(found.values - v))] for v in values]", "modes/test_modes.py"),
         "modes-have-bars-at-kinks": (
             "        if self.error_bars and not note:", "        if self.error_bars:",
-            "diagram/test_sharp_in_state.py"),
+            "diagram/test_kinks.py"),
         "double-eigenvalue-of-flutter-twice": (
             "for i in _upper(values) if i not in left_out]", "for i in _upper(values)]", RECORDED),
         "recorded-modes-without-those-of-special-points": (
@@ -626,7 +626,7 @@ TABLE = {
         "slow-frequencies-are-round-off": (
             "slow = np.flatnonzero(abs(values) < SLOW * one)", "slow = np.flatnonzero(abs(values) < 0.0)", HARD),
         "rods-that-soften-are-not-slow": (
-            "not (self.solver.slow or several)", "not self.solver.slow", "diagram/test_slow_and_far_frequencies.py"),
+            "not (self.solver.slow or several)", "not self.solver.slow", "diagram/test_light_and_slow_rods.py"),
         "modes-without-their-parts-along-free-motions": (
             "            force.array[drifts] = 0.0\n", "", "literature/test_free_rods.py"),
         "left-vectors-have-free-motions": ("if free and not left:", "if free:", "literature/test_free_rods.py"),
@@ -638,7 +638,7 @@ TABLE = {
         "symmetric-pencils-without-natural-units": (
             "    if units.ordinary:\n        return matrix, mass\n", "    if True:\n        return matrix, mass\n",
             "stability/test_eigenvalues_in_si_units.py"),
-        "masses-at-nine-loads": ("raise ConvergenceError(trouble)", "pass", "diagram/test_inertia_of_a_load.py"),
+        "masses-at-nine-loads": ("raise ConvergenceError(trouble)", "pass", "diagram/test_family_of_states.py"),
         "a-hinge-without-mass-in-small-units": (
             "        scaled.diagonalScale(system.sizes, system.sizes)", "        pass",
             "stability/test_eigenvalues_in_si_units.py"),

@@ -92,12 +92,13 @@ def _shares(mine: Spectrum, others: Spectrum) -> np.ndarray:
     return shares
 
 
-def others_negative(mine: Spectrum, others: Spectrum) -> bool:
-    """Whether the negative eigenvalues of two states, as many, are others, by their vectors."""
-    if not len(mine.negative):
-        return False
-    basis = others.pairs.right[:, others.negative].real
-    return bool(inside(basis, others.coordinates(mine)[:, mine.negative].real).min() < 1.0 - OUTSIDE)
+def same_negative(a: Spectrum, b: Spectrum) -> bool:
+    """Whether the negative eigenvalues of two states, as many, are the same ones, by values or by vectors."""
+    before, after = (np.sort(found.values[found.negative].real) for found in (a, b))
+    if np.allclose(after, before, rtol=1e-3, atol=0.0):
+        return True
+    basis = b.pairs.right[:, b.negative].real
+    return bool(inside(basis, b.coordinates(a)[:, a.negative].real).min() >= 1.0 - OUTSIDE)
 
 
 def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:

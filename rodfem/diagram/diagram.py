@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from html import escape
 from itertools import chain
 from numbers import Integral
+from operator import attrgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -139,7 +140,7 @@ class Diagram:
         if kind is None:
             return [s for s in every if not s.kind.given]
         found = [s for s in every if kind in s.names]
-        known = [*KINDS, *LAWS, *sorted({event.name for event in self.plan.events})]
+        known = [*KINDS, *LAWS, *map(attrgetter("name"), self.plan.events)]
         if not found and kind not in known:
             raise InputError(f"There is no kind {kind!r}: choose one of {', '.join(known)}.")
         return found
@@ -489,11 +490,7 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
                 check_start(found, plan.over(scene))
         asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
         recorder.system(found.system, plan.accuracy)
-        if doubt := round_off_of_strains(scene):
-            recorder.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
-            plan = replace(plan, error_bars=False)  # two meshes have that round-off alike: no bar would hold it
-        elif plan.error_bars and (doubt := found.system.equations.known.rough()):
-            recorder.warn(doubt)
+        plan = _with_bars(plan, found, recorder)
         if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
@@ -513,6 +510,16 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
                 trouble.add_note("The branches traced before are in the attribute `diagram` of this error.")
             raise
     return diagram
+
+
+def _with_bars(plan: Plan, solver: BranchSolver, observer: Observer) -> Plan:
+    """The plan, without error bars where round-off of strains, which two meshes have alike, is in none of them."""
+    if doubt := round_off_of_strains(solver.system.scene):
+        observer.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
+        return replace(plan, error_bars=False)
+    if plan.error_bars and (doubt := solver.system.equations.known.rough()):
+        observer.warn(doubt)
+    return plan
 
 
 def _mesh(

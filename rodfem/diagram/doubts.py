@@ -46,7 +46,7 @@ class PersistentZeros:
         """
         extra = self.extra(solver, point)
         recent = [p for p in history[-ROWS:] if p.arclength > 0.0]  # a branch point has zeros of its own
-        if extra <= 0 or not recent or any(p.zero != point.zero for p in recent):
+        if extra <= 0 or {p.zero for p in recent} != {point.zero}:
             solver.damp(0)
             return
         if not solver.system.damping:
@@ -94,14 +94,22 @@ class Quadrature:
 
         Of a state that the mesh does not resolve its bar says so.
         """
-        first = branch.points[:1] if branch.parent is None else []
+        first = branch.points[: branch.parent is None]
         asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
-        found = [(point, self._on(point.mesh)(point.x)) for point in first]
-        found += [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
+        found = self._reasons(first, asked)
         self._kinks(branch, [*first, *(special.point for special in asked)])
+        self._say(branch, [(point, words) for point, words in found if words and not point.kink])
         none = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
-        undefined = [(point, none) for point in branch.points if not isfinite(point.ordinate)]
-        for point, words in [each for each in found if each[1] and not each[0].kink][:1] + undefined[:1]:
+        self._say(branch, [(point, none) for point in branch.points if not isfinite(point.ordinate)])
+
+    def _reasons(self, first: Sequence[Point], asked: Sequence[SpecialPoint]) -> list[tuple[Point, str]]:
+        """Why the equations are not integrated at the points of a branch; empty where they are."""
+        found = [(point, self._on(point.mesh)(point.x)) for point in first]
+        return found + [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
+
+    def _say(self, branch: Branch, found: Sequence[tuple[Point, str]]) -> None:
+        """Say the first thing that was found."""
+        for point, words in found[:1]:
             self.observer.warn(Remark(f"{branch.name}: at {self.load} = {point.load:.6g} {words}", point.load))
 
     def _without_bars(self, special: SpecialPoint) -> str:

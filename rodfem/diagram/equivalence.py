@@ -154,14 +154,18 @@ def loop_end(branch: Branch, step: Step, width: float, here: Callable[[Point], P
         passed = solver.system.distance(b.x, here(branch.points[0]).x) < b.arclength - a.arclength
         return b if passed else None
     first = branch.points[0 if branch.parent is None else 1]
-    passes = min(a.load, b.load) <= first.load <= max(a.load, b.load) and a.load != b.load and a.slope * first.slope > 0
-    if not (passes and near(first, a, solver.units, 4)):
+    if not (_passes(a, b, first) and near(first, a, solver.units, 4)):
         return None
     try:
         point = Arc(solver, a, b).at_load(first.load)
     except ConvergenceError:  # near a fold, say: not there
         return None
     return point if alike(point, first, SAME_STATE) else None
+
+
+def _passes(a: Point, b: Point, first: Point) -> bool:
+    """Whether the load passes that of the ``first`` point between two others, and in the same direction."""
+    return min(a.load, b.load) <= first.load <= max(a.load, b.load) and a.load != b.load and a.slope * first.slope > 0
 
 
 def connection(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:

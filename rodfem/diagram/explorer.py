@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.mesh_sequence import Gap, arms
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.observer import Remark
@@ -254,14 +254,19 @@ class Explorer(Tracer):
         with self.solver.system.clock.scope("location"):
             for way in lines(self.solver, special, ways):
                 form = normal_form_of(self.solver, origin_of(self.solver, special), way)
-                if form is not None:
-                    form.classify(*self._indices(special))
-                found.append(("" if form is None else form.kind, way))
+                found.append((self._kind(form, special), way))
         found.sort(key=lambda each: not each[0].startswith("subcritical"))
         several = dict.fromkeys(kind for kind, _ in found if kind)
         if len(several) > 1:
             special.note = f"branches of several forms leave here: {', '.join(several)}"
         return [way for _, way in found]
+
+    def _kind(self, form: NormalForm | None, special: SpecialPoint) -> str:
+        """Kind of the form of a branch that leaves a special point; empty where it is not known."""
+        if form is None:
+            return ""
+        form.classify(*self._indices(special))
+        return form.kind
 
     @staticmethod
     def _indices(special: SpecialPoint) -> tuple[int, int]:

@@ -163,10 +163,13 @@ class Plan:
         for argument, what in COUNTS.items():
             if (value := getattr(self, argument.name)) < 0:
                 raise InputError(f"{value} is not a {what}", Remedy("give 0 or more in {}", argument))
-        if not self.at and self.tries:
-            raise InputError("A search needs loads to search at", GIVE_LOADS)
-        if not self.at and (self.modes or self.method):
-            raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
+        for asked, words in (
+            (self.tries, "A search needs loads to search at"),
+            (self.modes, "Modes need loads to judge at"),
+            (self.method, "A method needs loads to judge at"),
+        ):
+            if asked and not self.at:
+                raise InputError(words, GIVE_LOADS)
         if self.modes and self.method in METHODS and not find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from math import inf
 
 import numpy as np
@@ -201,29 +202,37 @@ class SpecialSearch:
         q = q if q.kept.reduced.zero <= piece.still or not ended else piece.solve(p, q, q.s - off) or q
         out, pieces = self._turning(piece, p, q, ended=ended)
         zeros, size = Zeros(piece.solve, piece.solver.inertia.tolerance), self._fourth(piece, p, q)
-        for crossing in (each for ends in pieces for each in zeros.between(*ends, size)):
+        for crossing in chain.from_iterable(zeros.between(*ends, size) for ends in pieces):
             turns = piece.turn(*crossing.piece) is not None
             special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
             if special is not None:
                 out.append(special)
-                continue
-            if not ended:
-                self._shorten(a, b)
-            self.observer.warn(Remark(missing(a.load, b.load), a.load, b.load))
+            else:
+                self._missing(a, b, ended=ended)
         for node in zeros.misses:
             self._missed(piece, node, resolved=ended)
-        nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
-        if not out and self._nearest > nearest < ahead and nearest < DIP * piece.solver.inertia.scale:
-            self._missed(piece, p, resolved=True)
-        self._nearest = -inf if out else nearest
+        self._dip(piece, p, q, found=bool(out))
         return sorted(out, key=lambda special: special.point.arclength)
+
+    def _missing(self, a: Point, b: Point, *, ended: bool) -> None:
+        """Ask for shorter steps where a crossing has no singular state, or say so."""
+        if not ended:
+            self._shorten(a, b)
+        self.observer.warn(Remark(missing(a.load, b.load), a.load, b.load))
+
+    def _dip(self, piece: Piece, p: Node, q: Node, *, found: bool) -> None:
+        """Look for a branch point taken apart where the eigenvalue nearest zero is least at a row."""
+        nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
+        if not found and self._nearest > nearest < ahead and nearest < DIP * piece.solver.inertia.scale:
+            self._missed(piece, p, resolved=True)
+        self._nearest = -inf if found else nearest
 
     def _turning(
         self, piece: Piece, p: Node, q: Node, *, ended: bool
     ) -> tuple[list[SpecialPoint], list[tuple[Node, Node]]]:
         """The branch point at which the load turns back, if there is one, and the pieces on both sides of it."""
         turn = piece.turn(p, q)
-        touch = None if turn is None else self._touching(piece, p, q, turn, ended=ended)
+        touch = None if turn is None else self._touching(piece, (p, q), turn, ended=ended)
         if touch is None:
             return [], [(p, q)]
         s, off = piece.place(touch.point.x), ASIDE * (q.s - p.s)
@@ -239,9 +248,10 @@ class SpecialSearch:
         before = piece.node(row.x, row.tangent, self._reduced(row))
         return fourth(before, p, q) if before.s < p.s else None
 
-    def _touching(self, piece: Piece, p: Node, q: Node, s: float, *, ended: bool) -> SpecialPoint | None:
+    def _touching(self, piece: Piece, ends: tuple[Node, Node], s: float, *, ended: bool) -> SpecialPoint | None:
         """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""
-        solver, off = piece.solver, ASIDE * (q.s - p.s)
+        (p, q), solver = ends, piece.solver
+        off = ASIDE * (q.s - p.s)
         left, right = piece.solve(p, q, max(s - off, (p.s + s) / 2)), piece.solve(p, q, min(s + off, (s + q.s) / 2))
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
@@ -265,20 +275,21 @@ class SpecialSearch:
         Whether the load ``turns`` back in its piece tells the fold of this branch from that of another one.
         Raises :class:`Gap` for an imperfection that is not known, unless the branch has ``ended``.
         """
-        solver, clearly = piece.solver, is_fold(piece.solver, at.x, at.null)
-        if clearly and turns and (found := solved(solver, at, fold=True)) is not None:
+        clearly = is_fold(piece.solver, at.x, at.null)
+        tried = dict[bool, SingularState | None]()
+        for fold in {True: (turns, not turns), False: (False,)}[clearly]:
+            found = tried[fold] = solved(piece.solver, at, fold=fold)
+            if found is not None and (fold or found.size <= found.noise):
+                return special_point(piece, at, found, fold=fold)
+        branch = tried[False]
+        special = None if branch is None else self._imperfect(piece, at, branch, ended=ended)
+        if not clearly and (turns or special is None) and (found := solved(piece.solver, at, fold=True)) is not None:
             return special_point(piece, at, found, fold=True)
-        found = solved(solver, at, fold=False)
-        if found is not None and found.size <= found.noise:
-            return special_point(piece, at, found, fold=False)
-        if clearly and not turns and (fold := solved(solver, at, fold=True)) is not None:
-            return special_point(piece, at, fold, fold=True)
-        gap = self._open_gap(piece, at, found, ended=ended) if found is not None else None
-        fold = solved(solver, at, fold=True)
-        if fold is not None and (turns or found is None):
-            return special_point(piece, at, fold, fold=True)
-        if found is None:
-            return None
+        return special
+
+    def _imperfect(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> SpecialPoint:
+        """The branch point at a state whose unfolding parameters are not round-off."""
+        gap = self._open_gap(piece, at, found, ended=ended)
         special = special_point(piece, at, found, fold=False)
         if gap is not None:
             special.kind, special.note = IMPERFECT, str(gap)

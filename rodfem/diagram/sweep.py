@@ -273,25 +273,26 @@ class Sweep:
         with self.solver.system.clock.scope("location"):
             events = self.critical.between(first.side, second.side, behind, still)
         negative = a.negative
-        explained = negative + sum(event.change for event in events) == b.negative
-        in_all = explained and {event.kind for event in events} == {FLUTTER}  # of all eigenvalues that are recorded
         for event in events:
-            after = b.negative if in_all and event is events[-1] else negative + event.change
+            after = negative + event.change
             if event.cluster is not None:
                 self._critical(branch, event, (a, b), (negative, after))
             elif event.change > 0:
-                report = self.observer.note if a.negative else self.observer.warn
-                words = (
-                    f"{event.change} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at "
-                    f"{a.load:.6g} by no more than round-off: the rows before, which count {a.negative}, may count too "
-                    "few."
-                )
-                report(Remark(words, a.load, b.load))
+                self._hidden(event, a, b)
             negative = after
-        if not explained:
+        if negative != b.negative:
             change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
             branch.unexplained.append(change)
             self.observer.warn(Remark(str(change), a.load, b.load))
+
+    def _hidden(self, event: Critical, a: Point, b: Point) -> None:
+        """Say that round-off hides a collision between two rows; where some are unstable only their number is open."""
+        report = self.observer.note if a.negative else self.observer.warn
+        words = (
+            f"{event.change} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} by no "
+            f"more than round-off: the rows before, which count {a.negative}, may count too few."
+        )
+        report(Remark(words, a.load, b.load))
 
     def _critical(self, branch: Branch, event: Critical, ends: tuple[Point, Point], negative: tuple[int, int]) -> None:
         """Take a critical load between two rows into a branch, at which the number of unstable eigenvalues changes."""

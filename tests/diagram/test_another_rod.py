@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import ufl
 from classics import column
 
 import rodfem
@@ -30,12 +29,6 @@ def loaded(mass: float = 1.0, tip: float = 1.0) -> Scene:
 def crooked(e: float) -> Scene:
     """A cantilever with a force across it that is zero at both ends of its range."""
     return column("crooked", (clamped(), free(lambda c: (e * c.P * (6.0 - c.P), 0.0, -c.P))), (0.0, 6.0))
-
-
-def beyond(e: float) -> Scene:
-    """A cantilever with a force across it above its own range."""
-    ends = clamped(), free(lambda c: (e * ufl.max_value(c.P - 1.0, 0.0), 0.0, -c.P))
-    return column("beyond", ends, (0.0, 1.0))
 
 
 OTHERS: dict[str, tuple[Callable[[], Scene], Callable[[], Scene], Plan]] = {
@@ -65,14 +58,6 @@ def test_a_fingerprint_of_an_older_file() -> None:
     assert same(older, numbers[0.05]) and same(older, numbers[0.0])
     assert not same(numbers[0.05], numbers[0.0])
     assert not same([1.01 * x if x is not None else x for x in older], numbers[0.05])
-
-
-@pytest.mark.long
-def test_loads_beyond_the_range_of_the_scene() -> None:
-    """Of a plan with a wider range that is seen, too."""
-    for high, alike in ((1.0, True), (6.0, False)):
-        first, second = (fingerprint(System(beyond(e), MESH), (0.0, high)) for e in (0.0, 0.05))
-        assert same(first, second) == alike
 
 
 @pytest.mark.long

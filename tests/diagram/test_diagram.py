@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,6 @@ import demo_cases
 import hemitropic_cases
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 import rodfem
 from rodfem import Diagram, Discretization, InputError, Observer, Parameter, Plan
@@ -70,16 +67,6 @@ def test_states_at_a_load(diagram: Diagram) -> None:
         diagram.at(20.0)
 
 
-@pytest.mark.alone
-def test_a_locus_begins_at_its_special_point(diagram: Diagram) -> None:
-    """The critical tension is ``k0^2 - w^2``: of the first mode, which it is for all k0, the difference is constant."""
-    special = diagram.special("branch point", "straight")[0]
-    found = diagram.locus(special, "k0", (9.0, 9.8))
-    k0 = diagram.scene.parameters["k0"].value
-    w2 = k0**2 - special.point.load
-    np.testing.assert_allclose(found.values[:, 1] ** 2 - found.values[:, 0], w2, atol=1e-6)
-
-
 @pytest.mark.long
 @pytest.mark.alone
 def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
@@ -116,22 +103,6 @@ def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
         rodfem.load(saved, softer)
     with pytest.raises(InputError, match=r"There is no .*diagram.json"):
         rodfem.load(folder, diagram.scene)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_loads_without_a_potential(folder: Path) -> None:
-    """Beck's column flutters at 20.05095 (the exact frequency equation): the same kind of object."""
-    beck = demo_cases.scene("follower")
-    found = rodfem.trace(beck, plan=Plan((15.0, 25.0)))
-    (flutter,) = found.special("flutter")
-    assert flutter.point.load == pytest.approx(20.05095361, abs=1e-6)
-    assert [p.stable for p in (*found.at(19.9), *found.at(20.2))] == [True, False]
-    again = rodfem.load(found.save(folder / "beck"), beck)
-    assert repr(again) == repr(found)
-    assert again.special("flutter")[0].point.load == flutter.point.load
-    with pytest.raises(InputError, match="A search by deflation needs a scene whose loads all have a potential"):
-        found.search(15.0)
 
 
 @pytest.mark.alone
@@ -180,20 +151,6 @@ def test_what_a_run_warns_of_is_saved_and_in_its_words(folder: Path, capsys: pyt
     assert rodfem.load(folder / "cord", rod).warnings == []
 
 
-@pytest.mark.long
-@pytest.mark.alone
-def test_pictures(diagram: Diagram, folder: Path) -> None:
-    point = diagram.at(40.0)[1]
-    picture = diagram.show(point, folder / "cord.png")
-    if MPI.COMM_WORLD.rank:
-        return
-    assert picture.png[:8] == b"\x89PNG\r\n\x1a\n"
-    assert (folder / "cord.png").read_bytes() == picture.png == picture._repr_png_()
-    figure = diagram.plot(folder / "diagram.svg")
-    assert len(figure.axes) == 1
-    assert (folder / "diagram.svg").stat().st_size > 1000
-
-
 @pytest.mark.alone
 def test_one_solver(diagram: Diagram) -> None:
     """States that a solver computes one by one are those of the diagram."""
@@ -220,24 +177,3 @@ def test_an_interrupt_loses_no_branch() -> None:
     (straight,) = caught.value.diagram
     assert [s.negative_after for s in straight.special if s.kind == "branch point"] == [2]
     assert caught.value.diagram.assess(straight.points[0]).negative == 0
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_a_diagram_that_is_dropped_leaves_no_memory_behind() -> None:
-    """PETSc keeps what Python has collected until all ranks agree: a diagram had left 21 MB each time."""
-
-    def resident() -> float:
-        """Memory of this process in MB."""
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-    sizes = []
-    for _ in range(5):
-        rodfem.trace(
-            hemitropic_cases.scene((0.5, 1.0, 1.0, 2.9)),
-            Discretization("reduced", 16, 6),
-            Plan(depth=0, error_bars=False),
-        )
-        gc.collect()
-        sizes.append(resident())
-    assert sizes[-1] - sizes[1] < 10.0

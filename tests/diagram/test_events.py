@@ -9,14 +9,11 @@ from typing import Any
 import classics
 import numpy as np
 import pytest
-from petsc4py import PETSc
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import rodfem
 from rodfem import Discretization, Event, InputError, Plan, clamped, sliding
-from rodfem.continuation import arc, event_piece
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
@@ -131,31 +128,6 @@ def test_zeros_between_rows_and_beside_them(kind: str) -> None:
     assert not found.warnings
 
 
-@pytest.mark.long
-def test_states_with_round_off_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Equilibria that are solved for differ by 1e-8, as beside a soft mode: each event is within its bar."""
-    chosen, solve = np.random.default_rng(4), arc.corrected
-
-    def rough(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
-        x, aside = solve(solver, start, row), solver.system.new_vector()
-        solver.system.set_load(aside, 1.0)
-        along = solver.tangent(row, at=x)
-        aside.axpy(-row.dot(aside) / row.dot(along), along)  # on the plane on which the state is solved for
-        return x + aside * (1e-8 * chosen.normal())
-
-    touches = tuple(
-        Event(f"at {b:.2f}", of=lambda state, b=b: (state.load - b) ** 2) for b in np.linspace(1.5, 3.5, 41)
-    )
-    tips = tuple(Event(f"tip {c:.2f}", of=lambda state, c=c: state.r[-1, 0] - c) for c in np.linspace(0.06, 0.18, 9))
-    plan = replace(PLAN, events=touches + tips)
-    exact = {s.note: s.point.load for s in rodfem.trace(COLUMN, MESH, plan)[0].special if s.event}
-    for module in (arc, event_piece):
-        monkeypatch.setattr(module, "corrected", rough)
-    found = [s for s in rodfem.trace(COLUMN, MESH, plan)[0].special if s.event]
-    assert len(found) == len(exact) == 50
-    assert all(abs(s.point.load - exact[s.note]) <= s.located_to < 1e-6 for s in found)
-
-
 def test_a_sweep_refuses_events() -> None:
     """It locates none: nothing would be found, without a word."""
     with pytest.raises(InputError, match=r"The event 'tip' is sought along branches"):
@@ -170,32 +142,3 @@ def test_an_event_that_is_zero_all_along_is_said_to_be() -> None:
     assert not found.special("event")
     assert sum("'side' is zero all along between loads 0 and 12" in note for note in found.notes) == 1
     assert not found.warnings
-
-
-def height(m: float) -> float:
-    """Largest deflection of a pinned elastica of parameter ``m``."""
-    return float(np.sqrt(m) / ellipk(m))
-
-
-def deflection(state: Any) -> float:
-    """Deflection of the middle of a rod of an even number of elements."""
-    return float(np.hypot(*state.r[len(state.s) // 2, :2]))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("below", [1e-2, 1e-5, 1e-8, -1e-6])
-def test_the_height_of_an_elastica_near_its_largest(below: float) -> None:
-    """Two zeros beside the load of the largest height, or none: equilibria decide, not states between rows."""
-    top = minimize_scalar(lambda m: -height(m), bounds=(0.3, 0.95), method="bounded", options={"xatol": 1e-12}).x
-    level = height(top) - below
-    ends = [(0.3, top), (top, 0.95)] if below > 0 else []
-    exact = [4 * ellipk(brentq(lambda m: height(m) - level, *pair)) ** 2 for pair in ends]
-    rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 25.0), planar="e1")
-    plan = Plan(depth=1, events=(Event("height", of=lambda state: deflection(state) - level),))
-    found = rodfem.trace(rod, Discretization("auto", 8, 8), plan)
-    events = found.special("event")
-    assert not found.warnings  # beside the largest height the event varies by round-off only
-    assert len(events) == len(exact)
-    for event, P in zip(sorted(events, key=lambda s: s.point.load), exact, strict=True):
-        assert abs(event.point.load - P) <= event.error_estimate + 1e-9
-        assert event.error_estimate < 0.1

@@ -1,48 +1,68 @@
-"""First states from a start that is no equilibrium: one on all meshes, and none at which nothing can be counted."""
+"""First states: their name, which is true, one on all meshes, and a column in units far from one."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi
 from typing import Any
 
+import classics
+import demo_cases
 import numpy as np
 import pytest
 import ufl
 from classics import circle
 
-from rodfem import Attachment, Discretization, Ordinate, Plan, Ring, Scene, Solver, hinged, sliding_hinge, trace
+from rodfem import Discretization, Ordinate, Plan, Ring, Scene, Solver, pinned, trace
+from rodfem.continuation.branch import Branch
+from rodfem.diagram.explorer import Explorer
+from rodfem.forms.energy import bending_and_twist
+
+pytestmark = pytest.mark.alone
+
+MESH = Discretization("auto", 6, 4)
 
 
-def energy(v: Any, k: Any, c: Any) -> Any:
-    """Grows so fast with the curvature that a state of huge curvature has a stiffness of 1e13."""
-    strains = (k[0], k[1], k[2] - 0.433)
-    quadratic = sum(B * x**2 for B, x in zip((1.037, 1.01, 2.74), strains, strict=True))
-    return 0.5 * quadratic + 20 * (v[2] - 1) ** 2 + 0.707 * sum(ufl.cosh(0.7 * x) - 1 for x in strains)
+def heavy(share: float) -> Scene:
+    """A cantilever whose weight grows from nothing: along its axis, and a ``share`` of it across."""
+    return replace(classics.heavy(), distributed=lambda c: (-share * c.P, 0.0, -c.P), span=(0.0, 2.0))
 
 
 @pytest.mark.long
-@pytest.mark.alone
-def test_all_meshes_find_one_first_state() -> None:
-    """The stiffness of a state far away was that of all others, and none was found: constraints were blamed.
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        (lambda: heavy(0.0), "straight"),
+        (lambda: heavy(1e-3), "first branch"),  # straight only as long as it has no weight
+        (lambda: demo_cases.scene("cord"), "straight"),  # of curvatures that vanish, and strains that do not
+        (lambda: demo_cases.scene("ruler"), "plane"),  # as the scene says
+        (lambda: replace(demo_cases.scene("ruler"), states=None), "first branch"),
+        (lambda: replace(demo_cases.scene("ring"), states=None), "ring"),
+        (lambda: classics.arch(0.5, dead=False), "first branch"),
+        (lambda: classics.spring(3.0, 2.0), "first branch"),
+        (lambda: classics.timoshenko(50.0), "straight"),
+        (classics.beck, "straight"),
+        (lambda: replace(classics.beck(), distributed=lambda c: (1e-3, 0.0, 0.0)), "first branch"),
+    ],
+)
+def test_only_what_is_straight_is_called_so(scene: Callable[[], Scene], name: str) -> None:
+    rod = scene()
+    start, stop = rod.span
+    plan = Plan((start, start + 0.02 * (stop - start)), depth=0, error_bars=False)
+    diagram = trace(rod, MESH, plan)
+    assert diagram.branches[0].name == name
+    sentence = diagram.in_words()
+    assert sentence.startswith("The first branch is " if name == "first branch" else f"The first branch, {name}, is ")
 
-    On the way back to no load the rod passes two folds.
-    """
-    guide = sliding_hinge((0.6, 0.0, 0.8), (0.6, 0.0, 0.8), lambda c: (0.0, 0.0, 1.0))
-    rod = Scene(
-        "cosh", (0.0, 1.0), "unshearable", energy, {"P": 0.0}, "P", (hinged((0.0, 1.0, 0.0)), guide),
-        Ordinate("middle", 0.5, of=lambda r, q: float(np.hypot(r[0], r[1]))), (29.756, 0.0),
-        attachments=(Attachment(0.6, force=lambda c: (0.0, 0.0, -c.P)),),
-    )  # fmt: skip
-    meshes = Discretization("auto", 5, 6), Discretization("pointwise", 7, 5), Discretization("pointwise", 10, 6)
-    found = [trace(rod, mesh, Plan(depth=0))[0] for mesh in meshes]
-    assert [branch.points[0].stable for branch in found] == [True] * 3
-    assert [branch.points[0].ordinate for branch in found] == pytest.approx(
-        [found[-1].points[0].ordinate] * 3, rel=1e-6
-    )
-    folds = [[s for s in branch.special if s.kind == "fold"] for branch in found]
-    for first, other in ((folds[-1], folds[0]), (folds[-1], folds[1])):
-        assert len(first) == len(other) == 2
-        for a, b in zip(first, other, strict=True):
-            assert abs(a.point.load - b.point.load) <= a.error_estimate + b.error_estimate
+
+@pytest.mark.long
+def test_no_two_branches_have_one_name() -> None:
+    """What leaves a branch that a search found was called ``branch 1``, as what leaves the first: files have one."""
+    explorer = Explorer.__new__(Explorer)
+    explorer.branches = [Branch("branch 1", ("straight", 0), 1), Branch("found 1 at 0.5", None, 0)]
+    assert explorer._unused("branch ") == "branch 2"
+    assert explorer._unused("found ", " at 0.5") == "found 2 at 0.5"  # of another load with these digits, say
 
 
 @pytest.mark.long
@@ -63,3 +83,32 @@ def test_of_two_equilibria_the_one_beside_the_start() -> None:
     found = [Solver(ring, Discretization("auto", elements, 5)).equilibrium(0.2) for elements in (7, 8, 10, 14)]
     assert [point.negative for point in found] == [1] * 4
     assert [point.ordinate for point in found] == pytest.approx([found[-1].ordinate] * 4, rel=1e-3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("stiffness", "push"), [(1e-20, 1e-15), (1e20, 1e15)])
+def test_a_column_buckles_in_any_units(stiffness: float, push: float) -> None:
+    """At ``pi^2``, with ``P = pi^2 (1 + (pi x)^2 / 8)`` for the amplitude ``x`` in the middle, in lengths.
+
+    Reactions that vanish are round-off of forces of the size of the stiffness.
+    """
+    one = stiffness / push
+    scene = Scene(
+        "column",
+        (0.0, 1.0),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist(k, (9 * stiffness, stiffness, stiffness)),
+        {"P": 0.0},
+        "P",
+        (pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P * push))),
+        Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
+        (8 * one, 11 * one),
+        planar="e2",
+    )
+    found = trace(scene, plan=Plan(depth=1))
+    (special,) = found.special("branch point")
+    assert abs(special.point.load - pi**2 * one) <= special.error_estimate < 1e-8 * one
+    assert special.law is not None
+    assert special.law.coefficient == pytest.approx(pi**4 / 8 * one, rel=1e-6)
+    assert [branch.ended for branch in found] == ["end of range"] * 2
+    assert found.warnings == []

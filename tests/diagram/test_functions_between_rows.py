@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import pi, sqrt
 from typing import Any
 
 import numpy as np
 import pytest
-import ufl
 from classics import column
 
 from rodfem import Diagram, Discretization, Plan, clamped, free, trace
@@ -18,12 +16,6 @@ from rodfem.problem.scene import Scene
 pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 6)
 EULER = pi**2 / 4
-BECK = 20.0509536189738
-WIDTH = 1e-3
-
-
-def bell(x: Any) -> Any:
-    return ufl.exp(-((x / WIDTH) ** 2))
 
 
 def cantilever(
@@ -56,45 +48,6 @@ def test_a_pair_where_stiffness_and_thrust_both_grow(above: float, other: float,
     half = sqrt(growth**2 - 1)
     np.testing.assert_allclose(branch_points(diagram), [growth - half, growth + half], rtol=0, atol=1e-9)
     assert not diagram.warnings
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("foundation", "width"),
-    [
-        (lambda c: 1e6 * ufl.exp(6 * c.P), 1.0),
-        pytest.param(lambda c: 100 * ufl.exp(3 * c.P), 0.1, marks=pytest.mark.long),
-        (lambda c: 100 * (1 + c.P), 1.0),  # the first state between two rows is one of the branch points, to round-off
-    ],
-)
-def test_a_pair_on_a_foundation_that_grows(foundation: Callable[[Any], Any], width: float) -> None:
-    """A foundation against turning about the axis leaves Euler's load as it is, and changes determinants a lot."""
-    rod = cantilever(
-        lambda v, k, c: bending_and_twist(k, (1.0, 9.0, 1.0)),
-        lambda c: EULER * (1 + 1e-6 - width * (c.P - 1.03) ** 2),
-        (0.25, 2.3),
-        potential=lambda x, c: foundation(c) * x.q[3] ** 2,
-    )
-    diagram, half = trace(rod, MESH, Plan(depth=0, error_bars=False)), 1e-3 / sqrt(width)
-    np.testing.assert_allclose(branch_points(diagram), [1.03 - half, 1.03 + half], rtol=0, atol=1e-9)
-    assert not diagram.warnings
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "energy",
-    [
-        lambda c: 1 / (1 + c.b * bell(c.s - 0.4321) / (WIDTH * sqrt(pi))),
-        lambda c: 1 + c.b * ufl.conditional(ufl.lt(c.s, 0.4321), 1.0, 0.0),
-    ],
-)
-def test_a_locus_knows_what_is_sharp_at_its_own_parameters(energy: Any) -> None:
-    """At the start there is none of it: errors were 1e11 times their bars."""
-    rod = cantilever(lambda v, k, c: bending_and_twist(k, (energy(c), 9.0, 1.0)), lambda c: c.P, constants={"b": 0.0})
-    diagram = trace(rod, MESH, Plan(depth=0))
-    found = diagram.locus(diagram.special("branch point")[0], "b", (0.0, 1.0), (0.0, 4.0))
-    assert "does not integrate the equations about s = 0.43" in found.note
-    assert np.isnan(found.error[found.values[:, 1] > 0.1]).all()
 
 
 @pytest.mark.long

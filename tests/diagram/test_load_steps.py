@@ -1,15 +1,21 @@
-"""Sweeps that stay on one path of equilibria, up to a jump of a load or two folds: `tests/hard/paths.py` has more."""
+"""Equilibria of a sweep on one path, and at a load that one iteration does not reach."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
+import classics
+import numpy as np
 import pytest
 import ufl
 from hard.paths import MESH, imperfect
 from hard.two_freedoms import scene as two_freedoms
 
-from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, trace
+from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, Solver, trace
+from rodfem.continuation.first_equilibrium import first_equilibrium
+from rodfem.diagram.equilibria import at_load
+from rodfem.errors import ConvergenceError
 
 pytestmark = pytest.mark.alone
 
@@ -48,3 +54,17 @@ def test_no_divergence_load_is_said() -> None:
     scene = following(two_freedoms(lambda u, f2, c: u**3 / 3 - 0.5 * c.P * u**2 + 0.5 * f2, (-0.3, 0.4)))
     diagram = trace(scene, Discretization("auto", 4, 3), Plan())
     assert any("could not be located" in said for said in diagram.warnings)
+
+
+def test_a_load_that_takes_several_steps() -> None:
+    """A cantilever with a lateral force of up to 50 at its tip."""
+    solver = Solver(classics.lateral(), Discretization("reduced", 6, 6)).equilibria
+    first, _ = first_equilibrium(solver, 0.0)
+    x = first
+    for _, load in pairwise(np.linspace(0.0, 50.0, 101).tolist()):
+        x, outcome = solver.at_load(x, load)
+        assert outcome.converged
+    assert not solver.at_load(first, 50.0)[1].converged
+    assert solver.system.distance(at_load(solver, first, 50.0), x) < 1e-8
+    with pytest.raises(ConvergenceError, match=r"No equilibrium at P = 1e\+06: use a smaller range"):
+        at_load(solver, first, 1e6)

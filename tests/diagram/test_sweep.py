@@ -4,30 +4,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 from io import StringIO
-from pathlib import Path
 
 import classics
 import numpy as np
 import pytest
-from closed_forms import column, double, flutter
-from hard.endurance import resident
+from closed_forms import column, flutter
 from hemitropic_cases import specials
-from mpi4py import MPI
-from scipy.linalg import expm
-from scipy.optimize import brentq, fsolve
+from scipy.optimize import brentq
 
-from rodfem import Inertia, Ordinate, Plan, clamped, compat, everywhere, free
+from rodfem import Inertia, Ordinate, Plan, free
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.diagram import trace
-from rodfem.diagram.solver import Solver
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.plot_frequencies import curves, draw_frequencies, figure_of, ranges_of
+from rodfem.output.plot_frequencies import curves, ranges_of
 from rodfem.problem.ends import End
 from rodfem.problem.scene import Scene
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 PILE = 64
 """States after which what PETSc keeps of matrices that are not used any more is destroyed."""
@@ -83,23 +77,6 @@ def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(line.loads) >= len(branch.points) - 1
 
 
-def test_curves_meet_as_square_roots(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Between the rows beside a flutter load curves of pictures are those of Beck's column, not chords."""
-    branch, data, _ = swept(classics.partly_following(1.0, (0.0, 25.0)), monkeypatch)
-    (flutter,) = (s.point.load for s in specials(branch, "flutter"))
-    rows = {p.load for p in branch.points}
-    found = data["branches"][0]
-    between = [
-        (load, mu)
-        for curve in curves(found["columns"], found["special"])
-        for load, mu in zip(curve.loads, curve.roots**2, strict=True)
-        if load not in rows and abs(load - flutter) > 1e-6
-    ]
-    assert len(between) > 20
-    for load, mu in between:
-        assert abs(column(mu, load) - mu) < 5e-3 * abs(mu)
-
-
 @pytest.mark.long
 @pytest.mark.alone
 def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,44 +94,8 @@ def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> N
     assert [[r.low, r.high] for r in found] == [pytest.approx(loads, rel=1e-6) for _, *loads in expected]
 
 
-@pytest.mark.long
-@pytest.mark.alone
-def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _, data, _ = swept(classics.partly_following(0.4, (0.0, 25.0)), monkeypatch)
-    if MPI.COMM_WORLD.rank == 0:
-        (axes,) = figure_of(data).axes
-        places = [float(line.get_xdata()[0]) for line in axes.get_lines() if line.get_marker() == "v"]
-        first = np.arccos(-2 / 3)
-        assert places == pytest.approx([first**2, (2 * np.pi - first) ** 2])
-        assert {text.get_text() for text in axes.texts} == {"5.29241", "15.8616", "16.4039"}
-        legend = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert {"divergence", "flutter", "diverged, growth rate"} < set(legend)
-        assert {"range of divergence", "range of flutter"} < set(legend)
-        spans = sorted(patch.get_xy()[:, 0].min() for patch in axes.patches)
-        assert spans == pytest.approx([places[0], 16.4039], rel=1e-5)
-        columns = data["branches"][0]["columns"]
-        for row in columns["omega2"]:  # all eigenvalues negative: there is no frequency to scale the axis by
-            row[:] = [[-abs(mu), 0.0] for mu, _ in row]
-        draw_frequencies(data, folder / "none.png")
-
-
 TURNING = brentq(lambda x: np.tan(x) - np.tanh(x), 3.8, 4.0)
 """The first number of a beam that may turn at one end, the other one clamped or free: tan(b) = tanh(b)."""
-TWICE_HELD = replace(
-    classics.torque("follower_moment"),
-    ends=(clamped(), End(position=lambda c: (0.0, 0.0, None), follower_moment=lambda c: (0.0, 0.0, c.P))),
-    constraints=(everywhere(lambda x, c: x.k[0], strain=True),),
-    span=(0.0, 1.0),
-)
-"""A straight rod that bends about d2 alone, whose end is kept on the axis twice."""
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_constraints_that_follow_from_others_are_refused() -> None:
-    """Without it a singular pencil, with an eigenvalue that is any number, is what frequencies are computed of."""
-    with pytest.raises(SceneError, match="Constraints depend on one another"):
-        trace(TWICE_HELD, Discretization(elements=5, degree=6))
 
 
 @pytest.mark.few(1)
@@ -189,68 +130,6 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
 
 
 @pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("twisting", [1e-3, 1e-4])
-@pytest.mark.usefixtures("few_loads")
-def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
-    """A rod that is so soft in torsion that dozens of motions are slower than those that flutter, at Beck's load.
-
-    Of the softer one they are 5e5 times slower.
-    """
-    beck = classics.beck(span=(19.0, 22.0))
-    scene = replace(
-        beck,
-        parameters={**beck.parameters, "C": twisting},
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 10.0, c.C)),
-        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)),
-    )
-    mesh = Discretization("pointwise", 4, 6)
-    found = trace(scene, mesh, Plan())
-    (flutter,) = specials(found[0], "flutter")
-    assert abs(flutter.point.load - double(20.0, 120.0)[0]) <= flutter.error_estimate < 1e-9
-    assert not found.warnings
-    for method in ("auto", "dense", "shift-invert"):
-        assert [found.assess(found[0].points[row], method).negative for row in (0, -1)] == [0, 2]
-    (state,) = found.at(22.0)
-    assert (state.negative, state.stable) == (2, False)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("elements", "degree"), [(4, 8), pytest.param(20, 4, marks=pytest.mark.alone)])
-@pytest.mark.usefixtures("few_loads")
-def test_infinite_eigenvalues_of_a_light_rod_are_left_out(elements: int, degree: int) -> None:
-    """Pflueger's column with a mass of a hundred times its own: the twelfth eigenvalue is 5e7 times the first.
-
-    Round-off makes finite eigenvalues of the infinite ones there: -1.7e8, or complex, which are none of the rod.
-    """
-    light = Inertia(rho_A=lambda c: LIGHT, rho_I=lambda c: (0.0, 0.0, 0.0))
-    scene = replace(classics.beck(tip=1.0, span=(0.0, 25.0)), inertia=light, planar="e1")
-    diagram = trace(scene, Discretization("pointwise", elements, degree))
-    assert not diagram.warnings and diagram[0].points[0].negative == 0
-    found = specials(diagram[0], "flutter")
-    assert len(found) == 2
-    for point in found:
-        P, _ = fsolve(pflueger, [point.point.load, point.omega2], xtol=1e-13)
-        assert abs(point.point.load - P) <= point.error_estimate
-
-
-LIGHT = 0.01
-"""Mass of a rod, over that at its tip."""
-
-
-def pflueger(z: np.ndarray) -> list[float]:
-    """Zero where two eigenvalues of ``w'''' + P w'' = LIGHT mu w`` meet, with ``w'' = w''' + mu w = 0`` at the tip."""
-
-    def determinant(mu: complex) -> complex:
-        A = np.eye(4, k=1, dtype=complex)
-        A[3, 0], A[3, 2] = LIGHT * mu, -z[0]
-        y = expm(A)[:, 2:]
-        return complex(np.linalg.det(np.array([y[2], y[3] + mu * y[0]])))
-
-    return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
-
-
-@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bar of its ordinate, 1e-12 for a straight rod, is none of the load."""
@@ -263,22 +142,3 @@ def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytes
     (point,) = specials(diagram[0], "flutter")
     assert np.isnan([point.error_estimate, point.ordinate_error]).all()
     assert any("No error of the flutter" in sentence for sentence in diagram.warnings)
-
-
-@pytest.mark.alone
-def test_memory_does_not_grow_with_the_states_whose_frequencies_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """PETSc keeps what is destroyed until all ranks clean up: 39 kB a state here, unless they do."""
-    solver = Solver(classics.beck(), Discretization("pointwise", 4, 6)).equilibria
-    x, eigensolver, used, cleaned = solver.start(10.0), NonsymmetricSolver(solver.system), list[float](), [0]
-    clean = compat.destroy_garbage
-
-    def counted(comm: MPI.Comm) -> None:
-        cleaned[0] += 1
-        clean(comm)
-
-    monkeypatch.setattr(compat, "destroy_garbage", counted)
-    for _ in range(2 * PILE):
-        eigensolver.at(x).near(3, -10.0)
-        used.append(resident())
-    assert cleaned == [2]
-    assert used[-1] - used[PILE] < 0.25 * (used[PILE - 2] - used[1]) + 512

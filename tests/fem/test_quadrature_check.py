@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import ufl
 from classics import SUPPORTS, column
-from diagram.test_sharp_in_state import bent, deflection, ordinates
+from diagram.test_kinks import bent, deflection, ordinates
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 

@@ -334,7 +334,7 @@ def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
         assert "count (as asked)" in out and "2 factorisations, " in out
     for words, sentence in (
         (("--at", "0.2", "--method", "magic"), "Unknown method 'magic'"),
-        (("--modes", "2"), "needs loads to judge at"),
+        (("--modes", "2"), "need loads to judge at"),
         (("--at", "0.2", "--modes", "2", "--method", "count"), "Counting alone finds no modes"),
     ):
         with pytest.raises(SystemExit):

@@ -1,0 +1,145 @@
+"""Branches that close, that go back to shorter steps however often, and that have an image by a symmetry."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from dataclasses import replace
+from math import inf, pi, sqrt
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from classics import column, push
+from problem.test_docs import scenes
+
+import rodfem
+from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, clamped, free, trace
+from rodfem.continuation.observer import Observer
+from rodfem.deflation.symmetries import Mirror
+from rodfem.diagram.special_search import PARTS, SHORTER, SpecialSearch, Unresolved
+from rodfem.forms.energy import bending_and_twist
+from rodfem.output.plot_diagram import figure_of
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.mark.long
+def test_two_states_of_a_twisted_ring_are_joined_at_any_step() -> None:
+    """Michell: rings twisted by none and by two turns lose stability where ``C |twist - t0| = sqrt 3``, both found.
+
+    At the second one the branch meets states with one more free motion, along which Newton's method slides away.
+    """
+    ring = Scene(
+        "ring",
+        (0.0, 2 * pi),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, 1.5)),
+        {"t0": 0.0},
+        "t0",
+        Ring(),
+        Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi)),
+        (0.0, 1.5),
+        start=lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1),
+    )
+    plan = Plan(depth=1, error_bars=False, steps=StepControl(largest=0.025))
+    diagram = trace(ring, Discretization(elements=8, degree=6), plan)
+    first, last = diagram["ring"].special[0], diagram["branch 1"].special[-1]
+    assert first.point.load == pytest.approx(2 / sqrt(3), abs=1e-8)
+    assert last.point.load == pytest.approx(2 - 2 / sqrt(3), abs=1e-8)
+    assert last.point.ordinate == pytest.approx(2.0, abs=1e-9)
+    assert diagram["branch 1"].ended.startswith("meets another branch")
+    assert not diagram.warnings
+
+
+OFTEN, DEEP = 400, 300
+
+
+@pytest.mark.long
+@pytest.mark.alone
+def test_no_stack_overflows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four hundred times, where three hundred calls are left: the rows are those that are found without."""
+    scene = column("column", (clamped(), free(push)), (0.0, 4.0), planar="e2")
+    mesh, plan = Discretization("auto", 2, 4), Plan(depth=0, error_bars=False)
+    (expected,) = trace(scene, mesh, plan)
+    after, left = SpecialSearch.after, [OFTEN]
+
+    def doubting(search: SpecialSearch, *step: Any) -> Any:
+        if left[0]:
+            left[0] -= 1
+            raise Unresolved
+        return after(search, *step)
+
+    monkeypatch.setattr(SpecialSearch, "after", doubting)
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(len(inspect.stack()) + DEEP)
+    try:
+        (found,) = trace(scene, mesh, plan)
+    finally:
+        sys.setrecursionlimit(limit)
+    assert not left[0] and found.ended == expected.ended == "end of range"
+    assert [p.load for p in found.points] == pytest.approx([p.load for p in expected.points], abs=1e-9)
+
+
+def test_steps_are_short_about_pieces_that_are_to_be_resolved_and_not_for_ever() -> None:
+    """A branch that goes back far before a piece does not creep towards it, nor to and fro between two."""
+
+    def row(arclength: float) -> Any:
+        return SimpleNamespace(arclength=arclength, mesh=0)
+
+    meshes, gaps = SimpleNamespace(solvers=[None]), SimpleNamespace(reach=lambda solver, point: inf)
+    search, asked = SpecialSearch(meshes, gaps, Observer()), 0  # type: ignore[arg-type]
+    for first in (3.0, 5.0) * 10:
+        try:
+            search._shorten(row(first), row(first + 0.2))
+        except Unresolved:
+            asked += 1
+    assert asked == 2 * SHORTER
+    assert search.reach(row(0.5)) == pytest.approx(2.5) and search.reach(row(6.0)) == inf
+    assert search.reach(row(3.1)) == search.reach(row(5.1)) == pytest.approx(0.2 / PARTS)
+    assert search.reach(row(3.5)) == pytest.approx(1.5)
+
+
+PLANAR = replace(
+    scenes()["in_plane"],
+    ends=(rodfem.clamped(), rodfem.free(lambda c: (0.0, 0.0, -c.P))),
+    ordinate=Ordinate("tip deflection", s=1.0, of=lambda r, q: r[0]),
+)
+"""Euler's cantilever in its plane: it buckles to either side at pi^2/4 times its stiffness."""
+
+
+def branches(scene: Scene) -> Any:
+    return trace(scene, Discretization("auto", 4, 4), Plan((0.0, 40.0), depth=1, error_bars=False))
+
+
+@pytest.mark.long
+def test_the_other_side_of_a_pitchfork(folder: Any) -> None:
+    found = branches(PLANAR)
+    straight, buckled = found[0], found[1]
+    assert straight.image == "" and "reflection along e1" in buckled.image
+    found.save(folder)
+    assert rodfem.load(folder, PLANAR)[1].image == buckled.image
+    data = rodfem.load_json(folder / "diagram.json")
+    axes = figure_of(data).axes[0]
+    thin = [line for line in axes.lines if line.get_linewidth() < 1.0]
+    assert thin and axes.get_ylim()[0] < -0.5 and axes.get_ylim()[1] > 0.5
+    (words,) = (t.get_text() for t in axes.get_legend().get_texts() if t.get_text().startswith("image, not traced"))
+    assert words.endswith(buckled.image)
+    solver, point = found.solvers[0], buckled.points[-1]  # the image is an equilibrium, and not the same one
+    image, rest = Mirror((-1, 1, 1), reversal=False)(solver.system, point.x), solver.system.new_vector()
+    solver.system.at(image).residual(rest)
+    assert rest.norm() < 1e-9 and solver.shape.ordinate(image) == pytest.approx(-point.ordinate, rel=1e-9)
+
+
+@pytest.mark.long
+def test_no_image_without_a_symmetry() -> None:
+    """A lateral force, however small, prefers a side; of an ordinate of one sign the image is the branch itself."""
+    push = rodfem.free(lambda c: (1e-3, 0.0, -c.P))
+    bent = branches(replace(PLANAR, ends=(rodfem.clamped(), push)))
+    assert all(branch.image == "" for branch in bent) and max(abs(p.ordinate) for p in bent[0].points) > 0.3
+    held = replace(scenes()["untwistable"], ordinate=Ordinate("deflection", s=0.5, of=lambda r, q: r[0]))
+    found = trace(held, Discretization("auto", 4, 4), Plan((0.0, 12.0), depth=1, error_bars=False))
+    assert all(branch.image == "" for branch in found)  # multipliers along the rod have signs that nobody knows
+    absolute = replace(PLANAR, ordinate=Ordinate("size", s=1.0, of=lambda r, q: np.hypot(r[0], r[1])))
+    assert all(branch.image == "" for branch in branches(absolute))
