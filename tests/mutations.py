@@ -90,7 +90,8 @@ TABLE = {
     },
     "rodfem/app/run.py": {
         "files-of-others-are-removed": (
-            "return [str(name) for name in named] if", "return os.listdir(folder) if", "hard/test_files_after_a_kill.py"),
+            "return [str(name) for name in named] if", "return os.listdir(folder) if",
+            "hard/test_files_after_a_kill.py"),
         "earlier-branches-are-lost": (
             "first=not self._saved", "first=True",
             "output/test_files.py output/test_formats.py hard/test_files_after_a_kill.py diagram/test_diagram.py"),
@@ -202,7 +203,8 @@ TABLE = {
         "first-states-beside-the-start-are-passed": (
             "            x, outcome = other\n", "            pass\n", "diagram/test_first_state.py"),
         "first-states-without-forces": (
-            "solver.at_load(_balanced(solver, guess), load)", "solver.at_load(guess, load)", "continuation/test_continuation.py"),
+            "solver.at_load(_balanced(solver, guess), load)", "solver.at_load(guess, load)",
+            "continuation/test_continuation.py"),
         "a-far-state-leaves-its-round-off": (
             "        solver.inertia.forget_band()", "        pass", "stability/test_far_states.py"),
     },
@@ -345,7 +347,9 @@ TABLE = {
     "rodfem/diagram/saved.py": {
         "a-read-diagram-forgets-its-plan": (
             "Plan() if asked is None else plan_without(asked)", "Plan()", "diagram/test_another_rod.py"),
-        "scene-of-another-name": ("if (name, load) != (scene.name, scene.load):", "if load != scene.load:", "diagram/test_diagram.py"),
+        "scene-of-another-name": (
+            "if (name, load) != (scene.name, scene.load):", "if load != scene.load:",
+            "diagram/test_diagram.py"),
     },
     "rodfem/diagram/solver.py": {
         "compared-across-the-branch": ("fixed_load=special is None", "fixed_load=True", AT_SPECIAL),
@@ -398,7 +402,9 @@ TABLE = {
             "if line is self.register.line:", "if self.register.line is not None:", OTHER_CONSTANTS),
         "forms-of-other-functions-serve": (
             "== (discretization, comm) and f.scene.alike(scene)", "== (discretization, comm)", OTHER_CONSTANTS),
-        "potential-of-constraints-at-nodes": ('{"potential": potential}', '{"potential": L}', "continuation/test_work.py"),
+        "potential-of-constraints-at-nodes": (
+            '{"potential": potential}', '{"potential": L}',
+            "continuation/test_work.py"),
     },
     "rodfem/fem/fields.py": {
         "unknowns-of-other-constants-stay": (
@@ -493,7 +499,8 @@ TABLE = {
     },
     "rodfem/output/files.py": {
         "moments-without-a-natural-size": (
-            '"length", "force", "moment", "energy")', '"length", "force", "energy")', "output/test_files.py output/test_formats.py"),
+            '"length", "force", "moment", "energy")', '"length", "force",
+            "energy")', "output/test_files.py output/test_formats.py"),
         "another-row-is-restored": (
             "_trimmed(value[row])", "_trimmed(value[row - 1])",
             "output/test_files.py output/test_formats.py diagram/test_diagram.py"),
