@@ -199,14 +199,14 @@ TABLE = {
     },
     "rodfem/continuation/first_equilibrium.py": {
         "states-that-cannot-be-counted": (
-            "return replace(outcome, converged=False), False", "return outcome, True", "stability/test_far_states.py"),
+            "return replace(outcome, converged=False), False", "return outcome, True", "stability/test_round_off.py"),
         "first-states-beside-the-start-are-passed": (
             "            x, outcome = other\n", "            pass\n", "diagram/test_first_state.py"),
         "first-states-without-forces": (
             "solver.at_load(_balanced(solver, guess), load)", "solver.at_load(guess, load)",
             "continuation/test_continuation.py"),
         "a-far-state-leaves-its-round-off": (
-            "        solver.inertia.forget_band()", "        pass", "stability/test_far_states.py"),
+            "        solver.inertia.forget_band()", "        pass", "stability/test_round_off.py"),
     },
     "rodfem/continuation/follow.py": {
         "beyond-a-corner-the-tangent-is-that-before-it": (
@@ -371,7 +371,7 @@ TABLE = {
             "        if self._still:", "        if False:", "diagram/test_family_of_states.py"),
         "ordinate-of-a-load-that-is-exact": (
             "of_ordinate += self._moved(x, point.load, of_load)", "pass", "literature/test_follower.py"),
-        "taut-rods-have-frequencies": (" or self._dependent(state)", "", "stability/test_missing_frequencies.py"),
+        "taut-rods-have-frequencies": (" or self._dependent(state)", "", "stability/test_frequencies.py"),
     },
     "rodfem/diagram/tracer.py": {
         "start-anew": (
@@ -569,7 +569,7 @@ TABLE = {
     },
     "rodfem/stability/assessment.py": {
         "fewer-eigenvalues-than-asked-for": (
-            "len(found.values) < number and name != COUNT", "False", "stability/test_too_many_eigenvalues.py"),
+            "len(found.values) < number and name != COUNT", "False", "stability/test_assessment.py"),
     },
     "rodfem/stability/cluster.py": {
         "a-cluster-is-sought-from-one-shift": ("FARTHER = 3.0", "FARTHER = 1.0", "codim2/test_places.py"),
@@ -606,7 +606,7 @@ TABLE = {
         "eigenvalues-beside-the-edge-of-the-band": ("\nFAR = 0.1\n", "\nFAR = 1e9\n", "stability/test_round_off.py"),
         "signs-by-the-edge-of-the-band": (
             "if own.factored == self._filled and abs(own.shift) > FAR * own.scale:", "if False:",
-            "stability/test_near_zero.py"),
+            "stability/test_round_off.py"),
         "constraints-are-miscounted": (
             "below = negative - self.constraints - drifts", "below = negative - self.constraints", INERTIA),
         "symmetries-are-no-zeros": (
@@ -618,7 +618,7 @@ TABLE = {
             "literature/test_cord.py continuation/test_index_chain.py"),
     },
     "rodfem/stability/motion_names.py": {
-        "round-off-is-a-rotation": ("LEAST = 1e-5", "LEAST = 0.0", "stability/test_mode_type.py"),
+        "round-off-is-a-rotation": ("LEAST = 1e-5", "LEAST = 0.0", "stability/test_frequencies.py"),
     },
     "rodfem/stability/near_zero.py": {
         "quotients-of-the-wrong-sign": (

@@ -12,11 +12,10 @@ import pytest
 from closed_forms import column as beck_value
 from hemitropic_cases import run_demo
 from mpi4py import MPI
-from numpy.polynomial import legendre
 from petsc4py import PETSc
 from PIL import Image
 from scipy.spatial.transform import Rotation
-from small_states import buckled, plain, scene
+from small_states import buckled, plain
 from small_states import solver as solver_of
 
 from rodfem.continuation.branch_solver import BranchSolver
@@ -74,19 +73,6 @@ def test_euler_column() -> None:
         sign = np.sign(modes.rotation[i, :, axis].sum())
         np.testing.assert_allclose(sign * modes.rotation[i], rotation, atol=1e-6)
         np.testing.assert_allclose(sign * modes.displacement[i], moved, atol=1e-6)
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-def test_straight_cord(formulation: str) -> None:
-    """Its fourth mode stays in the plane of the coil: rotation sqrt(2) sin 2 pi s, mu = (2 pi)^2 + lam."""
-    modes = modes_of(*state(scene("cord"), Discretization(formulation, 6, 6), 20.0), 4)
-    assert modes.value[3] == pytest.approx(4 * np.pi**2 + 20, rel=1e-8)
-    wave = 2 * np.pi * modes.s
-    sign = np.sign(modes.displacement[3, :, 0].sum())
-    np.testing.assert_allclose(sign * modes.rotation[3, :, 1], 2**0.5 * np.sin(wave), atol=2e-5)
-    np.testing.assert_allclose(sign * modes.displacement[3, :, 0], 2**0.5 * (1 - np.cos(wave)) / (2 * np.pi), atol=2e-5)
-    assert abs(modes.displacement[:, [0, -1], :2]).max() < 1e-12  # the end slides along e3
 
 
 def shape(mu: complex, P: float, s: np.ndarray, adjoint: bool) -> np.ndarray:
@@ -196,36 +182,6 @@ def test_motion_is_the_derivative_of_the_shape(name: str, formulation: str) -> N
     np.testing.assert_allclose(found.w, (turn[0] * turn[1].inv()).as_rotvec() / (2 * eps), atol=1e-6)
 
 
-def test_energy_along_an_unstable_mode() -> None:
-    """A cantilever past lateral buckling: turned along the mode it has the energy mu a^2/2 more, by plain numpy."""
-    P, d = 5.5, FINE
-    modes = modes_of(*state(classics.lateral(), d, P, 6), 2)
-    assert modes.value[0] < 0 < modes.value[1]
-    x, weights = legendre.leggauss(10)
-
-    def energy(q: np.ndarray) -> float:
-        total, k = 0.0, d.degree
-        for e in range(d.elements):
-            part = slice(e * k, (e + 1) * k + 1)
-            half = (modes.s[part][-1] - modes.s[part][0]) / 2
-            c = legendre.legfit((modes.s[part] - modes.s[part][0]) / half - 1, q[part], k)
-            p, slope = legendre.legval(x, c), legendre.legval(x, legendre.legder(c)) / half
-            size = (p * p).sum(axis=0)
-            curvature = 2 * (p[0] * slope[1:] - slope[0] * p[1:] - np.cross(p[1:].T, slope[1:].T).T) / size
-            d3 = 2 * (p[1] * p[3] + p[0] * p[2]) / size  # along the load, e1
-            total += half * weights @ (np.array([1, 10, 1]) @ curvature**2 / 2 - P * d3)
-        return total
-
-    q = Rotation.from_quat(np.roll(modes.q, -1, axis=1))
-    for i in range(2):
-        at = [
-            energy(np.roll((Rotation.from_rotvec(a * modes.rotation[i]) * q).as_quat(), 1, axis=1))
-            for a in (-1e-3, 0.0, 1e-3)
-        ]
-        assert (at[0] - 2 * at[1] + at[2]) / 1e-6 == pytest.approx(modes.value[i], rel=1e-4)
-        assert abs(at[2] - at[0]) < 1e-8  # an equilibrium
-
-
 # --- methods, symmetries, planes ---------------------------------------------------------------------------------
 
 
@@ -332,15 +288,6 @@ def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
     out = capfd.readouterr().out
     if MPI.COMM_WORLD.rank == 0:
         assert "count (as asked)" in out and "2 factorisations, " in out
-    for words, sentence in (
-        (("--at", "0.2", "--method", "magic"), "Unknown method 'magic'"),
-        (("--modes", "2"), "need loads to judge at"),
-        (("--at", "0.2", "--modes", "2", "--method", "count"), "Counting alone finds no modes"),
-    ):
-        with pytest.raises(SystemExit):
-            run_demo("--range", "0", "0.25", "--output", str(folder), *words)
-        err = capfd.readouterr().err
-        assert MPI.COMM_WORLD.rank or sentence in err
 
 
 @pytest.mark.long

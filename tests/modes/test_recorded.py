@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import classics
 import h5py
 import numpy as np
 import pytest
-from closed_forms import column as beck_value
 from modes.test_modes import shape
 
 import rodfem
@@ -19,8 +17,8 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.finder import FEWEST, ModeFinder
-from rodfem.modes.modes import SYMMETRY, Typical, typical_of
-from rodfem.problem.scene import Inertia, Scene
+from rodfem.modes.modes import Typical, typical_of
+from rodfem.problem.scene import Scene
 from rodfem.ranks import in_words
 from rodfem.report.page import payload_of
 
@@ -71,27 +69,6 @@ def test_a_double_eigenvalue_has_one_mode(folder: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_complex_pair_is_one_mode(folder: Path) -> None:
-    """Beck's column after flutter, P = 30, against the equation of its frequencies."""
-    found = recorded(classics.beck(span=(29.0, 30.0)), Plan(error_bars=False), folder, Discretization("auto", 6, 6))
-    (*_, last) = next(iter(found.values()))
-    mu = beck_value(50 + 150j, 30.0)
-    assert last.found is not None and sum(last.found.value.imag != 0) == 1
-    assert min(abs(last.found.value - mu)) < 1e-6 * abs(mu)
-
-
-def test_symmetries_come_last(folder: Path) -> None:
-    """A pinned rod that turns about its axis as a whole: a mode of torsion whose eigenvalue is zero at every load."""
-    found = recorded(classics.euler("pinned-pinned"), Plan((0.0, 5.0), depth=0, error_bars=False), folder)
-    for each in found["straight"]:
-        assert each.found is not None and each.found.motion.count(SYMMETRY) == 1
-        assert each.found.motion[-1] == SYMMETRY and each.found.value[-1] == 0.0
-        turning = each.found.rotation[-1]
-        np.testing.assert_allclose(abs(turning[:, 2]), abs(turning[0, 2]), rtol=1e-9)
-        assert abs(turning[:, :2]).max() < 1e-9 * abs(turning[0, 2])
-
-
-@pytest.mark.long
 def test_a_trace_is_the_same_with_and_without_them(folder: Path) -> None:
     """Modes are computed between two branches: nothing of the next one may depend on that, not even its last bit."""
     plan = Plan((0.0, 12.0), depth=2, error_bars=False)
@@ -124,11 +101,3 @@ def test_where_they_are_not_found_the_file_says_why(
     (shown,) = payload_of(folder)["branches"]
     assert list(shown["missed"].values()) == [sentence] * min(often, len(found))
     assert len(shown["modes"]) == max(len(found) - often, 0)
-
-
-@pytest.mark.long
-def test_a_rod_without_inertia_has_none(folder: Path) -> None:
-    nothing = Inertia(rho_A=lambda c: 0.0, rho_I=lambda c: (0.0, 0.0, 0.0))
-    scene = replace(classics.euler("clamped-free"), inertia=nothing)
-    found = recorded(scene, Plan((0.0, 2.0), depth=0, error_bars=False), folder)
-    assert found["straight"] == []

@@ -9,9 +9,8 @@ import classics
 import numpy as np
 import pytest
 import rescaled
-from hard.fuzz import wider
 
-from rodfem import Discretization, Parameter, Plan, Scene, Solver, trace
+from rodfem import Discretization, Parameter, Scene, Solver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.equilibria import at_load
 from rodfem.linalg.matrices import EPS, gathered
@@ -72,21 +71,6 @@ def test_what_an_eigensolver_leaves_open() -> None:
     off = replace(measured, discriminant=measured.discriminant * (1 + 1e-6))
     assert (left := noise_of(pencil, off)).discriminant_left == pytest.approx(1e-6 * measured.discriminant, rel=1e-3)
     assert left.of_discriminant >= left.discriminant + left.discriminant_left
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("low", "high"), [(85, 92), pytest.param(0, 100, marks=pytest.mark.long)])
-def test_flutter_of_steel_by_other_factors(low: int, high: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """MUMPS leaves 1e-10 of a flutter load in newtons; that is in its bar: with rows at each percent of the range."""
-    scene = wider.scene(14, 463)[0]
-    whole = scene.span[1]
-    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 1 + high - low)
-    scene = scene.varying("P", (low * whole / 100, high * whole / 100))
-    first, other = (
-        next(s for s in trace(scene, Discretization("pointwise", 12, 5, factors=how), Plan())[0].special if s.omega2)
-        for how in ("chain", "petsc")
-    )
-    assert abs(first.point.load - other.point.load) < other.error_estimate < 1e-8 * first.point.load
 
 
 @pytest.mark.parametrize(

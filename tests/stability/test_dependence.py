@@ -14,11 +14,8 @@ from rodfem import (
     Scene,
     Solver,
     StepControl,
-    at,
     clamped,
-    everywhere,
     pinned,
-    sliding,
     trace,
 )
 from rodfem.continuation.branch_solver import BranchSolver
@@ -64,14 +61,6 @@ def test_a_taut_rod_is_refused_on_any_mesh(formulation: str, mesh: tuple[int, in
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("mesh", meshes((5, 4), (9, 2)))
-def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
-    """To first order shear does not lengthen a straight rod either."""
-    with pytest.raises(SceneError, match="is taut"):
-        trace(shortened(rod="inextensible"), Discretization("pointwise", *mesh), PLAN)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("planar", [pytest.param("e2", marks=pytest.mark.alone), None])
 def test_a_range_that_ends_where_the_rod_is_taut(planar: str | None) -> None:
     """Its ends are as far apart as it is long at P = 0: nothing is missing there, and that is what is said."""
@@ -110,44 +99,3 @@ def test_a_state_given_is_looked_at_as_well() -> None:
         point = solver.equilibrium(float(load), point)
     with pytest.raises(SceneError, match="is taut"):
         solver.equilibrium(0.0, point)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("factors", ["chain", "petsc"])
-@pytest.mark.parametrize("mesh", meshes((4, 3), (5, 6), (7, 5)))
-def test_a_rod_that_is_held_twice_is_refused_on_any_mesh(mesh: tuple[int, int], factors: str) -> None:
-    """Straight, clamped at both ends and bent about d2 alone: ``k1 = 0`` says already how the one is turned about d1.
-
-    One of these meshes was traced, for Newton's method ended 1e-8 beside the straight state.
-    """
-
-    def energy(v: Any, k: Any, c: Any) -> Any:
-        return 0.5 * (1.3 * k[0] ** 2 + (k[1] - 0.4) ** 2 + 1.5 * k[2] ** 2) + 200 * (v[2] - 1) ** 2
-
-    held = everywhere(lambda x, c: x.k[0], strain=True)
-    ends = clamped(), sliding(lambda c: (None, None, None), force=lambda c: (0.05 * c.P, 0.0, -c.P))
-    tip = Ordinate("tip", s=1.0, of=lambda r, q: r[0])
-    rod = Scene("twice", (0.0, 1.0), "unshearable", energy, {"P": 0.0}, "P", ends, tip, (0.0, 1.0), constraints=(held,))
-    with pytest.raises(SceneError, match=r"depend on one another.*remove"):
-        trace(rod, Discretization("pointwise", *mesh, factors=factors), PLAN)
-    bent = rod.varying("P", (5.0, 6.0))  # bent about d2 the turn about d1 is no integral of k1 alone
-    assert trace(bent, Discretization("pointwise", *mesh, factors=factors), PLAN)[0].points[0].negative == 0
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_neither_units_nor_small_numbers_make_constraints_depend() -> None:
-    """Of a rod a nanometre long, in metres, and of a constraint that is multiplied by 1e-9."""
-    for length, small in ((1e-9, 1.0), (1.0, 1e-9), (1e6, 1e-9)):
-
-        def kept(x: Any, c: Any, small: float = small) -> Any:
-            return small * x.r[0]
-
-        scene = Scene(
-            "small", (0.0, length), "unshearable and inextensible",
-            lambda v, k, c, length=length: 0.5 * length * (k[0] ** 2 + 1.2 * k[1] ** 2 + k[2] ** 2), {"P": 0.0}, "P",
-            (clamped(), sliding(lambda c: (None, None, None), force=lambda c: (0.0, 0.0, -c.P))),
-            Ordinate("tip", s=length, of=lambda r, q: r[0]), (0.0, 1.0 / length),
-            constraints=(at(0.5 * length, kept),),
-        )  # fmt: skip
-        assert Solver(scene, Discretization("pointwise", 4, 4)).equilibrium(0.0).negative == 0

@@ -8,7 +8,7 @@ import pytest
 from closed_forms import tip
 from scipy.optimize import brentq
 
-from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, hinged, trace
+from rodfem import Discretization, Inertia, Ordinate, Scene, Solver, clamped, free, hinged
 from rodfem.forms.energy import bending_and_twist
 
 UNITS = [(1e4, 1e9, 1e3), (100.0, 1e7, 100.0), (300.0, 1e14, 3e5), (100.0, 1.0, 1.0), (1e-8, 2e-28, 1e-18)]
@@ -62,17 +62,6 @@ def test_each_method_finds_those_of_a_cantilever_under_thrust(units: tuple[float
         modes = solver.modes(point, 2)
         assert (abs(modes.value / of_value - exact) <= modes.error / of_value).all()
         assert (modes.error < 1e-5 * abs(modes.value)).all()
-
-
-@pytest.mark.long
-def test_a_spectrum_along_a_branch() -> None:
-    """The count of inertia and the frequencies of a row agree in any units."""
-    length, stiffness, mass = UNITS[0]
-    diagram = trace(cantilever(*UNITS[0]), Discretization("pointwise", 5, 7), Plan(depth=0, spectrum=2))
-    (special,) = diagram.special("branch point")
-    assert special.point.load == pytest.approx(np.pi**2 / 4 * stiffness / length**2, rel=1e-9)
-    first = diagram[0].points[0]
-    assert first.spectrum[0] == pytest.approx(12.362363368326239 * stiffness / (mass * length**4), rel=1e-8)
 
 
 @pytest.mark.few(1)

@@ -153,15 +153,3 @@ def test_spectrum_of_the_straight_rod(load: float) -> None:
     modes = SymmetricSolver(f.inertia).at(x).leftmost(8)
     np.testing.assert_allclose(modes.values, closed_form_hemitropic.spectrum(load, *DEFAULT)[:8], rtol=1e-7, atol=1e-9)
     assert modes.errors.max() < 1e-8
-
-
-@pytest.mark.long
-def test_spectrum_counts_as_inertia_does_along_branches() -> None:
-    """Sylvester's law: the number of negative eigenvalues does not depend on the metric."""
-    f = follower("reduced", 8, 6)
-    spectrum = SymmetricSolver(f.inertia)
-    for branch in explored("reduced", 8, 6):
-        for p in branch.points[1::6]:
-            if p.zero == branch.depth:
-                f.system.set_phase(p.x)
-                assert (spectrum.at(p.x).leftmost(6).values < -f.inertia.tolerance).sum() == p.negative

@@ -1,4 +1,4 @@
-"""Round-off of a quadratic form against its definition, entry by entry of a dense matrix."""
+"""Round-off of eigenvalues: of a quadratic form entry by entry, in wide bands, at states far from the rod's."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+import ufl
 from classics import column
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import Attachment, Solver, clamped, free
-from rodfem.continuation.first_equilibrium import first_equilibrium
+from rodfem import Attachment, Discretization, Ordinate, Scene, Solver, clamped, free
+from rodfem.continuation.first_equilibrium import examined, first_equilibrium, is_stable
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import NewtonResult
 from rodfem.linalg.matrices import rounding
 from rodfem.stability.inertia import Index
 from rodfem.stability.near_zero import decide, quotient_error, resolve
@@ -78,3 +81,28 @@ def test_a_band_wider_than_the_lowest_eigenvalue(place: float) -> None:
     for load, index in ((1.0, 0), (3.0, 1), (6.0, 2)):
         found = solver.inertia.at(first_equilibrium(solver, load)[0])
         assert (decide(found).index.negative, *resolve(found)) == (index, index, index)
+
+
+def stiffening(load: float) -> Scene:
+    """A cantilever that stiffens as ``cosh``, with a force at its tip."""
+    return Scene(
+        "stiffening", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: sum(ufl.cosh(x) - 1 for x in k),
+        {"P": 0.0}, "P", (clamped(), free(lambda c: (c.P, 0.0, 0.0))),
+        Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, load),
+    )  # fmt: skip
+
+
+@pytest.mark.long
+def test_the_band_of_a_far_state_is_not_kept() -> None:
+    """At curvatures of 100 the stiffness is 1e43, and all eigenvalues of such a state are round-off of one another."""
+    solver = Solver(stiffening(1.0), Discretization(elements=4, degree=4)).equilibria
+    system, x = solver.system, solver.start(0.5)
+    far = x.copy()
+    far.array[:] += 30 * np.sin(np.arange(len(far.array)))
+    system.set_load(far, 0.5)
+    with pytest.raises(ConvergenceError, match="out of all proportion"):
+        is_stable(solver, far)
+    assert examined(solver, far, NewtonResult(True, 1, 0.0, 0.0)) == (NewtonResult(False, 1, 0.0, 0.0), False)
+    assert is_stable(solver, x)
+    assert decide(solver.inertia.at(x)).band < 1e-3
+    assert system.verification.norm < 1e6

@@ -5,14 +5,13 @@ from __future__ import annotations
 import io
 from dataclasses import replace
 from functools import cache
-from math import atan2, exp, log, pi, sqrt
+from math import pi
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from classics import ROUND, SUPPORTS, circle, column, push
+from classics import SUPPORTS, column, push
 from continuation.test_index_chain import localised
 from mpi4py import MPI
 
@@ -22,7 +21,6 @@ from rodfem import (
     Ordinate,
     Parameter,
     Plan,
-    Ring,
     Scene,
     Solver,
     clamped,
@@ -31,10 +29,8 @@ from rodfem import (
     pinned,
     trace,
 )
-from rodfem.adaptivity.soft_states import SoftStates, _is_of_the_mesh
+from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import Point
-from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.pieces import UNDECIDED, UNSTABLE, pieces_of, typical_state
@@ -126,55 +122,12 @@ def test_what_no_mesh_decides_is_not_refined_again(k: float, last: float, monkey
     assert any(p.undecided for p in branch.points) == (k < 1e-8) and set(levels) == {0}
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("imperfection", [1e-9, -1e-9, 1e-6])
-def test_sections_that_are_nearly_round(imperfection: float) -> None:
-    """A circle turns its sections inside out at the cost of (B1 - B2)/2 sin^2 in the curvature 1, over 2 pi."""
-    scene = column(
-        "nearly round", Ring(), (0.0, 1.0), start=circle, constants={"B2": 1.0 + imperfection},
-        potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
-    )  # fmt: skip
-    point = Solver(scene, Discretization("pointwise", 8, 6)).equilibrium(0.0)
-    (mode,) = [m for m in point.soft if m.name == "turning of the cross-sections about d3"]
-    assert mode.decided and mode.value == pytest.approx(-2 * pi * imperfection, rel=1e-2)
-    assert point.negative == int(imperfection > 0)
-    turning = [m for m in point.soft if m is not mode]  # no pressure, no symmetry of the pressure
-    assert len(turning) == point.undecided == 2 and all("rotation about e" in m.name for m in turning)
-
-
 # --- a localised buckle ---------------------------------------------------------------------------------------------
 
 
 @cache
 def buckle(elements: int) -> Diagram:
     return trace(localised(), Discretization("reduced", elements, 6), Plan(at=(2900.0,), depth=1))
-
-
-def decay(diagram: Diagram, point: Point) -> float:
-    """Rate at which the buckle fades away along the rod, sqrt(T - M^2/4), by the moment at the clamp."""
-    sample = diagram.solvers[0].shape.sample(point.x)
-    (w, *v), (w1, *v1) = sample["q"][:2]
-    turned = np.array([w * w1 + np.dot(v, v1), *(w * np.array(v1) - w1 * np.array(v) - np.cross(v, v1))])
-    twist = 2 * atan2(turned[3], turned[0]) / float(sample["s"][1] - sample["s"][0])
-    return sqrt(point.load - (0.789 / 1.345 * twist) ** 2 / 4)
-
-
-@pytest.mark.long
-def test_sliding_costs_what_the_tails_of_a_buckle_tell() -> None:
-    """Its tails decay like exp(-delta s), and meet the clamps half a length away: mu ~ delta^2 exp(-delta)."""
-    diagram = buckle(40)
-    soft = [(decay(diagram, p), m) for p in diagram[1].points for m in p.soft]
-    assert len(soft) > 8 and {m.name for _, m in soft} == {SLIDING}
-    assert min(m.value for _, m in soft) < 2e-8
-    # one below 1e-8 is within what Newton's method leaves open of a state that is as good as singular
-    assert all(m.decided for _, m in soft if m.value > 1e-8)
-    assert {p.undecided for p in diagram[1].points if all(m.value > 1e-8 for m in p.soft)} == {0}
-    constant = [log(m.value) + delta - 2 * log(delta) for delta, m in soft[:8]]
-    assert np.ptp(constant) < 6e-3  # over a factor of 300 in the eigenvalue
-    for delta, m in soft:
-        assert abs(m.value - exp(np.mean(constant) - delta) * delta**2) < m.uncertainty + 0.01 * m.value
-    (asked,) = diagram.special("user", "branch 1")
-    assert "sliding along the rod, mu = 2.8e-06 +- " in str(asked.point.soft[0])
 
 
 @pytest.mark.long
@@ -282,26 +235,3 @@ def test_a_sign_that_is_the_error_of_the_mesh(elements: int) -> None:
         assert row.negative <= (row.load > 1) <= row.negative + row.undecided or row is point.point
     assert sum(row.undecided for row in found[0].points if row.load < 1.6) == 0
     assert any("the index is 0 or 1" in sentence for sentence in found.warnings)
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "of_the_mesh"),
-    [
-        (((0, 0), (0, 0)), ((1, 0), (1, 0)), False),
-        (((0, 1), (0, 1)), ((1, 1), (1, 1)), False),  # another mode is undecided all along
-        (((0, 1), (0, 1)), ((0, 1), (0, 1)), True),  # nothing changes that is decided
-        (((1, 0), (1, 0)), ((0, 1), (0, 1)), True),  # it may be 1 on both sides
-        (((0, 0), (0, 0)), ((0, 1), (1, 0)), False),  # a load asked for next to the branch point
-    ],
-)
-def test_a_zero_of_the_mesh_by_the_rows_beside_it(
-    before: tuple[tuple[int, int], ...], after: tuple[tuple[int, int], ...], of_the_mesh: bool
-) -> None:
-    """Rows by their decided index and what is undecided, on both sides of a branch point 0 -> 1, or 1 -> 0."""
-    rows = [SimpleNamespace(arclength=float(i), negative=n, undecided=u) for i, (n, u) in enumerate((*before, *after))]
-    change = (1, 0) if before[0][0] else (0, 1)
-    special = SimpleNamespace(
-        point=SimpleNamespace(arclength=1.5), kind=BRANCH_POINT, error_estimate=1e-3,
-        negative_before=change[0], negative_after=change[1],
-    )  # fmt: skip
-    assert _is_of_the_mesh(special, rows) == of_the_mesh  # type: ignore[arg-type]

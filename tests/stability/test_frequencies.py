@@ -1,14 +1,26 @@
-"""A light rod with a heavy body at its tip, under a follower thrust: infinite eigenvalues among the finite ones."""
+"""Frequencies under loads without a potential: none missing, none infinite, motions without rotation by name."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import pi
+
+import classics
 import numpy as np
 import pytest
+from hard.fuzz import wider
+from hard.fuzz.comparison import meshes
+from hard.fuzz.oracle import Oracle
 
 from rodfem import Attachment, Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
 from rodfem.forms.energy import bending_and_twist
+from rodfem.stability.motion_names import STRAIGHT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.spectrum import SHIFT
+
+pytestmark = pytest.mark.alone
+
+EA = 40.0
 
 
 def pushed(body: float) -> Scene:
@@ -49,19 +61,7 @@ def test_what_is_infinite_is_not_found(body: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
-def test_two_that_pass_one_another_stay_real() -> None:
-    """Those of the two planes do at P = 17.2383, where round-off, 1e-6 of them, made complex pairs of them."""
-    solver = Solver(pushed(1e6), Discretization(elements=6, degree=5))
-    pencils = NonsymmetricSolver(solver.equilibria.system)
-    for load in np.linspace(17.2382, 17.2384, 41):
-        found = pencils.at(solver.equilibrium(load).x).near(12, SHIFT)
-        assert (found.values.imag == 0).all()
-
-
-@pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
-@pytest.mark.alone
 def test_flutter() -> None:
     """Where the body that goes with an eigenvalue is stationary two of them coincide, as in waves along the column."""
     diagram = trace(pushed(1e6), Discretization(elements=6, degree=5), Plan(error_bars=False))
@@ -71,3 +71,51 @@ def test_flutter() -> None:
     assert body_of(P, 1.001 * omega2) == pytest.approx(body_of(P, 0.999 * omega2), rel=1e-4)
     assert not diagram.special("divergence")
     assert not diagram.warnings
+
+
+def check(found: np.ndarray, dense: np.ndarray) -> None:
+    """Compare the first real frequencies (k,) that were found with all (n,) by dense matrices."""
+    every = np.sort(dense.real)[: len(found)]
+    assert abs(found - every).max() < 1e-6 * every[-1]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [pytest.param(172, marks=pytest.mark.long), 175])
+def test_a_sweep_ends_where_the_rod_is_taut(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tension of a taut rod is any, and so are its frequencies: 115.9 and -21.7 were recorded for one state.
+
+    Nearly taut, the forces are the largest part of the vectors of some motions.
+    """
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 21)
+    scene = wider.scene(15, number)[0]
+    last = scene.span[0] / 5, scene.span[1]  # with a row every hundredth of the whole range
+    diagram = trace(scene, Discretization("auto", 5, 6), Plan(last, error_bars=False))
+    (branch,) = diagram
+    assert branch.ended.startswith("no frequencies at P = 0: Constraints depend on one another")
+    assert branch.ended in diagram.warnings
+    oracle = Oracle(diagram.solvers[0].system)
+    for point in branch.points[-3:]:
+        check(np.array([value for value, _ in point.omega2]), oracle.squares(point.x))
+
+
+@pytest.mark.long
+def test_no_pair_is_cut_in_two() -> None:
+    """The last of 14 eigenvalues at this load is one of a pair: 11 unstable ones were counted between 10 and 10."""
+    scene = wider.scene(16, 146)[0]
+    solver = Solver(scene, meshes(scene, 146)[0])
+    pencils, x = NonsymmetricSolver(solver.equilibria.system), solver.equilibrium(1.75).x
+    for number in range(4, 13):
+        found = pencils.at(x).near(number, SHIFT).values
+        assert number <= len(found) and (found.imag > 0).sum() == (found.imag < 0).sum() >= 2
+
+
+@pytest.mark.long
+def test_vibrations_along_a_rod() -> None:
+    """Of a clamped bar ``omega = (n - 1/2) pi sqrt(EA)``; round-off made "mixed" or "bending" of them."""
+    scene = replace(classics.shearable("flexible", 60.0, EA), inertia=classics.BEAM)
+    solver = Solver(scene, Discretization("pointwise", 6, 6))
+    pencil = NonsymmetricSolver(solver.equilibria.system).at(solver.equilibrium(0.0).x)
+    found = pencil.near_zero(6)
+    along = [i for i, kind in enumerate(found.kinds) if kind == STRAIGHT]
+    assert found.values[along].real == pytest.approx(((np.arange(5) + 0.5) * pi) ** 2 * EA, rel=1e-8)
+    assert {kind for kind in found.kinds if kind != STRAIGHT} == {"bending about d1", "bending about d2"}
