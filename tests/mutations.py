@@ -499,8 +499,8 @@ TABLE = {
     },
     "rodfem/output/files.py": {
         "moments-without-a-natural-size": (
-            '"length", "force", "moment", "energy")', '"length", "force",
-            "energy")', "output/test_files.py output/test_formats.py"),
+            '"length", "force", "moment", "energy")', '"length", "force", "energy")',
+            "output/test_files.py output/test_formats.py"),
         "another-row-is-restored": (
             "_trimmed(value[row])", "_trimmed(value[row - 1])",
             "output/test_files.py output/test_formats.py diagram/test_diagram.py"),
