@@ -293,7 +293,8 @@ TABLE = {
         "two-that-cross-may-meet": (
             "(products[:, i, j].real < -rounded) | ", "np.ones_like(D[:2], bool) | ",
             "diagram/test_all_frequencies.py"),
-        "divergence-numbered-across-collisions": ("if passed and not negative:", "if passed:", "literature/test_rods.py"),
+        "divergence-numbered-across-collisions": (
+            "if passed and not negative:", "if passed:", "literature/test_rods.py"),
         "divergence-of-rigid-motions": ("[self._still :]", "[0:]", "literature/test_free_rods.py"),
         "steps-are-not-parted": ("if self._parted == PARTS or", "if True or", "diagram/test_close_critical_loads.py"),
         "a-pole-is-a-divergence": ("        if pole:", "        if False:", "diagram/test_light_and_slow_rods.py"),
