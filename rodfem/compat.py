@@ -95,40 +95,21 @@ def move_vertices(mesh: Any, old: np.ndarray, new: np.ndarray) -> None:
 
 
 def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
-    """Mixed space of Lagrange elements on Gauss-Lobatto-Legendre nodes.
-
-    Each part is ``(continuous, degree, components)``; a part with one component is scalar.
-    """
+    """Mixed space of Lagrange elements on Gauss-Lobatto-Legendre nodes: parts (continuous, degree, components)."""
     if hasattr(basix, "ufl") and hasattr(basix.ufl, "mixed_element"):
+        lagrange, variant = ("Lagrange", mesh.basix_cell()), basix.LagrangeVariant.gll_warped
+        more = {"dtype": mesh.geometry.x.dtype}
         elements = [
-            basix.ufl.element(
-                "Lagrange",
-                mesh.basix_cell(),
-                degree,
-                basix.LagrangeVariant.gll_warped,
-                discontinuous=not continuous,
-                shape=(size,) if size > 1 else None,
-                dtype=mesh.geometry.x.dtype,
-            )
-            for continuous, degree, size in parts
+            basix.ufl.element(*lagrange, k, variant, shape=(n,) if n > 1 else None, discontinuous=not joined, **more)
+            for joined, k, n in parts
         ]
         element = basix.ufl.mixed_element(elements)
     else:
         cell = mesh.ufl_cell()
-        single = [
-            ufl.FiniteElement("Lagrange" if continuous else "DG", cell, degree) for continuous, degree, _ in parts
-        ]
-        element = ufl.MixedElement(
-            [ufl.VectorElement(e, dim=p[2]) if p[2] > 1 else e for e, p in zip(single, parts, strict=True)]
-        )
+        single = [(ufl.FiniteElement("Lagrange" if joined else "DG", cell, k), n) for joined, k, n in parts]
+        element = ufl.MixedElement([ufl.VectorElement(e, dim=n) if n > 1 else e for e, n in single])
     with compilation():  # the element itself is compiled
         return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
-
-
-def collapsed(space: Any) -> tuple[Any, np.ndarray]:
-    """A subspace as a space of its own, and the numbers in its parent of its degrees of freedom, (n,)."""
-    alone, numbers = space.collapse()
-    return alone, np.ravel(numbers).astype(np.int32)  # in newer releases a list of one array
 
 
 def nodes(degree: int) -> np.ndarray:
@@ -186,8 +167,7 @@ def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.
     """Add a real form to a PETSc matrix, without the final exchange between ranks.
 
     ``rows`` and ``columns`` are the global numbers of the local degrees of freedom, -1 for what is left out; the matrix
-    has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first.  ``form``
-    is a compiled bilinear form, and ``matrix`` has a pattern that holds all its entries.
+    has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first.
     """
     if not COMPLEX:
         fem.petsc.assemble_matrix(matrix, form)
@@ -216,10 +196,9 @@ def local_table(form: Any) -> sp.csr_matrix:
 
 
 class Integral(NamedTuple):
-    """An integral of a compiled form.
+    """An integral of a compiled form: its kernel, a function pointer of cffi, and ``entities`` (count, ``kind``).
 
-    ``kernel`` is the C function that computes the tensor of one entity, a function pointer of cffi; ``entities``
-    (count, ``kind``) are a cell each, with a facet on the boundary, of both sides inside.
+    An entity is a cell, with a facet on the boundary, of both sides inside.
     """
 
     kernel: Any
@@ -259,7 +238,7 @@ def pack_constants(form: Any) -> np.ndarray:
 
 @contextmanager
 def compilation() -> Iterator[None]:
-    """Compile with rodfem's options alone, and without the chatter of FFCx and of setuptools, which runs the compiler.
+    """Compile with rodfem's options alone, and without the chatter of FFCx and of setuptools.
 
     FFCx and dolfinx also read options from files of the current folder and of the home folder; their tolerances would
     change the equations.
@@ -280,10 +259,10 @@ def compilation() -> Iterator[None]:
 
 @contextmanager
 def slepc_errors() -> Iterator[None]:
-    """Have the errors of SLEPc's functions raised as :class:`PETSc.Error`, whatever slepc4py makes of them.
+    """Have the errors of SLEPc's functions raised as :class:`PETSc.Error`.
 
-    Its functions set the exception and return a value all the same where petsc4py's check is compiled to another
-    convention (3.25.1 on Debian sid).  Python makes a SystemError of that, with the exception as its cause.
+    Where petsc4py's check is compiled to another convention (3.25.1 on Debian sid) slepc4py sets the exception and
+    returns a value all the same: Python makes a SystemError of that, with the exception as its cause.
     """
     try:
         yield

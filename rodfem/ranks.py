@@ -35,7 +35,7 @@ PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
 def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
     """Do something on the first rank, and raise its :class:`InputError` on every rank.
 
-    The others sleep meanwhile: waiting for a message they would keep a processor busy that the first one can use.
+    The others sleep meanwhile: waiting for a message they would keep a processor busy.
     """
     trouble: InputError | None = None
     if comm.rank == 0:

@@ -81,9 +81,10 @@ class GaveUpError(ConvergenceError):
 
 
 class Elimination:
-    """The compiled elimination of matrices with one pattern, given as arrays.
+    """The compiled elimination of matrices with one pattern (``starts``, ``indices``), in the order of a sequence.
 
-    ``regular`` is false where the last matrix was exactly singular.
+    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia). ``regular`` is false where the last matrix was exactly
+    singular.
     """
 
     def __init__(
@@ -93,11 +94,6 @@ class Elimination:
         indices: np.ndarray,
         order: tuple[np.ndarray, np.ndarray],
     ) -> None:
-        """Find the fronts of the pattern (``starts``, ``indices``); the ``order`` is that of :func:`sequence`.
-
-        ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  Raises :class:`MemoryError` where there is no
-        room.
-        """
         compiled = module("linalg/chain")
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self.rows, self.regular = len(starts) - 1, False
@@ -126,10 +122,7 @@ class Elimination:
         return [int(self.ffi.cast("uintptr_t", address)) for address in found]
 
     def factor(self, values: np.ndarray) -> None:
-        """Eliminate; raises :class:`GaveUpError` where the matrix is no chain.
-
-        Raises :class:`ConvergenceError` where it holds what is no number.
-        """
+        """Eliminate; raises :class:`GaveUpError` where the matrix is no chain."""
         values = np.ascontiguousarray(values.real)
         status = self.lib.chain_factor(self._chain, buffer(self.ffi, values))
         self.regular = status == 0
@@ -146,7 +139,7 @@ class Elimination:
         self.lib.chain_sizes(self._chain, buffer(self.ffi, sizes))
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
+        """Solutions (n, k) for ``right`` (n, k)."""
         right = np.asarray(right, dtype=float, order="F")
         out = np.empty_like(right)
         if self.lib.chain_solve(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
@@ -174,11 +167,12 @@ class Elimination:
 
 
 class Chain:
-    """:class:`~rodfem.linalg.factorization.Factors` of matrices with one pattern, on one rank.
+    """Factors of matrices with one pattern, on one rank, whose last ``border`` rows may couple to all others.
 
-    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  The last ``border`` rows of a matrix may couple to
-    all others.  ``regular`` is false where the last one was exactly singular; ``elimination`` has its factors.  A
-    matrix on which the elimination gives up is factored by the last resort; ``times`` is the number of those.
+    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia); ``sizes`` returns the natural sizes of the unknowns,
+    None where they are one. ``regular`` is false where the last one was exactly singular; ``elimination`` has its
+    factors. A matrix on which the elimination gives up is factored by the last ``resort``, without one
+    :class:`GaveUpError` is raised; ``times`` is the number of those.
     """
 
     def __init__(self, kind: str, border: int, resort: Mumps | None = None, sizes: Sizes | None = None) -> None:
@@ -187,7 +181,7 @@ class Chain:
         self._matrix: PETSc.Mat | None = None
 
     def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` where it holds what is no number."""
+        """Factor ``matrix``."""
         self.resorted = False
         self.prepare(matrix)
         try:
@@ -231,10 +225,7 @@ class Chain:
 
 
 def package(prefix: str) -> str:
-    """Name of what factors a rod's matrices: PETSc's option with the prefix, or what is best.
-
-    Raises :class:`InputError` for another name.
-    """
+    """Name of what factors a rod's matrices: PETSc's option with the prefix, or what is best."""
     best = MUMPS if np.issubdtype(PETSc.ScalarType, np.complexfloating) else CHAIN
     name = str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
     if name not in (CHAIN, MUMPS):
@@ -246,8 +237,6 @@ def factors_of(kind: str, comm: MPI.Comm, unknowns: int, scalars: int, sizes: Si
     """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
 
     Those of another matrix, of 0 unknowns, and on several ranks are MUMPS's, which is the last resort of the others.
-    ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.  ``sizes`` are those of the unknowns,
-    where they are not one.
     """
     mumps = Mumps(kind, sizes)
     if not unknowns or package(mumps.prefix) == MUMPS or comm.size > 1:

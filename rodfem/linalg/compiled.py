@@ -73,11 +73,7 @@ class Memory:
 
 
 def buffer(ffi: Any, values: np.ndarray) -> Any:
-    """Pointer to ``values``, numbers of float64 or int32, which live as long as it does.
-
-    They are contiguous, by rows or by columns.  Raises :class:`ValueError` for others, of which C would read something
-    else.
-    """
+    """Pointer to contiguous ``values`` of float64 or int32, which live as long as it does; others raise ValueError."""
     kind = {"d": "double[]", "i": "int[]"}.get(values.dtype.char)
     if kind is None:
         raise ValueError(f"C has no numbers of type {values.dtype}: hand over float64 or int32.")
@@ -94,11 +90,7 @@ def compile_ahead(*names: str) -> None:
 
 @cache
 def module(name: str) -> Any:
-    """The compiled module of the file ``name.c`` in the package, with ``lib`` and ``ffi`` of cffi.
-
-    Raises what the compiler raises, and :class:`SetupError` where there is no compiler, or where the cache lacks the
-    module and cannot be written.
-    """
+    """The compiled module of the file ``name.c`` in the package, with ``lib`` and ``ffi`` of cffi."""
     full = _full_name(name)
     if full in _JOBS:
         _JOBS.pop(full).wait()

@@ -75,7 +75,7 @@ class Factors(Protocol):
 
 
 class Mumps:
-    """Factors by MUMPS, on all ranks of a matrix.
+    """Factors ``lu``, or ``cholesky`` (LDL^t), by MUMPS, on all ranks of a matrix.
 
     Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
     takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
@@ -130,7 +130,7 @@ class Mumps:
             out.pointwiseMult(out, sizes)
 
     def solve_all(self, right: np.ndarray) -> np.ndarray:
-        """Solutions for all columns of ``right`` (own rows, k) at once: a column costs much less than a call."""
+        """Solutions for all columns of ``right`` (own rows, k) at once."""
         sizes = np.ones(len(right)) if self.sizes is None else self.sizes().array_r.real
         columns, out = (self._dense(right.shape[1]) for _ in range(2))
         columns.getDenseArray()[:] = right * sizes[:, None]

@@ -113,13 +113,7 @@ def _petsc() -> tuple[Any, Any]:
 
 
 class Entries:
-    """Entries of an AIJ matrix on one rank whose pattern stays, without the search that PETSc makes for each.
-
-    Attributes
-    ----------
-    starts, columns
-        Pattern of the rows, with columns in ascending order.
-    """
+    """Entries of an AIJ matrix on one rank whose pattern (``starts``, sorted ``columns``) stays."""
 
     def __init__(self, matrix: PETSc.Mat) -> None:
         self.matrix = matrix

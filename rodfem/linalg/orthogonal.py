@@ -16,10 +16,7 @@ def generic(numbers: np.ndarray, which: int = 0) -> np.ndarray:
 
 
 def project_out(vector: PETSc.Vec, basis: Sequence[PETSc.Vec], metric: PETSc.Mat, times: int = 1) -> None:
-    """Make ``vector`` orthogonal to orthonormal ones, in place; done ``times`` two also where little of it is left.
-
-    The ``basis`` is orthonormal in the ``metric`` (n, n), as is the result.
-    """
+    """Make ``vector`` orthogonal to an orthonormal ``basis`` in a metric, in place; twice where little may be left."""
     for _ in range(times):
         for other in basis:
             vector.axpy(-(metric * other).dot(vector), other)

@@ -59,9 +59,7 @@ class Modes:
     s: np.ndarray  #: arclength (m,)
     r: np.ndarray  #: centreline (m, 3)
     q: np.ndarray  #: unit quaternions (m, 4)
-    value: (
-        np.ndarray
-    )  #: eigenvalues mu = omega^2 (K,), complex without a potential; zeros of symmetries last
+    value: np.ndarray  #: eigenvalues mu = omega^2 (K,), complex without a potential; zeros of symmetries last
     residual: np.ndarray  #: backward errors of the eigenpairs (K,); nan for symmetries
     error: np.ndarray  #: estimated errors of the discretisation (K,); nan where not estimated, and for symmetries
     motion: tuple[str, ...]  #: what each does: SYMMETRY, bending about a director, torsion, or a mixture

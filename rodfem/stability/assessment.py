@@ -49,9 +49,7 @@ class Verdict:
 
     negative: int  #: index, or number of unstable eigenvalues
     zero: int  #: number of zero eigenvalues, symmetry modes included
-    values: (
-        np.ndarray
-    )  #: left-most mu = omega^2 (nearest zero, without a potential), without symmetry modes
+    values: np.ndarray  #: left-most mu = omega^2 (nearest zero, without a potential), without symmetry modes
     vectors: list[PETSc.Vec]  #: without multipliers if constraints were reduced; none without a potential
     errors: np.ndarray  #: backward errors
     band: float  #: half width of the interval about zero, in the metric, in which inertia alone decides nothing

@@ -67,7 +67,8 @@ def fields(number: int, a: float = 0.0, b: float = 1.0) -> tuple[fem.Function, N
     space = compat.mixed_space(mesh, [(True, DEGREE, number)])
     at = []
     for i in range(number):
-        part, inside = compat.collapsed(space.sub(0).sub(i))
+        part, numbers = space.sub(0).sub(i).collapse()
+        inside = np.ravel(numbers).astype(np.int32)  # in newer releases a list of one array
         s = np.asarray(part.tabulate_dof_coordinates())[:, 0]
         at.append(inside[np.argsort(s)])
     return fem.Function(space, dtype=compat.REAL), np.array(at)
