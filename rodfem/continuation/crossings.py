@@ -6,18 +6,16 @@ Between two states with the same border the cubic Hermite interpolant of ``H``, 
     H(t) = A0 + A1 t + A2 t^2 + A3 t^3,      0 <= t <= 1,
 
 is singular at the eigenvalues of a pencil of order 3k: all of them at once.  A real one is a crossing, of whatever
-kind: several at one place, opposite ones, pairs that cancel, folds.  A complex one near the axis is a pair that the
-interpolant does not tell from a near miss, and asks for one state more, as do several in one piece, and a change of the
-index across the border, by which the piece is too long for it.
+kind.  A complex one near the axis is a pair that the interpolant does not tell from a near miss, and asks for one state
+more, as do several in one piece, and a change of the index across the border, by which the piece is too long for it.
 
 Most pieces have none, and one test says so: in the eigenvectors of ``H(0) + H(1)`` all four control matrices of
 Bernstein have a positive definite block, and a negative definite one.  Then so has each of their means, and a matrix of
 this shape is regular.
 
 The cubic through nodes at a and b is off by ``(s - a)^2 (s - b)^2 H''''/4!``.  A third node shows the fourth
-derivative: the row before, by the cubic that is extrapolated, or a state in the piece.  If what that leaves open may
-hide a crossing, the piece is divided: the blocks are definite with that margin, and an eigenvalue that passes zero is
-faster than the margin changes.
+derivative: the row before, or a state in the piece.  If what that leaves open may hide a crossing, the piece is
+divided: the blocks are definite with that margin, and an eigenvalue that passes zero is faster than the margin changes.
 """
 
 from __future__ import annotations
@@ -37,13 +35,10 @@ from rodfem.tolerances import TINY
 
 AXIS, REAL = 0.4, 1e-6
 """Imaginary parts of a root, in pieces: below the first it may be a pair of crossings, below the second it is real."""
-DEEPEST = 8
-"""Divisions of a piece."""
-SHORTEST = 1e-8
-"""Length of a piece, in the metric, that is not divided."""
+DEEPEST, SHORTEST = 8, 1e-8
+"""Divisions of a piece, at most; length of a piece, in the metric, that is not divided."""
 SAFE = 10.0
-"""Times the fourth derivative at one place that bounds it in a piece, and what the cubic is off that is less than the
-rate of an eigenvalue which passes zero once."""
+"""Times the fourth derivative at one place that bounds it in a piece, and what the cubic is off against rates."""
 PLACES = np.linspace(0.02, 0.98, 49)
 """Where other eigenvalues are compared with zero, in pieces."""
 
@@ -83,16 +78,10 @@ def coefficients(a: Node, b: Node) -> list[np.ndarray]:
     return [a.H, h * a.slope, 3 * d - h * (2 * a.slope + b.slope), h * (a.slope + b.slope) - 2 * d]
 
 
-def at(a: Node, b: Node, t: float) -> np.ndarray:
-    """The cubic at t."""
+def at(a: Node, b: Node, t: float, order: int = 0) -> np.ndarray:
+    """The cubic at t, or its derivative."""
     A = coefficients(a, b)
-    return np.asarray(A[0] + t * (A[1] + t * (A[2] + t * A[3])))
-
-
-def rate(a: Node, b: Node, t: float) -> np.ndarray:
-    """Its derivative in t."""
-    A = coefficients(a, b)
-    return np.asarray(A[1] + t * (2 * A[2] + 3 * t * A[3]))
+    return np.asarray(A[1] + t * (2 * A[2] + 3 * t * A[3]) if order else A[0] + t * (A[1] + t * (A[2] + t * A[3])))
 
 
 def roots(a: Node, b: Node) -> np.ndarray:
@@ -121,7 +110,7 @@ def fourth(a: Node, b: Node, c: Node) -> np.ndarray:
     h, left, right = b.s - a.s, c.s - a.s, c.s - b.s
     steep = 2 * abs(left * right) * max(abs(left + right), h / 2)  # in the middle slopes do not tell
     out = np.zeros_like(c.H)
-    for off, scale in ((c.H - at(a, b, left / h), (left * right) ** 2), (c.slope - rate(a, b, left / h) / h, steep)):
+    for off, scale in ((c.H - at(a, b, left / h), (left * right) ** 2), (c.slope - at(a, b, left / h, 1) / h, steep)):
         values, vectors = np.linalg.eigh(off)
         out += vectors * abs(values) @ vectors.T / scale  # (off^2)^(1/2)
     return out
@@ -144,21 +133,14 @@ def clear(a: Node, b: Node, off: np.ndarray | None) -> bool:
 
 @dataclass
 class Zeros:
-    """Finds crossings; ``solve`` makes a node between two others.
+    """Finds crossings."""
 
-    Eigenvalues of several modes that are within the ``tolerance`` of zero at one place pass it there.  ``misses`` are
-    nodes at which an eigenvalue is nearly zero, and does not pass it.
-    """
-
-    solve: Callable[[Node, Node, float], Node | None]
-    tolerance: float
-    misses: list[Node] = field(default_factory=list)
+    solve: Callable[[Node, Node, float], Node | None]  # makes a node between two others
+    tolerance: float  # of eigenvalues of several modes that pass zero at one place
+    misses: list[Node] = field(default_factory=list)  # where an eigenvalue is nearly zero, and does not pass it
 
     def between(self, a: Node, b: Node, size: np.ndarray | None = None, depth: int = 0) -> list[Crossing]:
-        """All crossings between two nodes ``a``, ``b``, of a piece that was divided ``depth`` times.
-
-        ``size`` is that of the :func:`fourth` derivative; None if it is not known.
-        """
+        """All crossings in a piece divided ``depth`` times, by the ``size`` of its :func:`fourth` derivative."""
         off = None if size is None else SAFE * (b.s - a.s) ** 4 / 16 * size
         if clear(a, b, off):
             return []
@@ -178,22 +160,18 @@ class Zeros:
 
 def _passed(a: Node, b: Node, groups: list[list[float]]) -> list[Crossing]:
     """Crossings at the roots of the cubic, in ``groups``."""
-    out, index, h = list[Crossing](), a.index, b.s - a.s
+    out, after, h = list[Crossing](), a.index, b.s - a.s
     for group in groups:
         own, rates = _passing(a, b, group)
-        after = index - int(np.sign(rates).sum())
-        out.append(Crossing(a.s + float(np.mean(group)) * h, own, index, after, (a, b), (group[-1] - group[0]) * h))
-        index = after
+        before, after = after, after - int(np.sign(rates).sum())
+        out.append(Crossing(a.s + float(np.mean(group)) * h, own, before, after, (a, b), (group[-1] - group[0]) * h))
     return out
 
 
 def _division(
     a: Node, b: Node, found: np.ndarray, groups: list[list[float]], off: np.ndarray | None
 ) -> tuple[float | None, bool]:
-    """Where a piece is to be divided, None if it need not, and whether that is at a near miss of zero.
-
-    All ``found`` roots of the cubic are given, the ``groups`` of real ones, and how far it may be ``off``.
-    """
+    """Where a piece is to be divided, None if it need not, and whether that is at a near miss of zero."""
     if a.far == b.far and len(groups) > 1:
         _, last, first = max((q[0] - p[-1], p[-1], q[0]) for p, q in pairwise(groups))
         return float(np.clip((last + first) / 2, 0.01, 0.99)), False
@@ -222,20 +200,17 @@ def _passing(a: Node, b: Node, group: list[float]) -> tuple[np.ndarray, np.ndarr
     t = float(np.mean(group))
     values, vectors = np.linalg.eigh(at(a, b, t))
     own = vectors[:, np.argsort(abs(values))[: len(group)]]
-    return own, np.linalg.eigvalsh(own.T @ rate(a, b, t) @ own)
+    return own, np.linalg.eigvalsh(own.T @ at(a, b, t, 1) @ own)
 
 
 def together(a: Node, b: Node, found: np.ndarray, tolerance: float) -> list[list[float]]:
-    """Crossings between nodes ``a``, ``b`` among the roots that are ``found``, in order.
-
-    Those of different modes that are one point within the ``tolerance`` are a group.
-    """
+    """Real roots in order; those of different modes that are one point within the ``tolerance`` are a group."""
     out: list[list[float]] = []
     before, fast = np.zeros(len(a.H)), 0.0
     for t in np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)]).tolist():
         values, vectors = np.linalg.eigh(at(a, b, t))
         v = vectors[:, abs(values).argmin()]
-        speed, apart = abs(float(v @ rate(a, b, t) @ v)), t - out[-1][-1] if out else 1.0
+        speed, apart = abs(float(v @ at(a, b, t, 1) @ v)), t - out[-1][-1] if out else 1.0
         alike = abs(v @ before) >= 0.9 and apart * (b.s - a.s) >= 1e-12  # one mode, at two places
         if out and apart * max(speed, fast) <= tolerance and not alike:
             out[-1].append(t)

@@ -15,7 +15,7 @@ k modes that are to vanish together, and N the others, which are near by.  What 
 
 An imperfection, however small, takes a branch point apart: of ``A xi^3 + B lam xi + eps = 0`` no point is singular
 *and* has a derivative in the load that vanishes.  With the unfolding parameters ``beta`` (Moore, SIAM J. Numer. Anal.
-17 (1980) 567-576) it is regular again, and they measure the imperfection: ``-eps`` above, round-off at a branch point.
+17 (1980) 567-576) it is regular again, and they measure the imperfection: ``-eps`` above.
 
 Newton's step is ``dx = s + dlam w + sum_j xi_j V_j``, which changes
 
@@ -28,19 +28,17 @@ Newton's step is ``dx = s + dlam w + sum_j xi_j V_j``, which changes
 
 the derivatives by central differences, whose errors do not enter the converged result.
 
-*In two parameters* solutions form curves.  The second parameter ``t`` has a response ``w`` and a ``b``, too, and one
-more equation is that of a plane across the curve.  Without it the null vector ``(dlam, dt, xi)`` of the rows is the
-tangent.  For folds they are regular also at a *cusp*, where ``V.y = 0`` and neither parameter changes (Doedel, Keller &
-Kernevez, Int. J. Bifurcation Chaos 1 (1991) 493-520); but not where ``b = 0`` for both parameters: there the fold ends
-on a branch point.  Along a curve of branch points ``lam`` leads across it, and ``b_z`` changes by minus the rate of the
-eigenvalue, times ``xi``: because of the symmetry ``s`` and ``w`` have no part along the null vectors.  No difference is
-taken in a parameter, which next to its bounds may make no sense.
+*In two parameters* solutions form curves.  The second one, ``t``, has a response ``w`` and a ``b``, too, and one more
+equation is that of a plane across the curve.  Without it the null vector ``(dlam, dt, xi)`` of the rows is the tangent,
+at a *cusp* of folds as well, where ``V.y = 0`` and neither parameter changes (Doedel, Keller & Kernevez, Int. J.
+Bifurcation Chaos 1 (1991) 493-520).  Where ``b = 0`` for both parameters a fold ends on a branch point.  Along a curve
+of branch points ``lam`` leads across it, and ``b_z`` changes by minus the rate of the eigenvalue, times ``xi``: because
+of the symmetry ``s`` and ``w`` have no part along the null vectors.
 
-*Divergence* under loads without a potential: S is not symmetric.  The columns of the border are ``M`` times the left
-null vectors, its rows ``M`` times the right ones; the left ones ``W`` of the transposed equations take the place of
-``V`` in ``b``, ``f`` and ``q``, and ``S^t W`` that of ``S V`` in ``r`` and ``y`` (Govaerts, *Numerical Methods for
-Bifurcations of Dynamical Equilibria*, SIAM 2000, chapters 3 and 4).  No square root appears where divergence meets
-flutter, a double zero eigenvalue with one null vector: S is as singular there as elsewhere.
+*Divergence* under loads without a potential: S is not symmetric.  The border has ``M`` times the left null vectors as
+columns and ``M`` times the right ones as rows; the left ones ``W`` of the transposed equations take the place of ``V``
+in ``b``, ``f`` and ``q``, and ``S^t W`` that of ``S V`` in ``r`` and ``y`` (Govaerts, *Numerical Methods for
+Bifurcations of Dynamical Equilibria*, SIAM 2000, chapters 3 and 4).
 """
 
 from __future__ import annotations
@@ -72,16 +70,14 @@ Vectors = Sequence[PETSc.Vec]
 class Section:
     """Plane ``weight t + row . dx = 0`` across a curve of singular states; ``t = 0`` without a ``row`` (n,).
 
-    The load of a state stands for what is on the ``line`` of t, and t for what is on the ``second`` line of the load;
-    both are one in natural size, and zero at the state that :meth:`SingularSystem.solve` begins with.  The ``reach``
-    bounds the distance from there.
+    Load and t are one in natural size, and zero at the state that :meth:`SingularSystem.solve` begins with.
     """
 
-    line: Callable[[float], Line]
-    second: Callable[[float], Line]
+    line: Callable[[float], Line]  # of the load, at a t
+    second: Callable[[float], Line]  # of t, at a load
     weight: float
     row: PETSc.Vec | None
-    reach: float
+    reach: float  # bound of the distance from there
 
 
 @dataclass(frozen=True)
@@ -103,18 +99,14 @@ class Curve:
 
 @dataclass(frozen=True)
 class SingularState:
-    """A solution of the singular system: a state ``x`` with null ``vectors`` of metric norm 1.
-
-    The unfolding parameters ``beta`` (k,) are relative to the metric, as eigenvalues are: an eigenvalue times an
-    amplitude in radian.
-    """
+    """A solution of the singular system: a state ``x`` with null ``vectors`` of metric norm 1."""
 
     x: PETSc.Vec
     load: float
     vectors: list[PETSc.Vec]
     response: PETSc.Vec  # change of state with the load, the null vectors left out
-    beta: np.ndarray
-    noise: float  # round-off of their size
+    size: float  # of the unfolding parameters in the metric: an eigenvalue times an amplitude in radian
+    noise: float  # round-off of that
     directions: list[PETSc.Vec]  # unit vectors along both branches that cross, of one null vector
     rate: float  # derivative of the eigenvalue along the response
     spread: float  # what several eigenvalues, whose mean vanishes, differ from that
@@ -123,11 +115,6 @@ class SingularState:
     last: PETSc.Vec  # what Newton's method leaves of the state
     second: float  # the second parameter
     curve: Curve | None  # with two parameters
-
-    @property
-    def size(self) -> float:
-        """Size of the unfolding parameters."""
-        return float(np.linalg.norm(self.beta))
 
 
 @dataclass(frozen=True)
@@ -142,6 +129,7 @@ class _Linear:
     left: list[PETSc.Vec]
     y: PETSc.Vec
     f: np.ndarray
+    rows: np.ndarray  # (m + 1, 1 + parameters + m): their products with (1, share) are to vanish
 
     @property
     def V(self) -> list[PETSc.Vec]:
@@ -156,13 +144,8 @@ class _Linear:
         return self.border[:, -len(self.border) :]
 
 
-@dataclass(frozen=True)
-class _Step:
-    """Newton's step ``dx``: the ``share`` (parameters + m,) of parameters and modes, by ``rows`` of equations."""
-
-    dx: PETSc.Vec
-    share: np.ndarray
-    rows: np.ndarray
+Step = tuple[PETSc.Vec, np.ndarray]
+"""Newton's step of the state, and its share (parameters + m,) of parameters and modes."""
 
 
 class SingularSystem:
@@ -190,15 +173,11 @@ class SingularSystem:
 
     def relaxed(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
         """Modes of the border and left ones, relaxed at a state: a step of inverse iteration."""
-        self._factor(self.inertia.at(x).matrix)
-        sides = [self._modes(bordered)[0] for bordered in self._bordered]
+        sides, *_ = self._modes(self.inertia.at(x).matrix)
         return sides[0], sides[-1]
 
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
-        """Newton's method from a state, on a curve in a ``section`` across it; None where there is no solution near by.
-
-        With a section the load in ``x`` is zero, and the line of the system's parameters changes.
-        """
+        """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
         found = self._newton(x, section)
         return None if found is None else self._state(*found)
 
@@ -207,26 +186,27 @@ class SingularSystem:
         found = self._newton(x, section)
         if found is None:
             return None
-        x, t, _, step = found
-        return x, np.array([self.system.scalar(x), t]), step.share[:2]
+        x, t, _, (_, share) = found
+        return x, np.array([self.system.scalar(x), t]), share[:2]
 
-    def _newton(self, x: PETSc.Vec, section: Section | None) -> tuple[PETSc.Vec, float, _Linear, _Step] | None:
+    def _newton(self, x: PETSc.Vec, section: Section | None) -> tuple[PETSc.Vec, float, _Linear, Step] | None:
         """The solution, its second parameter, and the last step, as it was linearised."""
         self._section = section
         start, x, t, moved = x, x.copy(), 0.0, 0.0
         at: _Linear | None = None
-        step: _Step | None = None
+        step: Step | None = None
 
         def iteration(fresh: bool) -> Correction | None:
             nonlocal at, step, t, moved
             try:  # on a curve third derivatives, which cost most, serve again where corrections shrink tenfold
                 at = self._linear(x, t, at if section and not fresh else None)
-                step = self._step(at, self._equations(x, at), x - start, t)
+                dx, share = step = self._step(at, x - start, t)
             except (ConvergenceError, np.linalg.LinAlgError):
                 return None
-            size = self._length(step)
-            x.axpy(1.0, step.dx)
-            t += step.share[1] if section else 0.0
+            size = self.system.norm(dx)
+            if section:  # the metric of the state, and both parameters
+                size, t = float(np.sqrt(dx.dot(self.inertia.metric * dx) + (share[:2] ** 2).sum())), t + share[1]
+            x.axpy(1.0, dx)
             moved += size
             return Correction(moved, size)
 
@@ -234,28 +214,18 @@ class SingularSystem:
         outcome = newton(iteration, Limits(reach=reach, lost=lambda: self._lost(x, at, step)))
         if not outcome.converged or at is None or step is None:
             return None
-        step.dx.scale(outcome.error if outcome.error < TOLERANCE else 1.0)  # what convergence leaves, or round-off
+        step[0].scale(outcome.error if outcome.error < TOLERANCE else 1.0)  # what convergence leaves, or round-off
         return x, t, at, step
 
-    def _lost(self, x: PETSc.Vec, at: _Linear | None, step: _Step | None) -> bool:
+    def _lost(self, x: PETSc.Vec, at: _Linear | None, step: Step | None) -> bool:
         """Whether round-off of the eigenvalue at ``x`` moves the load by as much as a step to a branch point."""
         if self.fold or self._section is not None or at is None or step is None:
             return False
-        found = self.inertia.at(x)
-        noise = max(found.noise(combine(at.V, z)) for z in at.Z.T)
-        return bool(abs(self.system.scalar(step.dx) * step.rows[-1, 1]) <= noise * self.count)
-
-    def _length(self, step: _Step) -> float:
-        """Size of a step: in the metric, or in that of the state and in both parameters."""
-        if self._section is None:
-            return self.system.norm(step.dx)
-        return float(np.sqrt(step.dx.dot(self.inertia.metric * step.dx) + (step.share[:2] ** 2).sum()))
+        noise = max(self.inertia.at(x).noise(combine(at.V, z)) for z in at.Z.T)
+        return bool(abs(self.system.scalar(step[0]) * at.rows[-1, 1]) <= noise * self.count)
 
     def _at(self, x: PETSc.Vec, t: float, *, moved: bool = False) -> Factored:
-        """S at a state and a second parameter; ``moved`` from the last state, with its phase conditions.
-
-        Changes of these are felt by no vector without drift.
-        """
+        """S at a state and a second parameter; ``moved`` from the last state, with its phase conditions."""
         if self._section is not None:
             self.system.line = self._section.line(t)
         return self.inertia.moved(x) if moved else self.inertia.at(x)
@@ -268,8 +238,8 @@ class SingularSystem:
         self.system.line = self._section.second(self.system.scalar(x))
         return self.inertia.at(there).border.copy()
 
-    def _factor(self, matrix: PETSc.Mat) -> int:
-        """Factor the bordered matrix, and its transpose where it is not symmetric; its other negative eigenvalues."""
+    def _modes(self, matrix: PETSc.Mat) -> tuple[list[list[PETSc.Vec]], np.ndarray, int]:
+        """V, and its left counterpart if S is not symmetric, G, and the other negative eigenvalues, by new factors."""
         sides = [(matrix, self.psi, self.phi)]
         if self.psi is not self.phi:
             sides.append((matrix.transpose(self._transposed), self.phi, self.psi))
@@ -277,34 +247,30 @@ class SingularSystem:
             constraints = self.inertia.constraints if len(sides) == 1 else None
             self._bordered = [Bordered(self.system, side, len(self.psi), constraints) for side, *_ in sides]
         counts = [bordered.factor(*side) for bordered, side in zip(self._bordered, sides, strict=True)]
-        return counts[0]
-
-    def _modes(self, bordered: Bordered) -> tuple[list[PETSc.Vec], np.ndarray]:
-        """(V, G) by these factors."""
-        solved = [bordered.solve(None, e) for e in np.eye(len(self.psi))]
-        return [v for v, _ in solved], np.array([row for _, row in solved])
+        solved = [bordered.modes() for bordered in self._bordered]
+        return [V for V, _ in solved], solved[0][1], counts[0]
 
     def _linear(self, x: PETSc.Vec, t: float, old: _Linear | None = None) -> _Linear:
         """Factor the bordered matrix, and solve with it; derivatives of an ``old`` linearisation serve again."""
         system, none = self.system, np.zeros(len(self.psi))
         columns = [] if self._section is None or old else [self._second(x, t)]
         found = self._at(x, t)
-        self._factor(found.matrix)
+        sides, G, _ = self._modes(found.matrix)
         columns.insert(0, found.border.copy())
-        residual = system.new_vector()
+        residual, V = system.new_vector(), sides[0]
         system.at(x).residual(residual)
         s, c = self._bordered[0].solve(-residual, none)
-        V, G = self._modes(self._bordered[0])
         if old is not None:
-            return replace(old, vectors=[s, *old.vectors[1 : -len(V)], *V], border=np.column_stack([c, old.b, G]))
-        responses = [self._bordered[0].solve(-column, none) for column in columns]
-        system.set_load(responses[0][0], 1.0)
-        Z, N = self._split(G)
-        sides = [V, V if self.psi is self.phi else self._modes(self._bordered[1])[0]]
-        null, left = ([combine(side, z) for z in Z.T] for side in sides)
-        border = np.column_stack([c, *(b for _, b in responses), G])
-        y, f = self._along_null(x, t, null, left)
-        return _Linear([s, *(w for w, _ in responses), *V], border, columns, Z, N, left, y, f)
+            at = replace(old, vectors=[s, *old.vectors[1 : -len(V)], *V], border=np.column_stack([c, old.b, G]))
+        else:
+            responses = [self._bordered[0].solve(-column, none) for column in columns]
+            system.set_load(responses[0][0], 1.0)
+            Z, N = self._split(G)
+            null, left = ([combine(side, z) for z in Z.T] for side in (V, sides[-1]))
+            border = np.column_stack([c, *(b for _, b in responses), G])
+            y, f = self._along_null(x, t, null, left)
+            at = _Linear([s, *(w for w, _ in responses), *V], border, columns, Z, N, left, y, f, border)
+        return replace(at, rows=self._equations(x, at))
 
     def _split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The modes that are to vanish, and the others: eigenvectors of G, by what they have of the last ones."""
@@ -316,7 +282,7 @@ class SingularSystem:
         return vectors[:, order[:k]], vectors[:, order[k:]]
 
     def _equations(self, x: PETSc.Vec, at: _Linear) -> np.ndarray:
-        """Rows (m + 1, 1 + parameters + m) whose products with ``(1, share)`` are to vanish."""
+        """The rows of the equations."""
         forces = (np.hstack([at.N, at.Z]).T if self.fold else at.N.T) @ at.border
         trace = np.array([v.dot(at.y) for v in at.vectors])
         trace[1 : 1 + len(at.f)] += at.f
@@ -351,10 +317,10 @@ class SingularSystem:
             bend.axpy(sign / (2 * h), found.matrix * w)
             bend.axpy(sign / (2 * h), found.border)
         self.system.set_load(bend, 0.0)
-        rows = [[v.dot(image) for v in at.vectors] for image in r]
-        for row, left in zip(rows, at.left, strict=True):
-            row[1] = bend.dot(left)
-        return np.array(rows) + np.pad(constant[:, None], ((0, 0), (0, len(at.vectors) - 1)))
+        rows = np.array([[v.dot(image) for v in at.vectors] for image in r])
+        rows[:, 1] = [bend.dot(left) for left in at.left]
+        rows[:, 0] += constant
+        return rows
 
     def _image(self, matrix: PETSc.Mat, left: PETSc.Vec) -> PETSc.Vec:
         """``S^t W``, which is known without a transpose where S is symmetric."""
@@ -363,22 +329,22 @@ class SingularSystem:
         self.system.set_load(image, 0.0)
         return image
 
-    def _step(self, at: _Linear, rows: np.ndarray, moved: PETSc.Vec, t: float) -> _Step:
+    def _step(self, at: _Linear, moved: PETSc.Vec, t: float) -> Step:
         """Newton's step, from ``moved`` and ``t`` off where the section is."""
         m, k = at.Z.shape
         if self._section is not None:
             own = self._own(at)
-            table = np.vstack([rows[m - k :], self._plane(at, self._section, moved, t)]) @ own
+            table = np.vstack([at.rows[m - k :], self._plane(at, self._section, moved, t)]) @ own
             size = abs(table[:, 1:]).max(axis=1)
             share = (own @ [1.0, *np.linalg.solve(table[:, 1:] / size[:, None], -table[:, 0] / size)])[1:]
         else:  # in natural units of eigenvalues and loads: what these do not determine, a free motion, stays as it is
             units, least = np.array([self.solver.units.load, *np.ones(m)]), np.full(m + 1, self.inertia.scale)
             least[m if self.fold else m - k : m] /= units[0]
-            table = rows[:, 1:] * units
+            table = at.rows[:, 1:] * units
             size = np.maximum(least, abs(table).max(axis=1))
-            share = units * np.linalg.lstsq(table / size[:, None], -rows[:, 0] / size, rcond=FREE)[0]
+            share = units * np.linalg.lstsq(table / size[:, None], -at.rows[:, 0] / size, rcond=FREE)[0]
         self.Z = at.Z
-        return _Step(combine(at.vectors, np.array([1.0, *share])), share, rows)
+        return combine(at.vectors, np.array([1.0, *share])), share
 
     def _own(self, at: _Linear) -> np.ndarray:
         """Columns (3 + m, 3 + k) of ``s``, both parameters and the null vectors, which modes near by follow."""
@@ -387,54 +353,49 @@ class SingularSystem:
 
     def _plane(self, at: _Linear, section: Section, moved: PETSc.Vec, t: float) -> np.ndarray:
         """Row of the equation of the section."""
-        row = np.zeros(len(at.vectors)) if section.row is None else np.array([section.row.dot(v) for v in at.vectors])
-        row[0] += (0.0 if section.row is None else section.row.dot(moved)) + section.weight * t
-        row[2] += section.weight
-        return row
+        along = [0.0 if section.row is None else section.row.dot(v) for v in (moved, *at.vectors)]
+        along[1] += along[0] + section.weight * t
+        along[3] += section.weight
+        return np.array(along[1:])
 
-    def _state(self, x: PETSc.Vec, t: float, at: _Linear, step: _Step) -> SingularState:
+    def _state(self, x: PETSc.Vec, t: float, at: _Linear, step: Step) -> SingularState:
         """The solution ``x``, ``t``, which the last step has led to."""
-        rows, share, curve, k = step.rows, step.share, None, self.count
+        (last, share), curve, k = step, None, self.count
+        changes = [1.0, *share]
         if self._section is not None:  # the derivatives so far are those of an iterate
-            at = self._linear(x, t)
-            rows, share = self._equations(x, at), np.zeros(len(share))
+            at, changes = self._linear(x, t), [1.0, *np.zeros(len(share))]
         matrix = self._at(x, t).matrix
-        self._factor(matrix)
-        modes, _ = self._modes(self._bordered[0])  # of this very state
+        (modes, *_), *_ = self._modes(matrix)  # of this very state
         null = [combine(modes, z) for z in at.Z.T]
         # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times
         noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale  # or all vanish
         if self._section is not None:
-            curve = self._curve(step.share[:2], rows, at, noise)
+            curve = self._curve(share[:2], at, noise)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
         response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self._rest(at, -at.b[:, 0]))]))
+        vectors, seed = [v.copy() for v in null], self.inertia.seed(0)
+        orthonormalize(vectors, self.inertia.metric)
         return SingularState(
             x,
             self.system.scalar(x),
-            self._oriented(null),
+            [v * (1.0 if seed.dot(v) >= 0 else -1.0) for v in vectors],  # of two directions always the same
             response,
-            at.Z.T @ (at.border @ [1.0, *share]),
+            float(np.linalg.norm(at.Z.T @ (at.border @ changes))),
             noise,
-            self._directions(response, null, rows, at.Z) if curve is None else [],
-            rows[-1, 1] / k,
+            self._directions(response, null, at) if curve is None else [],
+            at.rows[-1, 1] / k,
             float(np.linalg.norm(soft - np.trace(soft) / k * np.eye(k), 2)),
             modes,
             np.linalg.eigvalsh(others + others.T) / 2,
-            step.dx,
+            last,
             t,
             curve,
         )
 
-    def _oriented(self, null: list[PETSc.Vec]) -> list[PETSc.Vec]:
-        """Orthonormal vectors of this space, of the two directions of each always the same."""
-        own, seed = [v.copy() for v in null], self.inertia.seed(0)
-        orthonormalize(own, self.inertia.metric)
-        return [v * (1.0 if seed.dot(v) >= 0 else -1.0) for v in own]
-
-    def _curve(self, last: np.ndarray, rows: np.ndarray, at: _Linear, noise: float) -> Curve:
-        """The curve through a solution, of which the equations are linearised in ``rows``."""
+    def _curve(self, last: np.ndarray, at: _Linear, noise: float) -> Curve:
+        """The curve through a solution."""
         (m, k), own = at.Z.shape, self._own(at)[1:, 1:]
-        table = rows[m - k :, 1:] @ own
+        table = at.rows[m - k :, 1:] @ own
         slope = np.linalg.svd(table / np.maximum(abs(table).max(axis=1), TINY)[:, None])[2][-1]
         square = np.vstack([table, slope]) if self.fold else np.vstack([table[-1:, :2], slope[:2]])
         dx = combine(at.vectors[1:], own @ slope)
@@ -470,36 +431,26 @@ class SingularSystem:
         return float((work[work > noise] / terms[work > noise]).max(initial=0.0))
 
     def _negative(self, N: np.ndarray) -> int:
-        """Eigenvalues clearly below zero, but for those that vanish, at the state that the matrix holds.
-
-        What is zero all along a curve has the sign of its round-off.
-        """
+        """Eigenvalues clearly below zero, but for those that vanish, at the state that the matrix holds."""
         self.inertia.move(-self.inertia.tolerance)
-        far = self._factor(self.inertia.matrix)
-        G = N.T @ self._modes(self._bordered[0])[1] @ N
+        _, G, far = self._modes(self.inertia.matrix)
+        G = N.T @ G @ N
         return far + int((np.linalg.eigvalsh(G + G.T) > 0).sum())
 
-    def _directions(self, w: PETSc.Vec, null: list[PETSc.Vec], rows: np.ndarray, Z: np.ndarray) -> list[PETSc.Vec]:
-        """Unit directions ``xi V + dlam (w, 1)`` with ``a xi^2 + 2 b xi dlam + c dlam^2 = 0``, the reduced equation.
-
-        That is the one of a branch point with one null vector, and known by the last two ``rows``.
-        """
+    def _directions(self, w: PETSc.Vec, null: list[PETSc.Vec], at: _Linear) -> list[PETSc.Vec]:
+        """Unit directions ``xi V + dlam (w, 1)`` with ``a xi^2 + 2 b xi dlam + c dlam^2 = 0``, the reduced equation."""
         if self.fold or len(null) > 1:
             return []
-        c, b, a = rows[-2, 1], float(rows[-2, 2:] @ Z[:, 0]), float(rows[-1, 2:] @ Z[:, 0])
+        c, (b, a) = at.rows[-2, 1], (at.rows[-2:, 2:] @ at.Z[:, 0]).tolist()
         root = np.sqrt(max(b * b - a * c, 0.0))
         pivot = -(b + np.copysign(root, b))
-        out = []
-        for xi, dlam in ((pivot, a), (c, pivot)):  # no cancellation: the two roots xi/dlam have the product c/a
-            if xi or dlam:
-                d = combine([null[0], w], np.array([xi, dlam]))
-                out.append(d / self.system.norm(d))
-        return out
+        # no cancellation: the two roots xi/dlam have the product c/a
+        out = [combine([null[0], w], np.array(each)) for each in ((pivot, a), (c, pivot)) if any(each)]
+        return [d / self.system.norm(d) for d in out]
 
 
 def load_uncertainty(solver: BranchSolver, found: SingularState) -> float:
     """Uncertainty of the load of a branch point, by round-off and by what several eigenvalues differ."""
     matrix = solver.inertia.at(found.x)
     doubt = max(matrix.noise(v) for v in found.vectors) + found.spread
-    moved = abs(solver.system.scalar(found.last))
-    return moved + doubt / max(abs(found.rate), TINY)
+    return abs(solver.system.scalar(found.last)) + doubt / max(abs(found.rate), TINY)

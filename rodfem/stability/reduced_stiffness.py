@@ -44,8 +44,7 @@ ROTATED = 1.0
 class Bordered:
     """A square ``matrix`` of a system with a number of dense ``borders``, a column and a row each, and its factors.
 
-    Those of a symmetric one, ``constraints`` of whose eigenvalues are negative whatever the state, count the rest;
-    None: it is not symmetric, and nothing is counted.
+    Those of a symmetric one count: ``constraints`` of its eigenvalues are negative whatever the state; else None.
     """
 
     def __init__(self, system: System, matrix: PETSc.Mat, borders: int, constraints: int | None) -> None:
@@ -125,6 +124,11 @@ class Bordered:
             x.array[:] = out.array_r[:rows]
             return x, np.array(self.comm.bcast(out.array_r[rows:].copy(), root=self.comm.size - 1))
 
+    def modes(self) -> tuple[list[PETSc.Vec], np.ndarray]:
+        """Solutions for a unit on each border: their vectors, and rows (k, k) of multipliers."""
+        solved = [self.solve(None, e) for e in np.eye(self.k)]
+        return [v for v, _ in solved], np.array([row for _, row in solved])
+
 
 @dataclass(frozen=True, eq=False)
 class ReducedStiffness:
@@ -141,11 +145,6 @@ class ReducedStiffness:
     def zero(self) -> int:
         """Number of eigenvalues that are zero to working accuracy."""
         return int((abs(np.linalg.eigvalsh(self.H)) <= self.doubt).sum())
-
-    @property
-    def index(self) -> int:
-        """Number of negative eigenvalues of S."""
-        return self.far + negative(self.H)
 
 
 def negative(H: np.ndarray) -> int:
@@ -200,9 +199,8 @@ class Condensation:
         if self._bordered is None or self._bordered.k != k:
             self._bordered = Bordered(self.system, matrix, k, self.inertia.constraints)
         far = self._bordered.factor(matrix, [self.inertia.vector(column) for column in B.T])
-        solved = [self._bordered.solve(None, e) for e in np.eye(k)]
-        H = -np.array([g for _, g in solved])
-        return far, _symmetric(H), np.stack([w.array_r for w, _ in solved], axis=1)
+        modes, G = self._bordered.modes()
+        return far, _symmetric(-G), np.stack([w.array_r for w in modes], axis=1)
 
     def _rate(self, x: PETSc.Vec, tangent: PETSc.Vec, H: np.ndarray, W: np.ndarray) -> np.ndarray:
         """``W^t S' W`` along a tangent by a difference from ``W^t S W = H``, with the phase conditions of ``x``."""
@@ -216,14 +214,10 @@ class Condensation:
             rates = (system.at(ahead).generators - system.at(x).generators) / AHEAD
             for i, weights in phase.broken.items():
                 rate = system.generators.vector(weights @ rates).array_r
-                term = np.outer(inertia.sum(W.T @ inertia.weighed(rate[:, None])[:, 0]), self._row(W, system.drifts[i]))
+                own = np.arange(*inertia.metric.getOwnershipRange()) == system.drifts[i]
+                term = np.outer(inertia.sum(W.T @ inertia.weighed(rate[:, None])[:, 0]), inertia.sum(own @ W))
                 out += term + term.T
         return _symmetric(out)
-
-    def _row(self, columns: np.ndarray, number: int) -> np.ndarray:
-        """Row of a global number of columns, on all ranks."""
-        begin, end = self.inertia.metric.getOwnershipRange()
-        return self.inertia.sum(columns[number - begin] if begin <= number < end else np.zeros(columns.shape[1]))
 
 
 def _symmetric(A: np.ndarray) -> np.ndarray:
