@@ -51,43 +51,31 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Locus": "codim2.locus",
-    **dict.fromkeys(
-        ("End", "clamped", "pinned", "sliding", "hinged", "free", "elastic", "Ring", "Attachment", "Constraint"),
-        "problem.ends",
-    ),
-    **dict.fromkeys(("integral", "at", "everywhere", "sliding_hinge"), "problem.ends"),
-    "Scene": "problem.scene",
-    "Parameter": "problem.scene",
-    "Ordinate": "problem.scene",
-    "Inertia": "problem.scene",
-    "section": "problem",
-    "tabulated": "problem.table",
-    "path": "problem.table",
-    "Discretization": "fem.fields",
-    "Plan": "diagram.plan",
-    "StepControl": "continuation.step_control",
-    "Event": "problem.events",
-    "IndexStepControl": "continuation.step_control",
-    "run": "app.run",
-    "trace": "diagram.diagram",
-    "load": "diagram.saved",
-    "Diagram": "diagram.diagram",
-    "Solver": "diagram.solver",
-    "Observer": "continuation.observer",
-    "Branch": "continuation.branch",
-    "Point": "continuation.branch",
-    "SpecialPoint": "continuation.branch",
-    "many": "app.many",
-    "Modes": "modes.modes",
-    "load_modes": "modes.modes",
-    "InputError": "errors",
-    "SceneError": "errors",
-    "ConvergenceError": "errors",
-    "SetupError": "errors",
-    "load_json": "output.files",
+    name: home
+    for home, names in {
+        "codim2.locus": "Locus",
+        "problem.ends": "End clamped pinned sliding hinged sliding_hinge free elastic Ring Attachment Constraint "
+        "integral at everywhere",
+        "problem.scene": "Scene Parameter Ordinate Inertia",
+        "problem": "section",
+        "problem.table": "tabulated path",
+        "fem.fields": "Discretization",
+        "diagram.plan": "Plan",
+        "continuation.step_control": "StepControl IndexStepControl",
+        "problem.events": "Event",
+        "app.run": "run",
+        "diagram.diagram": "trace Diagram",
+        "diagram.saved": "load",
+        "diagram.solver": "Solver",
+        "continuation.observer": "Observer",
+        "continuation.branch": "Branch Point SpecialPoint",
+        "app.many": "many",
+        "modes.modes": "Modes load_modes",
+        "errors": "InputError SceneError ConvergenceError SetupError",
+        "output.files": "load_json",
+    }.items()
+    for name in names.split()
 }
-
 _NAMES = sorted(_HOMES)
 
 __doc__ = f"{__doc__ or ''}\nPublic names, by module (``help(rodfem.Scene)`` describes one of them):\n\n" + "\n".join(

@@ -47,10 +47,11 @@ def main(words: Sequence[str]) -> None:
         name, rest = (rest[1] if len(rest) > 1 else ""), rest[2:]
     module = load(Path(file))
     statement, mesh = Statement(rod_of(module, name)), mesh_of(module)
-    ours, petsc = (rest[: rest.index("--")], rest[rest.index("--") + 1 :]) if "--" in rest else (rest, [])
+    end = rest.index("--") if "--" in rest else len(rest)
+    ours, petsc = rest[:end], rest[end + 1 :]
     usual = statement.scene()
     parser, option = parser_of(statement, usual, f"rodfem run {file}"), f"--{usual.load}"
-    if option in [word.split("=")[0] for word in ours] and option not in parser._option_string_actions:
+    if option in {word.split("=")[0] for word in ours} - parser._option_string_actions.keys():
         complain(f"{usual.load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
     options = parser.parse_args(ours)
     start_petsc(petsc)

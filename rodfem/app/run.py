@@ -27,13 +27,13 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder, typical_modes
-from rodfem.modes.modes import save_modes
+from rodfem.modes.modes import Modes, save_modes
 from rodfem.output.files import load_json, save_json, save_run
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
-from rodfem.stability.assessment import Assessor
+from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.whole_files import locked, remove_earlier
 
 if TYPE_CHECKING:
@@ -194,45 +194,53 @@ def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     scene, plan, output = diagram.scene, terminal.plan, terminal.output
     which = "left-most eigenvalues mu = omega^2" if scene.conservative else "eigenvalues mu = omega^2 nearest zero"
     terminal.say(f"\nIs it stable? ({which})")
-    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
-    about |= asdict(diagram.solvers[0].system.fields.discretization)
-    del about["vertices"]
     finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
     saved: list[tuple[str, int]] = []
     for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
         where = f"{scene.load} = {special.point.load:.10g}"
         terminal.working(f"{branch.name} at {where}: stability{' and modes' if plan.modes else ''}")
-        finder, modes = finder_on(special.point.mesh), None
         try:
-            if plan.modes:
-                verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
-            else:
-                verdict = finder.assessor(special.point.x, plan.method)
+            verdict, modes = _verdict(finder_on(special.point.mesh), special, plan)
         except (InputError, ConvergenceError) as trouble:
             terminal.warn_of(diagram, trouble, branch, special)
             continue
         terminal.verdict(branch.name, where, verdict.at(special.point), modes)
         if modes is not None:
             terminal.name("modes.h5")
-            keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, about)
+            keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
             on_first(terminal.comm, partial(keep, first=not saved, scene=scene))
             saved.append((branch.name, special.row))
     if saved:
-        pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
-        _draw_modes(saved, pictures, terminal)
-        terminal.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
+        _draw_modes(saved, terminal, figures)
 
 
-def _draw_modes(saved: list[tuple[str, int]], pictures: list[str], terminal: Terminal) -> None:
-    """Draw the modes that were saved of rows of branches: a picture and an animation of each row."""
+def _verdict(finder: ModeFinder, special: SpecialPoint, plan: Plan) -> tuple[Verdict, Modes | None]:
+    """Verdict on a state, and its modes if the plan asks for them."""
+    if plan.modes:
+        return finder(special.point.x, plan.modes, plan.method or "auto")
+    return finder.assessor(special.point.x, plan.method), None
+
+
+def _about(diagram: Diagram) -> dict[str, Any]:
+    """What a file of modes says of its scene and its mesh."""
+    scene, mesh = diagram.scene, asdict(diagram.solvers[0].system.fields.discretization)
+    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
+    return about | {name: value for name, value in mesh.items() if name != "vertices"}
+
+
+def _draw_modes(saved: list[tuple[str, int]], terminal: Terminal, figures: bool) -> None:
+    """Draw the modes that were saved of rows of branches, if ``figures``: a picture and an animation of each row."""
     from rodfem.output.plot_modes import draw_modes
 
+    output = terminal.output
+    pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
     terminal.name(*(f"{picture}{suffix}" for picture in pictures for suffix in (".png", ".gif")))
     for (name, row), picture in zip(saved, pictures, strict=False):
         terminal.working(f"{name}, row {row}: pictures and animations of its modes")
         for suffix in (".png", ".gif"):
-            target = terminal.output / f"{picture}{suffix}"
-            on_first(terminal.comm, partial(draw_modes, terminal.output / "modes.h5", name, row, target))
+            target = output / f"{picture}{suffix}"
+            on_first(terminal.comm, partial(draw_modes, output / "modes.h5", name, row, target))
+    terminal.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
 
 
 def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[str, float, float]) -> None:
@@ -240,9 +248,7 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
     saved: list[dict] = []
     for branch in diagram:
         near: list[Locus] = []
-        # where it meets another branch, the locus is that one's
-        followed = (s for s in branch.special if s.connects_to is None and (s.kind.counted or s.kind.line))
-        for special in followed:
+        for special in _to_follow(branch):
             which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
             if any(found.passes(special, diagram.solvers[0].units) for found in near):
                 terminal.say(f"\nThe {which} is on a locus above")
@@ -266,6 +272,11 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
 
         on_first(terminal.comm, lambda: draw_locus(saved, terminal.output / "locus.png"))
         terminal.say(f"Loci in {terminal.output}{os.sep}: locus-1.json ..., locus.png")
+
+
+def _to_follow(branch: Branch) -> list[SpecialPoint]:
+    """Special points of a branch that have a locus, but for those at which it meets another branch."""
+    return [s for s in branch.special if s.connects_to is None and (s.kind.counted or s.kind.line)]
 
 
 def draw(output: Path, report: Report) -> None:

@@ -189,22 +189,25 @@ class End(Contribution):
         """Check shapes, and that nothing acts on what is held; raises :class:`SceneError`."""
         where = f"{side} end"
         for c in map(scene.constants, scene.loads() if callable(self.rotation) else scene.span[:1]):
-            rotation = self.frame(c)
-            size = 1.0 if rotation is None else _size(f"rotation of the {where}", rotation, 4)
-            if not 0 < size:
-                words = "the zero quaternion" if size == 0 else f"{rotation}"
-                raise SceneError(f"The rotation of the {where} is {words}: give one of unit norm.")
-        if self.hinge is not None:
-            if self.rotation is None:
-                raise SceneError(f"The {where} has a hinge but no rotation: say which directors the hinge holds.")
-            if not 0 < _size(f"hinge of the {where}", self.hinge, 3):
-                raise SceneError(f"The hinge of the {where} has no axis: give three components, not all zero.")
+            self._check_rotation(where, self.frame(c))
         for c in map(scene.constants, scene.loads()):
             self._check_force(where, c)
         if self.fixed_rotation is not None and (self.moment or self.follower_moment):
             raise SceneError(
                 f"A moment acts on the {where}, whose directors are held: leave its rotation free, or use a hinge."
             )
+
+    def _check_rotation(self, where: str, rotation: Any) -> None:
+        if rotation is not None:
+            size = _size(f"rotation of the {where}", rotation, 4)
+            if not 0 < size:
+                words = "the zero quaternion" if size == 0 else f"{rotation}"
+                raise SceneError(f"The rotation of the {where} is {words}: give one of unit norm.")
+        if self.hinge is not None:
+            if rotation is None:
+                raise SceneError(f"The {where} has a hinge but no rotation: say which directors the hinge holds.")
+            if not 0 < _size(f"hinge of the {where}", self.hinge, 3):
+                raise SceneError(f"The hinge of the {where} has no axis: give three components, not all zero.")
 
     def _check_force(self, where: str, c: Constants) -> None:
         fixed = self.fixed(c)
@@ -290,14 +293,13 @@ class JoinedEnd(End):
 
     def lagrangian(self, at: Site) -> Iterator[Any]:
         """Share of this end in the equations of closure, with their multipliers."""
-        planar, sign = at.whole is not None, 1.0 if self.last else -1.0
-        turned = [at.turned] if planar else [at.turned[i] for i in range(4)]
-        if self.last and planar:
+        sign, size = 1.0 if self.last else -1.0, 4 if at.whole is None else 1
+        turned = [at.turned] if size == 1 else at.turned
+        if self.last and size == 1:
             yield -at.y[0] * at.whole
-        yield (sign if self.last or planar else -self.sign) * sum(y * q for y, q in zip(at.y, turned, strict=False))
-        forces = at.y[len(turned) :]
-        if len(forces):
-            yield sign * sum(f * at.x.r[i] for f, i in zip(forces, at.free, strict=True))
+        yield (-self.sign if size == 4 and not self.last else sign) * _dot(at.y[:size], turned, range(size))
+        if len(at.y) > size:
+            yield sign * _dot(at.y[size:], at.x.r, at.free)
 
     def check(self, side: str, scene: Scene) -> None:
         """Check that the start of the ring closes; raises :class:`SceneError`."""
@@ -309,6 +311,10 @@ class JoinedEnd(End):
                 f"The start of the ring does not end as it begins: make q(l) = {self.sign:+g} q(0), or choose "
                 f"Ring(odd={self.sign > 0})."
             )
+
+
+def _dot(multipliers: Any, values: Any, components: Any) -> Any:
+    return sum(y * values[i] for y, i in zip(multipliers, components, strict=True))
 
 
 @dataclass(frozen=True)

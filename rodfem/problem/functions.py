@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import wraps
+from itertools import chain
 from logging import getLogger
 from math import sqrt
 from numbers import Real
@@ -91,6 +92,12 @@ class Role:
         letters = self.call.partition("(")[2].rstrip(")").split(", ")
         return ", ".join(MEANINGS[letter] for letter in letters if letter in MEANINGS)
 
+    def failure(self, trouble: BaseException) -> str:
+        """What a function raises, in words, and how it is written."""
+        first = str(trouble).split("\n", 1)[0].rstrip(".")
+        wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
+        return f"{type(trouble).__name__}, {first!r}: {(wrong and self.meanings) or self.hint}"
+
 
 def role_field(role: Role | Callable[[Any], Role], default: Any = None) -> Any:
     """Field of a dataclass for a function of this role, or of the role that it has for the object; optional."""
@@ -116,10 +123,7 @@ def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
         except SceneError:
             raise
         except (Exception, SystemExit) as trouble:  # whatever a person's function may raise
-            first = str(trouble).split("\n", 1)[0].rstrip(".")
-            wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
-            hint = role.meanings if wrong and role.meanings else role.hint
-            raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {hint}.") from trouble
+            raise SceneError(f"The {what} fails with {role.failure(trouble)}.") from trouble
         finally:
             LOG_OF_UFL.disabled = silent
 
@@ -170,23 +174,25 @@ def changes(
     """
     new = {}
     for f in fields(owner):
-        value = found = getattr(owner, f.name)
-        role = f.metadata.get("role")
-        if value is f.default:
-            continue
-        if role is not None:
-            role = role if isinstance(role, Role) else role(owner)
-            constant = role.or_value and not callable(value)
-            found = in_floats(value) if constant else visit(role.words.format(place), value, role)
-        elif nested and isinstance(value, (tuple, list)):
-            places = f.metadata.get("places") or ("",) * len(value)
-            parts = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))
-            found = parts if any(a is not b for a, b in zip(parts, value, strict=True)) else value
-        elif nested:
-            found = _changed(value, visit, place)
-        if found is not value:
-            new[f.name] = found
+        value = getattr(owner, f.name)
+        if value is not f.default and (nested or "role" in f.metadata):
+            found = _visited(owner, f.metadata, value, visit, place)
+            if found is not value:
+                new[f.name] = found
     return new
+
+
+def _visited(owner: Any, declared: Any, value: Any, visit: Callable[[str, Any, Role], Any], place: str) -> Any:
+    role = declared.get("role")
+    if role is not None:
+        role = role if isinstance(role, Role) else role(owner)
+        constant = role.or_value and not callable(value)
+        return in_floats(value) if constant else visit(role.words.format(place), value, role)
+    if isinstance(value, (tuple, list)):
+        places = declared.get("places") or ("",) * len(value)
+        parts = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))
+        return parts if any(a is not b for a, b in zip(parts, value, strict=True)) else value
+    return _changed(value, visit, place)
 
 
 def _changed(owner: Any, visit: Callable[[str, Any, Role], Any], place: str) -> Any:
@@ -323,13 +329,12 @@ def asked_for(scene: Scene, c: Constants | None = None) -> set[str]:
     return asked
 
 
-def asks_where(function: OfPlace | None, c: Constants) -> bool:
-    """Whether there is a function of a place, and it depends on where the rod is."""
+def asks_where(function: OfPlace, c: Constants) -> bool:
+    """Whether a function of a place depends on where the rod is."""
     q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
     strains = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": 1.0}
     try:
-        if function is not None:
-            function(place(q, rotation(q), c.s, **strains), c)
+        function(place(q, rotation(q), c.s, **strains), c)
     except NoCentreline:
         return True
     return False
@@ -345,20 +350,21 @@ def floats(scene: Scene) -> bool:
 
 def needs_centreline(scene: Scene) -> str:
     """Say what in a scene needs the centreline as a field, in words; empty where nothing does."""
-    return next((what for what, needs in _needs(scene) if needs), "")
+    return next((what for what, needs in chain(_needs(scene), _asking(scene)) if needs), "")
 
 
 def _needs(scene: Scene) -> Iterator[tuple[str, bool]]:
-    c, ordinate = scene.constants(), scene.ordinate
     attached = [x for x in scene.attachments if scene.is_inside(x.s)]
     yield "the mass of a rod under a load without potential", not scene.conservative
     yield "a distributed force", scene.distributed is not None
     yield "what is attached along the rod", any(x.force or x.mass for x in attached)
-    yield "the mass of the rod", scene.inertia.rho_A(c) != 0
+    yield "the mass of the rod", scene.inertia.rho_A(scene.constants()) != 0
     floating = floats(scene) and not all(scene.plain)
     yield "a rod that nothing holds, with more than dead forces at its ends,", floating
-    yield "the potential along the rod", asks_where(scene.potential, c)
-    yield "the ordinate", not ordinate.places and asks_where(ordinate.of, c)
-    yield "what is attached along the rod", any(asks_where(x.energy, c) for x in attached)
-    of_points = [x for x in scene.constraints if x.s is None or scene.is_inside(x.s)]
-    yield "a constraint", any(asks_where(x.of, c) for x in of_points)
+
+
+def _asking(scene: Scene) -> Iterator[tuple[str, bool]]:
+    for owner in (*(part.of for part in scene.parts if part.s is None or scene.is_inside(part.s)), scene.ordinate):
+        for what, function, role in functions_of(owner, nested=False):
+            of_place = role.call in ("f(x, c)", "of(x, c)")
+            yield f"the {what}", of_place and asks_where(function, scene.constants())

@@ -21,7 +21,7 @@ import ufl
 from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import RODS, UNDEFORMED
-from rodfem.problem.arguments import a, convert, encodes, interval, number, optional, plain, real, text
+from rodfem.problem.arguments import Check, a, convert, encodes, interval, number, optional, plain, real, text
 from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution
 from rodfem.problem.ends import End, Ring
 from rodfem.problem.functions import (
@@ -181,6 +181,59 @@ class Part(NamedTuple):
     s: float | None
 
 
+def _folder(name: str, value: Any) -> str:
+    """Check for the name of a scene or a branch."""
+    word: str = text("column")(name, value)
+    if word in ("", ".", "..") or not encodes(word) or set(word) & set("/\\\n"):
+        raise SceneError(f"The name {word!r} cannot be that of a folder: give a text without slashes.")
+    if name == "states" and GIVEN.fullmatch(word):
+        raise SceneError(f"states is {word!r}, a name which others are given: choose another, as 'straight'.")
+    return word
+
+
+def _two_ends(name: str, value: Any) -> Any:
+    if not isinstance(value, (tuple, list, Ring)) or [isinstance(x, End) for x in value] != [True, True]:
+        raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
+    return value
+
+
+def _parameters(name: str, value: Any) -> dict[str, Parameter]:
+    made = {}
+    for n, p in a(Mapping, "a dictionary, as in {'P': Parameter(0.0)}")(name, value).items():
+        if not isinstance(n, str) or not n.isidentifier() or iskeyword(n) or n == "s" or n.startswith("__"):
+            raise SceneError(f"A parameter cannot have the name {n!r}: choose another (s is the arclength).")
+        made[n] = p if isinstance(p, Parameter) else Parameter(real(n, p, 0.0))
+    return made
+
+
+def _tuple_of(kind: type, example: str) -> Check:
+    """Check for a tuple of objects of a class."""
+
+    def check(name: str, value: Any) -> Any:
+        for x in a((tuple, list), f"a tuple, as in {name}={example}")(name, value):
+            a(kind, example)(f"One of the {name}", x)
+        return tuple(map(float, value)) if kind is Real else value
+
+    return check
+
+
+KINDS: dict[str, Check] = {
+    "name": _folder,
+    "title": text("column"),
+    "states": optional(_folder),
+    "ends": _two_ends,
+    "parameters": _parameters,
+    "inertia": a(Inertia, "one, as in Inertia(rho_A=1.0)"),
+    "ordinate": a(Ordinate, "an Ordinate(name, s, of)"),
+    "attachments": _tuple_of(Attachment, "(Attachment(0.5, mass=1.0),)"),
+    "constraints": _tuple_of(Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
+    "breaks": _tuple_of(Real, "(0.5,)"),
+    "interval": interval(0.0, 1.0, real),
+    "span": interval(0.0, 1.0, real),
+}
+"""Checks of the fields of a scene that are no functions."""
+
+
 class Stated(type):
     """Class whose ``dir``, and so ``help`` and completion, has its fields and what its ``PUBLIC`` names."""
 
@@ -259,54 +312,17 @@ class Scene(Contribution, metaclass=Stated):
 
     def __post_init__(self) -> None:
         """Check all that can be checked before any computation; raises :class:`InputError`."""
-        self._check_kinds()
+        convert(self, **KINDS)
+        for what, function, role in functions_of(self):
+            check_function(what, function, role)
         for field_name, value in changes(self, guarded).items():
             object.__setattr__(self, field_name, value)
-        convert(self, interval=interval(0.0, 1.0, real), span=interval(0.0, 1.0, real))
-        named = {n: p if isinstance(p, Parameter) else Parameter(p) for n, p in self.parameters.items()}
-        object.__setattr__(self, "breaks", tuple(map(float, self.breaks)))
-        object.__setattr__(self, "parameters", named)
         self._check_values()
         check_scene(self)
 
     def __dir__(self) -> list[str]:
         """Names for completion."""
         return dir(type(self))
-
-    def _check_kinds(self) -> None:
-        """Raise :class:`InputError` for a field that is no such thing."""
-        word = text("column")
-        convert(self, title=word, name=word, states=optional(word))
-        for name in (x for x in (self.name, self.states) if x is not None):
-            if name in ("", ".", "..") or not encodes(name) or set(name) & set("/\\\n"):
-                raise SceneError(f"The name {name!r} cannot be that of a folder: give a text without slashes.")
-        if GIVEN.fullmatch(self.states or ""):
-            raise SceneError(
-                f"states is {self.states!r}, a name which others are given: choose another, as 'straight'."
-            )
-        if not isinstance(self.ends, (tuple, list, Ring)) or [isinstance(x, End) for x in self.ends] != [True, True]:
-            raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
-        convert(
-            self,
-            parameters=a(Mapping, "a dictionary, as in {'P': Parameter(0.0)}"),
-            inertia=a(Inertia, "one, as in Inertia(rho_A=1.0)"),
-            ordinate=a(Ordinate, "an Ordinate(name, s, of)"),
-        )
-        for name, kind, example in (
-            ("attachments", Attachment, "(Attachment(0.5, mass=1.0),)"),
-            ("constraints", Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
-            ("breaks", Real, "(0.5,)"),
-        ):
-            for x in a((tuple, list), f"a tuple, as in {name}={example}")(name, getattr(self, name)):
-                a(kind, example)(f"One of the {name}", x)
-        for name, p in self.parameters.items():
-            known = isinstance(name, str) and name.isidentifier() and not iskeyword(name)
-            if not known or name == "s" or name.startswith("__"):
-                raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
-            if not isinstance(p, Parameter):
-                real(name, p, 0.0)
-        for what, function, role in functions_of(self):
-            check_function(what, function, role)
 
     def _check_values(self) -> None:
         """Raise :class:`SceneError` for a rod without a length, an unknown kind or load, or a constant out of range."""

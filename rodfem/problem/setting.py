@@ -134,8 +134,7 @@ def read(group: Any, row: int | None = None) -> Setting:
     or a constraint is not whole.
     """
     row, section, distributed, foundation = row or 0, None, None, None
-    supports = tuple(_made(Support, here, row) for here in group[SUPPORTS].values()) if SUPPORTS in group else ()
-    ties = tuple(_made(Tie, here, row) for here in group[TIES].values()) if TIES in group else ()
+    supports, ties = _all(Support, group, SUPPORTS, row), _all(Tie, group, TIES, row)
     notes = [tie.note for tie in ties if tie.note]
     if SECTION in group.file:
         s, B = (group.file[SECTION][name][:] for name in ("s", "stiffness"))
@@ -145,13 +144,19 @@ def read(group: Any, row: int | None = None) -> Setting:
         distributed = along["s"][:], along["force"][row], along["follower"][row]
     if FOUNDATION in group:
         along = group[FOUNDATION]
-        foundation = (along["s"][:], along["stiffness"][:]) if "stiffness" in along else None
-        notes += [along.attrs["note"]] if foundation is None else []
+        if "stiffness" in along:
+            foundation = along["s"][:], along["stiffness"][:]
+        else:
+            notes.append(along.attrs["note"])
     return Setting(supports, section, distributed, foundation, ties, tuple(notes))
 
 
+def _all(kind: type[T], group: Any, name: str, row: int) -> tuple[T, ...]:
+    """Supports or constraints, in one state, from a group of their groups in a file."""
+    return tuple(_made(kind, here, row) for here in group[name].values()) if name in group else ()
+
+
 def _made(kind: type[T], group: Any, row: int) -> T:
-    """A support or a constraint, in one state, from its group in a file."""
     entries = {name: value[row] for name, value in group.items()} | dict(group.attrs)
     try:
         return kind(**{f.name: entries[f.name] for f in fields(kind) if f.name != "guide" or "guide" in entries})  # type: ignore[arg-type]

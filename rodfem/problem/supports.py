@@ -241,16 +241,7 @@ def _stations(scene: Scene) -> Floats:
 
 def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
     """Write what holds and loads P states into groups below an HDF5 group, as ``docs/files.md`` describes them."""
-    first = supports_of(scene, samples[0])
-    states = [first, *(supports_of(scene, sample, first) for sample in samples[1:])]
-    out = group.create_group(SUPPORTS)
-    for name, support in first.items():
-        here = out.create_group(name)
-        for key, value in vars(support).items():
-            if key in CHANGING:
-                here[key] = np.array([getattr(supports[name], key) for supports in states])
-            else:
-                here.attrs[key] = value
+    _write_supports(group.create_group(SUPPORTS), scene, samples)
     if scene.distributed is not None or scene.follower is not None:
         along = group.create_group(DISTRIBUTED)
         found = [distributed_on(scene, float(sample["load"])) for sample in samples]
@@ -261,11 +252,26 @@ def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
         along.attrs["note"] = "" if foundation else "load by a potential along the rod"
         if foundation:
             along["s"], along["stiffness"] = foundation
+    _write_ties(group, scene, samples)
+
+
+def _write_ties(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
     for number, ties in enumerate(ties_of(scene, samples)):
         here = group.create_group(f"{TIES}/constraint {number + 1}")
         here.attrs.update(s=ties[0].s, note=ties[0].note)
-        for key in ("line", "normal"):
-            here[key] = np.array([getattr(tie, key) for tie in ties])
+        here["line"], here["normal"] = np.array([tie.line for tie in ties]), np.array([tie.normal for tie in ties])
+
+
+def _write_supports(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
+    first = supports_of(scene, samples[0])
+    states = [first, *(supports_of(scene, sample, first) for sample in samples[1:])]
+    for name, support in first.items():
+        here = group.create_group(name)
+        for key, value in vars(support).items():
+            if key in CHANGING:
+                here[key] = np.array([getattr(supports[name], key) for supports in states])
+            else:
+                here.attrs[key] = value
 
 
 def write_section(file: Any, scene: Scene) -> None:

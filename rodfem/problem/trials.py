@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain
 from math import inf, isfinite, isnan, nan
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -125,11 +124,15 @@ def expressions_of(scene: Scene) -> Iterator[Any]:
 def _trials(scene: Scene) -> Iterator[_Trial]:
     for what, function, role in functions_of(scene):
         if role.call in OF_PLACES or (role.call == "f(c)" and role.size is not None):
-            places: list[float | None] = []
-            if not role.along and role.placed and role.call != "W(v, k, c)":  # numbers in the equations, too
-                owners = (x for x in scene.parts if any(function is f for f in vars(x.of).values()))
-                places = [*dict.fromkeys(x.s for x in owners)]
-            yield from (_Trial(scene, what, function, role, s) for s in places or [None])
+            yield from (_Trial(scene, what, function, role, s) for s in _places(scene, function, role))
+
+
+def _places(scene: Scene, function: Any, role: Role) -> list[float | None]:
+    """Arclengths at which something acts, numbers in the equations too; None for what is a function of them."""
+    if role.along or not role.placed or role.call == "W(v, k, c)":
+        return [None]
+    at = [x.s for x in scene.parts if x.s is not None and any(function is f for f in vars(x.of).values())]
+    return [*dict.fromkeys(at)] or [None]
 
 
 @dataclass(frozen=True)
@@ -239,10 +242,14 @@ class _Trial:
             found = self._called(c, state, symbolic)
         if self.of_place:
             self._check(found)
-        for part in chain.from_iterable(parts(e) for e in found if e is not None):
+        return c, [e if e is None else self._expression(e) for e in found]
+
+    def _expression(self, value: Any) -> Any:
+        """Expression of a value without derivatives that are left to take, of finite real numbers."""
+        for part in parts(value):
             if isinstance(part, ComplexValue) or (isinstance(part, ScalarValue) and not isfinite(part)):
                 raise SceneError(f"The {self.what} has {part} in it: return an expression of finite real numbers.")
-        return c, [e if e is None else differentiated(ufl.as_ufl(e)) for e in found]
+        return differentiated(ufl.as_ufl(value))
 
 
 def of_state(function: Callable[..., Any], role: Role, places: tuple[Place, Place], c: Constants) -> Any:
@@ -310,19 +317,23 @@ def _check_load(scene: Scene, what: str, function: Callable[..., Any], out: list
 
 
 def _check_functions_of_states(scene: Scene, normal: int) -> None:
-    own = scene.constants()
-    others = [*map(scene.constants, scene.loads()), *(scene.constants(s=s) for s in scene.samples())]
-    functions = [(what, f, role) for what, f, role in functions_of(scene) if role.call in ("f(x, c)", "W(v, k, c)")]
-    for state in range(len(STATES)):
-        for c in [own, *others] if state == 0 else [own]:
-            sides = [_side(scene, normal, state, c.s, sign) for sign in (1.0, -1.0)]
-            for what, function, role in functions:
-                one, other = (_defined(function, role, places, c) for places in sides)
-                if abs(one - other) > NEGLIGIBLE * max(abs(one), abs(other)):
-                    raise SceneError(
-                        f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
-                        "are not alike to it; leave that out, or planar out of the scene."
-                    )
+    functions = [found for found in functions_of(scene) if found[2].call in ("f(x, c)", "W(v, k, c)")]
+    for state, c in _tried(scene):
+        sides = [_side(scene, normal, state, c.s, sign) for sign in (1.0, -1.0)]
+        for what, function, role in functions:
+            one, other = (_defined(function, role, places, c) for places in sides)
+            if abs(one - other) > NEGLIGIBLE * max(abs(one), abs(other)):
+                raise SceneError(
+                    f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
+                    "are not alike to it; leave that out, or planar out of the scene."
+                )
+
+
+def _tried(scene: Scene) -> Iterator[tuple[int, Constants]]:
+    """States, by their numbers, and constants at which functions of a state are tried."""
+    yield from ((state, scene.constants()) for state in range(len(STATES)))
+    for c in (*map(scene.constants, scene.loads()), *(scene.constants(s=s) for s in scene.samples())):
+        yield 0, c
 
 
 def _side(scene: Scene, normal: int, state: int, s: float, sign: float) -> tuple[Place, Place]:

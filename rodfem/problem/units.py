@@ -55,18 +55,23 @@ def units_of(scene: Scene) -> Units:
     """Natural sizes of a scene: by its length, bending stiffness, masses and range of loads."""
     least, middle, _ = map(float, np.linalg.eigvalsh(scene.stiffness()[-3:, -3:]))
     length, stiffness = scene.length, (least * middle) ** 0.5  # a rod may be soft in one way only, as in torsion
-    c = scene.constants()
-    own = max(float(scene.inertia.rho_A(c)), *(float(x) / length**2 for x in scene.inertia.rho_I(c)))
-    rotary = [i for x in scene.attachments if x.rotary_inertia for i in x.rotary_inertia(c)]
-    attached = sum(float(x.mass(c)) for x in scene.attachments if x.mass) / length
-    carried = max(attached, own, *(float(i) / length**3 for i in rotary))
-    mass = (own * carried) ** 0.5 if own > 0 else carried  # between fast motions of a light rod and slow ones of bodies
+    mass = _mass(scene, length)
     omega2 = stiffness / (mass * length**4) if mass > 0 else 1.0
     sizes = length, stiffness / length**2, stiffness / length, stiffness / length, max(map(abs, scene.span)), omega2
     if all(size(x) == 1.0 for x in sizes):
         return ONES
     length, force, moment, energy, load, omega2 = (1.0 if x == 0 or not isfinite(x) else float(x) for x in sizes)
     return Units(length, force, moment, energy, load, size(_of_ordinate(scene)), omega2)
+
+
+def _mass(scene: Scene, length: float) -> float:
+    """Natural mass per length, between that of fast motions of a light rod and that of slow ones of bodies on it."""
+    c = scene.constants()
+    own = max(float(scene.inertia.rho_A(c)), *(float(x) / length**2 for x in scene.inertia.rho_I(c)))
+    rotary = [i for x in scene.attachments if x.rotary_inertia for i in x.rotary_inertia(c)]
+    attached = sum(float(x.mass(c)) for x in scene.attachments if x.mass) / length
+    carried = max(attached, own, *(float(i) / length**3 for i in rotary))
+    return float((own * carried) ** 0.5 if own > 0 else carried)
 
 
 def size(value: float) -> float:

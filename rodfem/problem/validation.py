@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,8 @@ from rodfem.problem.trials import check_functions, check_plane, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
+    from rodfem.problem.ends import End
+    from rodfem.problem.functions import Constants
     from rodfem.problem.scene import Scene
 
 LARGEST, TINIEST = 1e60, 1e-60
@@ -105,16 +108,19 @@ def check_start(scene: Scene) -> None:
     if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > NEGLIGIBLE:
         raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")
     for i in np.flatnonzero(_angles(q) > TURNED).tolist():
-        low, high = float(s[i]), float(s[i + 1])
-        for _ in range(32):  # a continuous start turns by nothing in what is left then
-            middle = (low + high) / 2
-            first, second = _angles(scene.start(np.array([low, middle, high])))
-            low, high = (low, middle) if first > second else (middle, high)
-        left = float(_angles(scene.start(np.array([low, high])))[0])
-        if left > TURNED / 2:
-            raise SceneError(
-                f"The start jumps by {left:.3g} radian at s = {low:.6g}: let it be continuous, as rotations are."
-            )
+        _check_jump(scene.start, float(s[i]), float(s[i + 1]))
+
+
+def _check_jump(start: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> None:
+    for _ in range(32):  # a continuous start turns by nothing in what is left then
+        middle = (low + high) / 2
+        first, second = _angles(start(np.array([low, middle, high])))
+        low, high = (low, middle) if first > second else (middle, high)
+    left = float(_angles(start(np.array([low, high])))[0])
+    if left > TURNED / 2:
+        raise SceneError(
+            f"The start jumps by {left:.3g} radian at s = {low:.6g}: let it be continuous, as rotations are."
+        )
 
 
 def _angles(q: np.ndarray) -> np.ndarray:
@@ -129,11 +135,7 @@ def trouble_with_inertia(scene: Scene, load: float | None) -> str:
 
     A rod under loads without a potential has an inertia.
     """
-    c, along = scene.constants(load), [scene.constants(load, s) for s in scene.samples()]
-    masses = [float(x.mass(c)) for x in scene.attachments if x.mass]
-    masses += [number_of(scene.inertia.rho_A(there)) for there in along]
-    rotary = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    rotary += [number_of(x) for there in along for x in scene.inertia.rho_I(there)]
+    masses, rotary = _inertia_at(scene, load)
     least, largest = min(masses + rotary), max(masses + rotary)
     there = "" if load is None else f" at {scene.load} = {load:g}"
     if least < 0:
@@ -148,6 +150,16 @@ def trouble_with_inertia(scene: Scene, load: float | None) -> str:
         f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter "
         f"of motion, so give it an inertia{there}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
     )
+
+
+def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
+    """Masses and rotary inertias of a scene at a ``load``, by default its own: of the rod at its samples."""
+    c, along = scene.constants(load), [scene.constants(load, s) for s in scene.samples()]
+    masses = [float(x.mass(c)) for x in scene.attachments if x.mass]
+    masses += [number_of(scene.inertia.rho_A(there)) for there in along]
+    rotary = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
+    rotary += [number_of(x) for there in along for x in scene.inertia.rho_I(there)]
+    return masses, rotary
 
 
 def check_convexity(scene: Scene) -> None:
@@ -249,14 +261,17 @@ def check_balance(scene: Scene) -> None:
     if any(x.force for x in scene.attachments) or scene.distributed is not None or not scene.conservative:
         return
     for load in scene.loads():
-        c = scene.constants(load)
-        forces = np.array([[float(x) for x in end.force(c)] for end in scene.sides if end.force] or np.zeros((1, 3)))
+        forces = np.array([_force_on(end, scene.constants(load)) for end in scene.sides])
         total = forces.sum(axis=0)
         if abs(total).max() > NEGLIGIBLE * abs(forces).max():
             raise SceneError(
                 f"At {scene.load} = {load:g} the forces on the ends add up to {(total + 0.0).tolist()}, and nothing "
                 "holds the rod against that: hold an end, attach a spring, or let the forces balance."
             )
+
+
+def _force_on(end: End, c: Constants) -> list[float]:
+    return [0.0] * 3 if end.force is None else list(map(float, end.force(c)))
 
 
 def check_reach(scene: Scene) -> None:

@@ -66,6 +66,8 @@ LINES = {
     "--twisting 1e308": "powers are no floats",
     "--coupling 1e308": "powers are no floats",
     # words
+    "--formulation foo": "formulation",
+    "blue": "nrecognized arguments: blue",
     "--output ''": "name of the folder is empty",
     "--output /etc/passwd/x": "cannot be written",
     "--foo": "Unrecognized arguments: --foo; see",

@@ -45,23 +45,6 @@ def test_shared_kept_and_taken_up_again(folder: Path) -> None:
 
 
 @pytest.mark.alone
-def test_a_result_of_an_older_file_is_used_again(folder: Path) -> None:
-    """Its key has digests, too."""
-    rods, done = [scene("cord", turns=1.0)], [0]
-
-    def work(rod: Scene) -> dict[str, Any]:
-        done[0] += 1
-        return {"name": rod.name}
-
-    many(rods, work, folder)
-    file = folder / "rod-00000.json"
-    data = json.loads(file.read_text())
-    file.write_text(json.dumps(data | {"key": data["key"] | {"stated": "0" * 16, "code": "1" * 16}}))
-    assert many(rods, work, folder) == [{"name": "cord"}]
-    assert done == [1]
-
-
-@pytest.mark.alone
 def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
     """It is refused on every rank, and not written over."""
     rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0)]

@@ -18,7 +18,7 @@ import hemitropic_cases
 import pytest
 from hard.folders import surroundings
 
-from rodfem import Discretization, Plan, run, trace
+from rodfem import Discretization, Plan, trace
 from rodfem.app.screen import coloured
 from rodfem.app.terminal import Report, is_screen
 from rodfem.ranks import RANK
@@ -211,14 +211,3 @@ def test_most_branches() -> None:
     found = trace(scene, MESH, Plan(most_branches=1, error_bars=False))
     assert len(found) == 1 and sum(s.to_follow for s in found.special()) == 2
     assert found.in_words().endswith("2 branch points were not followed.")
-
-
-@pytest.mark.long
-def test_a_run_without_error_bars_of_few_branches(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    plan = Plan(most_branches=2, error_bars=False)
-    run(hemitropic_cases.scene(span=(0.0, 0.5)), MESH, plan, folder, figures=False)
-    out = capfd.readouterr().out
-    assert "no estimate" in out and not list(folder.glob("*.png"))
-    assert "1 branch point was not followed, as there are 2 branches: Plan(most_branches=4) follows what leaves" in out
-    assert "The first branch, straight, is stable from lam = 0 to 0.11" in out
-    assert "\033" not in out

@@ -22,8 +22,8 @@ import rodfem
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
-from rodfem.problem.ends import Attachment, clamped, free
-from rodfem.problem.scene import Inertia, Ordinate, Scene
+from rodfem.problem.ends import clamped, free
+from rodfem.problem.scene import Ordinate, Scene
 
 pytestmark = pytest.mark.alone
 
@@ -102,23 +102,6 @@ def test_an_energy_of_strains_that_a_rod_does_not_have(
 
 
 @pytest.mark.long
-def test_inertia_of_the_spectrum_is_named(folder: Path, printed: Any) -> None:
-    rod, plan = replace(compressed(), span=(0.0, 0.1)), Plan(spectrum=1, error_bars=False)
-    own = replace(rod, inertia=Inertia(rho_I=lambda c: (2.0, 2.0, 2.0)))
-    carried = replace(rod, attachments=(Attachment(1.0, rotary_inertia=lambda c: (1.0, 1.0, 1.0)),))
-    found = [printed(scene, plan, folder) for scene in (rod, own, carried)]
-    assert [scene.has_inertia for scene in (rod, own, carried)] == [False, True, True]
-    if FIRST:
-        words = ("unit rotary inertia", "the scene's inertia", "the scene's inertia")
-        assert all(
-            f"omega^2 for {w} (symmetry modes left out; no error bars)" in out
-            for w, (out, _) in zip(words, found, strict=True)
-        )
-    first, second = (data["branches"][0]["columns"]["spectrum"][0][0] for _, data in found[:2])
-    assert first == pytest.approx(2 * second, rel=1e-9)
-
-
-@pytest.mark.long
 def test_what_is_counted_under_loads_without_potential(folder: Path, printed: Any) -> None:
     beck = demo_cases.scene("follower", span=(0.0, 5.0))
     mesh = Discretization("pointwise", 4, 4)
@@ -171,11 +154,6 @@ def test_help_has_all_that_pages_name() -> None:
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
-
-
-def test_what_is_no_module_is_named() -> None:
-    with pytest.raises(AttributeError, match="it has Attachment, "):
-        _ = rodfem.nothing
 
 
 @pytest.mark.long

@@ -24,11 +24,9 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
-from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
-from rodfem.problem.ends import Attachment, clamped, free, pinned, sliding
 from rodfem.problem.functions import needs_centreline
-from rodfem.problem.scene import Inertia, Scene
+from rodfem.problem.scene import Scene
 
 pytestmark = pytest.mark.alone
 
@@ -180,25 +178,3 @@ def test_flutter_loads_of_the_page() -> None:
     for name in ("pflueger", "leipholz"):
         (flutter,) = [s for s in golden[f"docs {name}"][0]["special"] if s["kind"] == "flutter"]
         assert [flutter["load"]] == pytest.approx(expected()[name], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"ends": (clamped(), free(), free())}, "not two of the kind End"),
-        ({"follower": lambda x, c: x.r}, r"distributed follower force is no function of 1 argument\(s\): give f\(c\)"),
-        ({"ends": (free(), sliding(lambda c: (0.0, 0.0, None)))}, "can drift away along e3"),
-        ({"ends": (free(), pinned(lambda c: (0.0, None, 0.0))), "inertia": Inertia(lambda c: 1)}, "away along e2"),
-        ({"planar": "e2", "ends": (clamped(), free(lambda c: (0, c.P, 0)))}, "pushes the rod out of its plane"),
-    ],
-)
-def test_limits(change: dict[str, Any], words: str) -> None:
-    fields = {name: page()[name] for name in ("rigid", "bent")}
-    column = {**fields["rigid"], **fields["bent"], "name": "column", "ordinate": page()["tip"], "span": (0.0, 1.0)}
-    with pytest.raises(SceneError, match=words):
-        Scene(**(column | {"ends": (clamped(), free(page()["push"]))} | change))
-
-
-def test_no_hinge_inside_the_rod() -> None:
-    with pytest.raises(TypeError, match="unexpected keyword argument 'hinge'"):
-        Attachment(0.5, hinge=(1.0, 0.0, 0.0))  # type: ignore[call-arg]

@@ -6,7 +6,7 @@ from math import pi, sqrt
 
 import pytest
 
-from rodfem import Discretization, Inertia, Ordinate, Scene, SceneError, Solver, clamped, free
+from rodfem import Discretization, Inertia, Ordinate, Scene, Solver, clamped, free
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.alone
@@ -45,9 +45,3 @@ def test_a_mass_alone_is_that_of_a_slender_rod() -> None:
     assert lowest(cantilever(Inertia(rho_A=lambda c: 1.0))) == pytest.approx(SLENDER, rel=1e-6)
     both = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0))
     assert lowest(cantilever(both)) == pytest.approx(pi / 2, rel=1e-6)
-
-
-def test_without_any_inertia_nothing_moves() -> None:
-    pushed = {"ends": (clamped(), free(follower=lambda c: (0.0, 0.0, -c.P)))}
-    with pytest.raises(SceneError, match="give it an inertia"):
-        Solver(cantilever(Inertia(rho_A=lambda c: 0.0), **pushed))

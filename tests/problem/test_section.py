@@ -85,15 +85,6 @@ def test_limits() -> None:
     assert section.ellipse(1.0, 0.001, E=1.0, nu=0.0).shear[0] == pytest.approx(0.9, rel=1e-4)  # of a thin blade
 
 
-def test_a_strip() -> None:
-    """It bends easily about its width; torsion as for a thin rectangle, b t^3/3 (1 - 0.630 t/b) (Timoshenko)."""
-    tape = section.strip(25e-3, 0.5e-3, **STEEL)
-    assert tape.I1 == pytest.approx(25e-3 * 0.5e-3**3 / 12, rel=1e-14) and tape.I2 == pytest.approx(2500 * tape.I1)
-    assert tape.J == pytest.approx(25e-3 * 0.5e-3**3 / 3 * (1 - 0.630 / 50), rel=1e-5)
-    with pytest.raises(InputError, match="thickness is 2: give no more than the width, 1"):
-        section.strip(1.0, 2.0, **STEEL)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("rod", ["flexible", "unshearable", "inextensible", "unshearable and inextensible"])
 def test_a_column_in_metres_and_newtons(rod: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, hypot, pi, radians, sin
+from math import cos, hypot, radians, sin
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, hinged, run, sliding_hinge, trace
+from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, run, sliding_hinge, trace
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import Look
 from rodfem.output.render import _read
@@ -50,25 +50,6 @@ def critical(scene: Scene, formulation: str) -> float:
 
 def top(c: Any) -> tuple[float, float, float]:
     return (0.0, 0.0, 1.0)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-@pytest.mark.parametrize("planar", [None, "e2"])
-@pytest.mark.parametrize(("left", "expected"), [(clamped(), TAN), (hinged(E2), pi**2)], ids=["clamped", "hinged"])
-def test_inclined_guide(left: End, expected: float, planar: str | None, formulation: str) -> None:
-    """The rod is straight under a thrust ``N`` with ``N cos(tilt) = P``, and its tip cannot move across to first order:
-    it buckles where ``N`` is that of a guide along the rod."""
-    scene = column(left, sliding_hinge(E2, INCLINED, top, force=push), planar=planar)
-    assert critical(scene, formulation) == pytest.approx(expected * cos(TILT), rel=1e-8)
-
-
-@pytest.mark.long
-def test_along_an_axis_it_is_the_plain_hinge() -> None:
-    plain = column(clamped(), hinged(E2, lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P)))
-    slides = column(clamped(), sliding_hinge(E2, (1e-17, 0.0, 2.0), force=push))
-    found = [critical(scene, "reduced") for scene in (plain, slides)]
-    assert found[0] == found[1] == pytest.approx(TAN, rel=1e-9)
 
 
 @pytest.mark.long

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import demo_cases
 import hemitropic_cases
@@ -14,9 +13,7 @@ from rescaled import STEEL, differences, rescaled
 
 import rodfem
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, sliding
-from rodfem.continuation.singular_points import coupling_of
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.words import in_decimals, number
 from rodfem.problem.functions import Constants
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -45,38 +42,6 @@ def column(length: float, stiffness: float, rod: str) -> Scene:
         ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0] ** 2 + r[1] ** 2),
         span=(0.0, 10 * stiffness / length**2),
     )
-
-
-@cache
-def dimensionless(rod: str) -> rodfem.Diagram:
-    """Diagram of the column of unit length and stiffness."""
-    return rodfem.trace(column(1.0, 1.0, rod), MESH, Plan(depth=1))
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("rod", ["unshearable and inextensible", "flexible"])
-@pytest.mark.parametrize(
-    ("length", "stiffness"),
-    [(1.0, 1e6), (1e-3, 1.0), (1e4, 1e9), (1e-4, 1e-8), (1e-8, 2e-28)],
-    ids=["steel bar", "wire", "pipeline", "fibre", "DNA"],
-)
-def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> None:
-    """Loads, ordinates and indices of all rows in units of the rod are those of the rod of unit length and stiffness.
-
-    Loads of order 1e6 are the trap: the weight of the load in the metric, one over the square of the span, is no mass
-    of a perturbation, and as the smallest of them it would put every eigenvalue within round-off.
-    """
-    one, other = dimensionless(rod), rodfem.trace(column(length, stiffness, rod), MESH, Plan(depth=1))
-    assert [[(str(s.kind), s.negative_before, s.negative_after) for s in b.special] for b in one] == [
-        [(str(s.kind), s.negative_before, s.negative_after) for s in b.special] for b in other
-    ]
-    assert not other.warnings
-    load, area = stiffness / length**2, length**2
-    for a, b in zip(one, other, strict=True):
-        assert [p.negative for p in a.points] == [p.negative for p in b.points]
-        found = np.array([(s.point.load / load, s.point.ordinate / area) for s in b.special])
-        np.testing.assert_allclose(found, [(s.point.load, s.point.ordinate) for s in a.special], rtol=1e-9, atol=1e-10)
 
 
 @pytest.mark.long
@@ -108,28 +73,6 @@ def test_index_where_the_stiffness_is_lost_beside_the_constraints(units: tuple[f
         assert [solver.equilibrium(load).negative for load in loads] == [0, 1]
 
 
-def aside(length: float, stiffness: float) -> Scene:
-    """The flexible column with a tenth of its natural load aside: it bends from the first load on."""
-    lateral = 0.1 * stiffness / length**2
-    return replace(column(length, stiffness, "flexible"), ends=(clamped(), free(force=lambda c: (0.0, lateral, -c.P))))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "units", [DNA[:2], *(pytest.param(x, marks=pytest.mark.alone) for x in [(1.0, 1e6), (1e-3, 1.0), (1e4, 1e9)])]
-)
-def test_coupling_to_the_load(units: tuple[float, float]) -> None:
-    """Cosine between a mode and the derivative in the load, which tells folds from branch points."""
-    found = []
-    for length, stiffness in ((1.0, 1.0), units):
-        solver = rodfem.Solver(aside(length, stiffness), MESH)
-        x = solver.equilibrium(2.0 * stiffness / length**2).x
-        (mode,) = solver.equilibria.inertia.modes_near_zero(x, 1)
-        found.append(coupling_of(solver.equilibria, x, mode))
-    assert found[0] > 1e-3
-    assert found[1] == pytest.approx(found[0], rel=1e-6)
-
-
 def pushed(length: float, stiffness: float, mass: float) -> Scene:
     """Rod under a follower load."""
     return Scene(
@@ -144,20 +87,6 @@ def pushed(length: float, stiffness: float, mass: float) -> Scene:
         ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
         span=(0.0, 24 * stiffness / length**2),
     )
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("units", [DNA, PIPELINE], ids=["DNA", "pipeline"])
-def test_flutter(units: tuple[float, float, float]) -> None:
-    """Beck's load 20.0509536 EI / L^2 and the frequencies of a cantilever: roots of 1 + cos x cosh x, to the fourth."""
-    length, stiffness, mass = units
-    diagram = rodfem.trace(pushed(*units), Discretization(elements=4, degree=6), Plan(error_bars=False))
-    (flutter,) = diagram.special("flutter")
-    assert flutter.point.load * length**2 / stiffness == pytest.approx(20.05095361897, rel=1e-9)
-    omega2 = np.array(diagram["straight"].points[0].omega2)[[0, 2], 0] * mass * length**4 / stiffness
-    np.testing.assert_allclose(omega2, np.array([1.875104068711961, 4.694091132974174]) ** 4, rtol=1e-7)
-    assert [p.negative for p in diagram["straight"].points if p.load < flutter.point.load][-1] == 0
 
 
 @pytest.mark.few(1)
@@ -179,20 +108,6 @@ def test_frequencies_of_a_cantilever(length: float, force: float, elements: int)
 
 
 @pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
-def test_methods(method: str) -> None:
-    """Eigenvalues of a flexible rod by each method, in the kinetic metric of unit rotary inertia."""
-    values = []
-    for length, stiffness in ((1.0, 1.0), DNA[:2]):
-        solver = rodfem.Solver(column(length, stiffness, "flexible"), MESH)
-        verdict = solver.assess(solver.equilibrium(5.0 * stiffness / length**2), method)
-        assert verdict.negative == 2
-        values.append(np.array(verdict.values) * length**2 / stiffness)
-    np.testing.assert_allclose(values[1], values[0], rtol=1e-8)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(("name", "units"), [("cord", (7.0, 1e6)), ("hemitropic", (1e-3, 1e6))])
 def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> None:
     """Off natural units its pivots do not tell a singular state from others: branch points are missed."""
@@ -204,15 +119,6 @@ def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> Non
     diagram = rodfem.trace(rescaled(scene, *units), Discretization("pointwise", 7, 5, factors="petsc"), plan)
     assert [s.point.load for s in diagram.special("branch point")] == pytest.approx(buckling, rel=1e-7)
     assert not diagram.warnings
-
-
-@pytest.mark.alone
-def test_numbers_in_words() -> None:
-    """A load of 1e-11 is written with its digits, by the terminal and in tables."""
-    assert number(7.89568359e-11, 8e-19) == "7.89568359e-11 (8e-19)"
-    assert number(0.3216500866, 3e-7) == "0.3216501 (4e-07)"
-    assert in_decimals(1.026438867e-10, 10, 1e-10) == "1.026439e-10"
-    assert in_decimals(1.0, 3, 1.0) == "1.000"
 
 
 @pytest.mark.few(1)
@@ -253,3 +159,17 @@ def test_loads_have_units_too(name: str) -> None:
 def test_a_fold_feels_a_load_of_any_unit() -> None:
     """In a unit of 1e-13 the derivative in the load is as small as that of equations that do not feel it."""
     assert not differences("classic pressed arch", *STEEL[:2], 1e13)
+
+
+@pytest.mark.long
+@pytest.mark.alone
+@pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
+def test_methods(method: str) -> None:
+    """Eigenvalues of a flexible rod by each method, in the kinetic metric of unit rotary inertia."""
+    values = []
+    for length, stiffness in ((1.0, 1.0), DNA[:2]):
+        solver = rodfem.Solver(column(length, stiffness, "flexible"), MESH)
+        verdict = solver.assess(solver.equilibrium(5.0 * stiffness / length**2), method)
+        assert verdict.negative == 2
+        values.append(np.array(verdict.values) * length**2 / stiffness)
+    np.testing.assert_allclose(values[1], values[0], rtol=1e-8)
