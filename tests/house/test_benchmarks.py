@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 from types import ModuleType
@@ -16,7 +15,6 @@ from benchmarks.auto.program import check, require_auto
 from benchmarks.speed import plots
 from benchmarks.speed.scipy_bvp import RODS, solve
 from benchmarks.speed.tables import fastest
-from benchmarks.store import Store
 from benchmarks.targets import TARGETS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -72,19 +70,3 @@ def test_figures_are_drawn_from_the_page_alone(tmp_path: Path) -> None:
 def test_a_picture_is_drawn(tmp_path: Path, picture: ModuleType) -> None:
     picture.main(tmp_path / "drawn.png")
     assert (tmp_path / "drawn.png").stat().st_size > 20_000
-
-
-def test_nothing_measured_is_lost(tmp_path: Path) -> None:
-    store = Store(tmp_path / "measured.json", resume=False)
-    store.measure("one", lambda: [{"failed": "no"}, {"seconds": 1.0}])
-    with pytest.raises(KeyboardInterrupt):
-        store.measure("two", interrupted)
-    again = Store(tmp_path / "measured.json", resume=True)
-    assert again.measure("one", interrupted)[1] == {"seconds": 1.0}
-    assert again.failures() == {"no": ["one"]}
-    again.measure("two", lambda: [])
-    assert list(json.loads((tmp_path / "measured.json").read_text())) == ["one", "two"]
-
-
-def interrupted() -> None:
-    raise KeyboardInterrupt
