@@ -486,8 +486,8 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         with clock("setup"):
             mesh = _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
-            if plan.accuracy is None:
-                check_start(found, plan.over(scene))
+            if plan.accuracy is None and (doubt := check_start(found, plan.over(scene))):
+                recorder.warn(doubt)
         asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
         recorder.system(found.system, plan.accuracy)
         plan = _with_bars(plan, found, recorder)

@@ -57,19 +57,11 @@ class PersistentZeros:
 
     def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
         """Report eigenvalues that are zero at two rows: to round-off, or to what Newton's method leaves of a state."""
-        load, exact = solver.system.scene.load, _exact(solver, (before, point), extra)
-        stays = "eigenvalue stays", "eigenvalues stay"
-        if exact:
-            self.observer.note(
-                f"  {many(exact, *stays)} zero that no symmetry of the scene explains: these states may turn or "
-                "move freely at one and the same load"
-            )
-        if extra > exact:
-            self.observer.note(
-                f"  {many(extra - exact, *stays)} within {TOLERANCE:.0e} of zero, relative to the lowest bending "
-                f"eigenvalue, from {load} = {before.load:.8g} to {point.load:.8g} at least, without being zero to "
-                "round-off: Newton's method leaves that open of a state, their sign is undecided"
-            )
+        stay = f"  {many(extra, 'eigenvalue stays', 'eigenvalues stay')} zero that no symmetry of the scene explains"
+        if _exact(solver, (before, point), extra) == extra:
+            self.observer.note(f"{stay}: these states may turn or move freely at one and the same load")
+        else:
+            self.observer.note(f"{stay}, to what a state leaves open ({TOLERANCE:.0e} of bending): signs are open")
 
 
 def _exact(solver: BranchSolver, points: Sequence[Point], extra: int) -> int:

@@ -22,6 +22,7 @@ from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
+from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 
@@ -75,22 +76,41 @@ def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
         )
 
 
-def check_start(solver: BranchSolver, span: tuple[float, float]) -> None:
-    """Raise an error where the mesh cannot hold the half-waves of the scene's start at the ends of a ``span``.
+def check_start(solver: BranchSolver, span: tuple[float, float]) -> str:
+    """Why indices may be the mesh's at the ends of a ``span``: that of the scene's start is another on a finer mesh.
 
-    Of a rod that bends from the start on, only the first load is looked at.
+    Each unstable mode has half-waves.  Of a rod that bends from the start on, only the first load is looked at.  Raises
+    :class:`InputError` where the mesh cannot hold the half-waves at all.
     """
     system, mesh = solver.system, solver.system.fields.discretization
+    nodes = mesh.elements * mesh.degree
     for load in span if solver.conservative else ():
-        start = solver.start(load)
-        x, outcome = solver.at_load(start, load)
-        turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
-        bent = load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT
-        if not outcome.converged or bent or solver.lost_convexity(x):
-            return
-        if may_depend(solver.shape, x):  # then a count is round-off
-            require_independent_constraints(solver.shape, x, start)
-        check_index(system.scene, load, solver.inertia.at(x).count().negative, mesh.elements * mesh.degree)
+        index = _index(solver, load)
+        if index is None:
+            break
+        check_index(system.scene, load, index, nodes)
+        if 8 * index > nodes:
+            there = _index(BranchSolver(System(system.scene, mesh.finer(2), system.comm)), load)
+            if there not in (None, index):
+                return (
+                    f"At {system.scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} "
+                    f"elements and {there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a "
+                    "higher degree."
+                )
+    return ""
+
+
+def _index(solver: BranchSolver, load: float) -> int | None:
+    """Index of the scene's start at a load; None where it is no equilibrium there, or its energy not convex."""
+    start, system = solver.start(load), solver.system
+    x, outcome = solver.at_load(start, load)
+    turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
+    bent = load != system.scene.span[0] and max(system.comm.allgather(turned)) > BENT
+    if not outcome.converged or bent or solver.lost_convexity(x):
+        return None
+    if may_depend(solver.shape, x):  # then a count is round-off
+        require_independent_constraints(solver.shape, x, start)
+    return solver.inertia.at(x).count().negative
 
 
 def at_load(solver: BranchSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:

@@ -100,8 +100,6 @@ class Sweep:
         if self._still:
             with without("Whether frequencies stay zero was not examined", comm, self.observer.warn):
                 self._family(last)
-        with without("The asymmetry of the tangent matrix was not measured", comm, self.observer.warn):
-            self._asymmetry(last)
         self.finished()
         return self.branches
 
@@ -207,14 +205,6 @@ class Sweep:
                 f"({', '.join(dict.fromkeys(moving))}): the rod may turn or move freely, and frequencies and critical "
                 "loads are those of the state that its start leads to; others differ."
             )
-
-    def _asymmetry(self, last: Point) -> None:
-        """Say what the load does to the tangent matrix at the last point."""
-        rank, size = self.eigensolver.at(last.x).asymmetry()
-        self.observer.note(
-            f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
-            f"(largest entry {size:.1e} of |S|)"
-        )
 
     def at(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""

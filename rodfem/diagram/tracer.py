@@ -291,24 +291,18 @@ class Tracer:
         branch.special.append(end)
         return "stretch reaches zero"
 
-    def _singular_start(self, branch: Branch) -> None:
-        """Record that a range begins at a singular state: a branch point there is not located, and not followed."""
-        first = branch.points[0]
-        extra = first.zero - persistent_zeros(branch.points)
-        located = any(s.point is first and s.kind.branches for s in branch.special)
-        if branch.parent is None and extra > 0 and not located:
-            branch.singular_start = extra
-            self.observer.warn(Remark(branch.start_in_words(self.scene.load), first.load))
-
-    def _singular_end(self, branch: Branch) -> None:
-        """Say that a range ends at a singular state: a branch point there is not located, and not followed."""
-        last, before = branch.points[-1], branch.points[-2:-1]
-        located = any(s.point is last and s.kind.branches for s in branch.special)
-        if branch.ended == END_OF_RANGE and before and last.zero > before[0].zero and not located:
-            words = (
-                f"{branch.name} ends at a singular state, at {self.scene.load} = {last.load:.8g}: use a wider range."
-            )
-            self.observer.warn(Remark(words, last.load))
+    def _singular_ends(self, branch: Branch) -> None:
+        """Say that a range begins or ends at a singular state: no branch point is located there, and none followed."""
+        first, last, still = branch.points[0], branch.points[-1], persistent_zeros(branch.points)
+        known, said = {id(s.point) for s in branch.special if s.kind.branches}, list[Remark]()
+        if branch.parent is None and first.zero > still and id(first) not in known:
+            branch.singular_start = first.zero - still
+            said.append(Remark(branch.start_in_words(self.scene.load), first.load))
+        if branch.ended == END_OF_RANGE and last.zero > still and id(last) not in known:
+            where = f"{self.scene.load} = {last.load:.8g}"
+            said.append(Remark(f"{branch.name} ends at a singular state, at {where}: use a wider range.", last.load))
+        for remark in said:
+            self.observer.warn(remark)
 
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
@@ -330,8 +324,7 @@ class Tracer:
         self.events.finish(self.observer)
         branch.renumber()
         branch.explain()
-        self._singular_start(branch)
-        self._singular_end(branch)
+        self._singular_ends(branch)
         last = branch.points[-1]
         if not any(s.point is last for s in branch.special if s.kind != USER):
             branch.special.append(self.solver.given(END, last))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import pi
 
 import classics
 import numpy as np
@@ -13,7 +12,7 @@ from golden_cases import NOT_CONSERVATIVE, cases
 from literature.test_free_rods import floating
 from scipy.linalg import eigvals
 
-from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, trace
+from rodfem import Discretization, Inertia, Parameter, Plan, Scene, Solver, free, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.equilibria import at_load
 from rodfem.forms.energy import bending_and_twist
@@ -52,27 +51,6 @@ def test_against_qz(name: str, part: float) -> None:
     for one, other in ((found, exact), (exact, found)):
         nu, all_others = 1.0 / (one[:18] + 10.0), 1.0 / (other + 10.0)
         assert abs(nu[:, None] - all_others).min(axis=1).max() < 1e-9 * abs(nu).max()
-
-
-@pytest.mark.long
-def test_a_cantilever_rolled_up_out_of_its_plane() -> None:
-    """Ten frequencies are complex at t = 0.045, and none of the six that are nearest to zero."""
-    helix = Scene(
-        "roll-up", (0.0, 10.0), "flexible",
-        lambda v, k, c: 5e3 * (v[0] ** 2 + v[1] ** 2 + (v[2] - 1) ** 2) + 50 * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
-        {"t": 0.0}, "t",
-        (clamped(), free(lambda c: (50 * c.t, 0.0, 0.0), moment=lambda c: (200 * pi * c.t, 0.0, 0.0))),
-        Ordinate("tip", s=10.0, of=lambda r, q: r[2]), (0.0, 0.046),
-        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1e-2, 1e-2, 2e-2)),
-    )  # fmt: skip
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rodfem.diagram.sweep.LOADS", 47)
-        diagram = trace(helix, Discretization("auto", 6, 5), Plan(error_bars=False))
-    (row,) = [p for p in diagram[0].points if abs(p.load - 0.045) < 1e-9]
-    assert row.negative == 10 == diagram.assess(row).negative
-    assert not diagram.warnings and not diagram[0].unexplained
-    for point in diagram[0].points[1::9]:
-        assert point.negative > 0
 
 
 def test_two_beyond_the_fortieth_meet_first() -> None:

@@ -23,7 +23,6 @@ from scipy.optimize import brentq, fsolve
 from rodfem import Diagram, Plan, clamped, free
 from rodfem.diagram.diagram import trace
 from rodfem.fem.fields import Discretization
-from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.scene import Scene
 
 BECK = float(double(20.0, 120.0)[0])
@@ -162,28 +161,3 @@ def test_flutter_and_divergence(strong: float, span: tuple[float, float]) -> Non
 
 
 FINE, COARSE = Discretization("pointwise", 4, 6), Discretization("pointwise", 2, 4)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_two_loads_beside_a_third_one() -> None:
-    """In one step of the sweep flutter comes and goes in one plane, and in the other one the column diverges."""
-
-    def push(part: float) -> Any:
-        return lambda c: (0.0, 0.0, -part * (FLUTTERS + 1e-5 - (c.p - 5.007) ** 2))
-
-    scene = classics.column(
-        "two planes",
-        (clamped(), free(force=push(1 - SHARE), follower=push(SHARE))),
-        (4.0, 6.0),
-        load="p",
-        inertia=classics.BEAM,
-        constants={"p": 4.0},
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, FLUTTERS / DIVERGES * (1 + 0.1 * (c.p - 5.015)), 1.0)),
-    )
-    diagram = trace(scene, FINE, Plan(depth=0))
-    inside = sorted((s.point.load, s.kind.words) for s in diagram.special() if 5.0 < s.point.load < 5.02)
-    assert [kind for _, kind in inside] == ["flutter", "flutter", "divergence"]
-    exact = [5.007 - sqrt(1e-5), 5.007 + sqrt(1e-5)]
-    assert [load for load, _ in inside[:2]] == pytest.approx(exact, abs=1e-8)
-    assert not diagram.warnings

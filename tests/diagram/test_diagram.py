@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import demo_cases
 import hemitropic_cases
@@ -103,27 +102,6 @@ def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
         rodfem.load(saved, softer)
     with pytest.raises(InputError, match=r"There is no .*diagram.json"):
         rodfem.load(folder, diagram.scene)
-
-
-@pytest.mark.alone
-def test_an_observer_hears_of_all(diagram: Diagram) -> None:
-    heard: list[Any] = []
-
-    class Ear(Observer):
-        def finished(self, branch: Branch) -> None:
-            heard.append(branch.name)
-
-        def complete(self, diagram: Diagram) -> None:
-            heard.append(len(diagram))
-
-        def warn(self, sentence: str) -> None:
-            heard.append(sentence)
-
-    rod = demo_cases.scene("cord")
-    found = rodfem.trace(rod, MESH, Plan((49.348022005446796, 45.0), depth=0, error_bars=False), Ear())
-    assert heard[-2:] == ["straight", 1]
-    assert [h for h in heard if isinstance(h, str) and h != "straight"] == found.warnings
-    assert any("is singular" in sentence for sentence in found.warnings)
 
 
 @pytest.mark.alone

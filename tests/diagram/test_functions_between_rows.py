@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import ufl
 from classics import column
 
 from rodfem import Diagram, Discretization, Plan, clamped, free, trace

@@ -13,7 +13,7 @@ from demo_cases import module
 
 import rodfem
 from rodfem import Diagram, Discretization, Inertia, Plan, Scene, Solver, clamped, free
-from rodfem.errors import InputError, SceneError
+from rodfem.errors import SceneError
 
 pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 4)
@@ -22,15 +22,6 @@ Statement = Callable[..., Scene]
 
 def hemitropic(A: float = -3.0) -> Scene:
     return replace(module("hemitropic").hemitropic_rod(A), span=(0.0, 0.5))
-
-
-def cord(k0: float = 3 * np.pi) -> Scene:
-    return replace(module("cord").cord(k0 / (2 * np.pi)), span=(60.0, 20.0))
-
-
-def ruler(B1: float = 1.0) -> Scene:
-    made: Scene = module("ruler").ruler(bending=(B1, 10.0))
-    return made
 
 
 def moved(e: float = 0.1) -> Scene:
@@ -53,8 +44,6 @@ def pushed(rho: float = 1.0) -> Scene:
 
 CASES: dict[str, tuple[Statement, dict[str, float], Plan]] = {
     "hemitropic": (hemitropic, {"A": -1.5}, Plan(at=(0.2,), depth=1)),
-    "cord": (cord, {"k0": 9.0}, Plan(depth=1)),
-    "ruler": (ruler, {"B1": 1.2}, Plan(depth=1)),
     "function at an end": (moved, {"e": 0.3}, Plan(depth=1)),
     "a symmetry more": (alike, {"B2": 1.0}, Plan(depth=1)),
     "frequencies": (pushed, {"rho": 2.0}, Plan()),
@@ -69,12 +58,7 @@ def same(a: Diagram, b: Diagram) -> None:
             np.testing.assert_array_equal(x.x.array_r, y.x.array_r)
             assert (x.load, x.ordinate, x.energy, x.negative) == (y.load, y.ordinate, y.energy, y.negative)
         for s, t in zip(one.special, other.special, strict=True):
-            assert (s.kind, s.note, s.negative_before, s.negative_after) == (
-                t.kind,
-                t.note,
-                t.negative_before,
-                t.negative_after,
-            )
+            assert repr(s) == repr(t)
             np.testing.assert_array_equal((s.point.load, s.error_estimate), (t.point.load, t.error_estimate))
     assert a.warnings == b.warnings
 
@@ -132,8 +116,3 @@ def test_other_functions_share_nothing() -> None:
 def test_constants_that_are_none(given: dict[str, Any], words: str) -> None:
     with pytest.raises(SceneError, match=words):
         Solver(alike(), MESH).rebind(**given)
-
-
-def test_a_change_that_neither_plan_nor_scene_has() -> None:
-    with pytest.raises(InputError, match="A plan has no 'B4', nor has the scene apart from its load"):
-        rodfem.trace(alike(), MESH, Plan((0.0, 2.0), depth=0, error_bars=False)).again(B4=1.0)
