@@ -59,16 +59,22 @@ def pieces_of(branch: Branch) -> list[Piece]:
     """Pieces of a branch of ``diagram.json``, in order."""
     columns = branch["columns"]
     rows = len(columns["load"])
-    known = {(row, side): index for row, *sides in _indices(branch) for side, index in enumerate(sides)}
+    known = {row: sides for row, *sides in _indices(branch)}
     kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
     off, space, steps = _from_neighbours(columns["negative"], kink), _in_space(branch), []
     for a, b in pairwise(range(rows)):
         on = kink[a] if kink[b] else ""
         own = columns["negative"] if on else off
-        least, more = _index([(known.get(end), own[end[0]], undecided[end[0]]) for end in ((a, 1), (b, 0))])
+        _, after = known.get(a, (None, None))
+        before, _ = known.get(b, (None, None))
+        least, more = _index([(after, own[a], undecided[a]), (before, own[b], undecided[b])])
         steps.append((least, max(space[a], space[b], least) if space else None, more, on))
-    cuts = [i for i in range(len(steps)) if i == 0 or steps[i] != steps[i - 1]]
-    return [Piece(a, b, *steps[a]) for a, b in pairwise([*cuts, len(steps)])]
+    out, first = [], 0
+    for step, group in groupby(steps):
+        last = first + len([*group])
+        out.append(Piece(first, last, *step))
+        first = last
+    return out
 
 
 def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
@@ -95,9 +101,12 @@ def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
         yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
         yield from _neighbours(columns, point) if point.get("negative_after") is not None else ()
     if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
-        s, undecided = columns["arclength"], columns["undecided"]
-        near = [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
+        near = _at_the_origin(columns["arclength"], columns["undecided"])
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
+
+
+def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
+    return [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
 
 
 def _neighbours(columns: Mapping[str, Any], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:

@@ -81,10 +81,8 @@ def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
         figure, axes = style.sheet(diagram["title"], _about(diagram), given)
         handles, lines = draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
-        bars = [point.get("ordinate_error_estimate") for branch in branches for point in branch.get("special", [])]
-        error = max((bar for bar in bars if bar is not None), default=0.0)
-        if given is None and all(abs(x) <= error for branch in branches for x in branch["columns"]["ordinate"]):
-            axes.set_ylim(-1.0, 1.0)  # as of a straight rod
+        if given is None and _is_flat(branches):
+            axes.set_ylim(-1.0, 1.0)
             if len(branches) > 1:
                 words = "the ordinate is zero all over: another one tells branches apart"
                 axes.annotate(words, (0.5, 0.25), xycoords="axes fraction", ha="center", color="0.4")
@@ -95,9 +93,16 @@ def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
     return figure
 
 
+def _is_flat(branches: Branches) -> bool:
+    """Whether the ordinate is zero all over, to the error bars that special points have of it: as of a straight rod."""
+    bars = [point.get("ordinate_error_estimate") for branch in branches for point in branch.get("special", [])]
+    error = max((bar for bar in bars if bar is not None), default=0.0)
+    return all(abs(x) <= error for branch in branches for x in branch["columns"]["ordinate"])
+
+
 def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Line]]:
     """Draw all curves and special points; return the legend's handles and the lines."""
-    handles, lines, images = list[Line2D](), list[Line](), list[Line2D]()
+    handles, lines = list[Line2D](), list[Line]()
     hues, behind = _free(axes, branches[0]["name"])
     for number, (branch, colour) in enumerate(zip(branches, cycle(hues), strict=False)):
         new = [Line(piece, colour, curve) for piece, curve in drawn(branch)]
@@ -107,19 +112,29 @@ def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Li
         if shape or not new:
             places = _places(branch).T
             axes.plot(*places, ls="", marker=shape or "o", ms=5.0, color=colour, markevery=0.08, zorder=3)
-        if branch.get("image") and not is_traced(branch, branches):
-            for piece, _, curve in new:
-                axes.plot(*(curve * [1.0, -1.0]).T, color=colour, **LINES[piece.kind] | style.THIN)
-            images.append(Line2D([], [], color="0.45", label=f"image, not traced: {branch['image']}", **style.THIN))
     for line in sorted(lines, key=lambda line: line.piece.kind != STABLE):
         upper = {} if line.piece.kind == STABLE else {"path_effects": style.RIM, "zorder": 2.5}  # where two lines lie
         axes.plot(*line.curve.T, color=line.colour, **LINES[line.piece.kind] | upper)
+    return handles + _kinds(lines) + _draw_images(axes, branches, hues) + _draw_marks(axes, branches), lines
+
+
+def _kinds(lines: Sequence[Line]) -> list[Line2D]:
+    """Handles of the legend for the kinds of lines, and for their indices."""
     kinds = {line.piece.kind for line in lines}
-    handles += [Line2D([], [], color="0.45", label=kind, **LINES[kind]) for kind in LINES if kind in kinds]
-    if lines:
-        words = "negative eigenvalues" + " in the plane (in space)" * any(x.piece.in_space is not None for x in lines)
-        handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words))
-    return handles + images + _draw_marks(axes, branches), lines
+    words = "negative eigenvalues" + " in the plane (in space)" * any(x.piece.in_space is not None for x in lines)
+    index = [Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=words)] * bool(lines)
+    return [Line2D([], [], color="0.45", label=kind, **LINES[kind]) for kind in LINES if kind in kinds] + index
+
+
+def _draw_images(axes: Axes, branches: Branches, hues: Sequence[str]) -> list[Line2D]:
+    """Draw the images of branches by a symmetry, of the opposite ordinate, that are no branches themselves."""
+    out = []
+    for branch, colour in zip(branches, cycle(hues), strict=False):
+        if branch.get("image") and not is_traced(branch, branches):
+            for piece, curve in drawn(branch):
+                axes.plot(*(curve * [1.0, -1.0]).T, color=colour, **LINES[piece.kind] | style.THIN)
+            out.append(Line2D([], [], color="0.45", label=f"image, not traced: {branch['image']}", **style.THIN))
+    return out
 
 
 def _free(axes: Axes, name: str) -> tuple[Sequence[str], str]:
@@ -226,13 +241,17 @@ def _about(diagram: Mapping[str, Any]) -> str:
     parts = [style.mesh_in_words(d)] if d else []
     if d and diagram.get("accuracy"):
         parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
-    counted = [point for point in special if point["kind"] in COUNTED]
-    bars = [point.get("error_estimate") for point in counted if point.get("resolved") is not False]
-    if known := [abs(bar) for bar in bars if bar is not None and isfinite(bar)]:
-        share = f" (of {len(known)} out of {len(counted)})" if len(known) < len(counted) else ""
-        parts.append(f"error of the loads of special points at most {style.at_most(max(known))}{share}")
     coarse = sum(point.get("resolved") is False for point in special)
-    return "; ".join(parts + [f"{coarse} of {len(special)} special points not resolved by the mesh"] * bool(coarse))
+    rest = [f"{coarse} of {len(special)} special points not resolved by the mesh"] * bool(coarse)
+    return "; ".join([*parts, *_accuracy([point for point in special if point["kind"] in COUNTED]), *rest])
+
+
+def _accuracy(special: Branches) -> list[str]:
+    """Greatest bound of the errors of special points in words; nothing where none is known."""
+    bars = [point.get("error_estimate") for point in special if point.get("resolved") is not False]
+    known = [abs(bar) for bar in bars if bar is not None and isfinite(bar)]
+    share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
+    return [f"error of the loads of special points at most {style.at_most(max(known))}{share}"] if known else []
 
 
 # --- branches between their rows

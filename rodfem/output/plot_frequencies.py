@@ -68,17 +68,20 @@ def figure_of(diagram: Mapping[str, Any], given: Axes | None = None, most: int =
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
     if not branches:
         raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")
-    about = mesh_in_words(diagram["discretization"])
-    found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
-    if found:
-        kinds = " and ".join(kind for kind in SPECIAL if any(s["kind"] == kind for s in found))
-        about += f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}"
+    about = mesh_in_words(diagram["discretization"]) + _accuracy(branches)
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(str(diagram["title"]), about, given)
         handles = draw_into(axes, branches, most)
         axes.set_xlabel(axis_label(diagram))
         explain(axes, handles)
     return figure
+
+
+def _accuracy(branches: Sequence[Mapping[str, Any]]) -> str:
+    """Greatest bound of the errors of the special loads."""
+    found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
+    kinds = " and ".join(kind for kind in SPECIAL if kind in {s["kind"] for s in found})
+    return f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}" if found else ""
 
 
 def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
@@ -90,12 +93,7 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
             axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
             ranges[found.words] = Patch(color=found.shade, label=found.words)
         for curve in curves(branch["columns"], branch["special"]):
-            color = motions.setdefault(curve.motion, curve.colour)
-            axes.plot(curve.loads, curve.real, "-", color=color, lw=1.8)
-            for what, part in curve.parts.items():
-                if not np.isnan(part).all():
-                    axes.plot(curve.loads, part, "".join(PARTS[what]), color=color, ms=4, lw=0.8, markevery=0.03)
-                    shown.add(what)
+            shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
         shown |= _marked(axes, branch["special"])
     looks: dict[str, dict[str, Any]] = {
         **{what: {"color": "0.3", "marker": marker, "ls": line, "lw": 0.8} for what, (marker, line) in PARTS.items()},
@@ -104,6 +102,15 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
     lines = [Line2D([], [], color=color, lw=1.8, label=motion) for motion, color in motions.items()]
     others = [Line2D([], [], **{"label": what} | look) for what, look in looks.items() if what in shown]
     return [*lines, *others, *ranges.values()]
+
+
+def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
+    """Draw one curve; returns which :data:`PARTS` it has."""
+    axes.plot(curve.loads, curve.real, "-", color=color, lw=1.8)
+    parts = {what: part for what, part in curve.parts.items() if not np.isnan(part).all()}
+    for what, part in parts.items():
+        axes.plot(curve.loads, part, "".join(PARTS[what]), color=color, ms=4, lw=0.8, markevery=0.03)
+    return {*parts}
 
 
 def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:

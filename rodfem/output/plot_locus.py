@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,26 +53,28 @@ def draw_locus(loci: Sequence[Locus], path: Path) -> Path:
         figure, axes = sheet(loci[0]["title"], _about(loci))
         axes.margins(0.04, 0.12)
         for one in loci:
-            _draw_curve(axes, one)
-        for one in loci:
-            if region := stable_region(one, loci):
-                axes.fill_between(*region, color="#CDE9DF", lw=0, zorder=-1, label=in_words(one))
+            _draw_curve(axes, one, loci)
         words, units = (loci[0].get(name, ("", "")) for name in ("words", "units"))
         load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
         axes.set_xlabel(other, fontsize=FONT + 1)
         axes.set_ylabel(load, fontsize=FONT + 1)
-        handles = [*axes.get_lines(), *axes.collections]
-        if any(pair[0] >= 0 for one in loci for pair in one["columns"]["index"]):
-            look = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
-            handles.append(Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **look))
-        explain(axes, handles)
+        explain(axes, [*axes.get_lines(), *axes.collections, *_index_entry(loci)])
         for one in loci:
             _write_indices(axes, one)
     return save(figure, path)
 
 
-def _draw_curve(axes: Axes, one: Locus) -> None:
-    """Draw a curve with the marks of its rows."""
+def _index_entry(loci: Sequence[Locus]) -> list[Line2D]:
+    """Entry of the legend for the indices of the curves, if there are any."""
+    known = any(pair[0] >= 0 for one in loci for pair in one["columns"]["index"])
+    look = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
+    return [Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **look)] * known
+
+
+def _draw_curve(axes: Axes, one: Locus, loci: Sequence[Locus]) -> None:
+    """Draw a curve with the marks of its rows and its stable side."""
+    if region := stable_region(one, loci):
+        axes.fill_between(*region, color="#CDE9DF", lw=0, zorder=-1, label=in_words(one))
     (x, y), (colour, dashes) = _curve(one), LINES[one["kind"]]
     axes.plot(x, y, color=colour, linestyle=dashes, linewidth=2.2, label=one["kind"])
     for row, what in [(one["start"], "start"), *((m["row"], m["kind"]) for m in one["marks"])]:
@@ -130,18 +132,22 @@ def stable_region(one: Locus, loci: Sequence[Locus]) -> StableRegion | None:
     """
     x, y = _curve(one)
     side, crossed = one.get("lower"), CROSSES in [mark["kind"] for mark in one["marks"]]
-    monotone = len(x) > 1 and abs(np.sign(np.diff(x)).sum()) == len(x) - 1
+    monotone = abs(np.sign(np.diff(x)).sum()) == len(x) - 1
     if crossed or not side or not monotone or any(next(zip(*one["columns"]["index"], strict=True))):
         return None
     order, grid = np.argsort(x), np.linspace(x.min(), x.max(), 400)
     edge = np.interp(grid, x[order], y[order])
     end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
-    for a, b in (_curve(another) for another in loci if another is not one):
-        for i in np.flatnonzero(np.diff(a) != 0):  # segments of another locus
-            share = (grid - a[i]) / (a[i + 1] - a[i])
-            level = np.where((share >= 0) & (share <= 1), b[i] + share * (b[i + 1] - b[i]), np.nan)
-            end = np.where((side * (level - edge) > 0) & (side * (level - end) < 0), level, end)
+    for level in (level for another in loci if another is not one for level in _levels(*_curve(another), grid)):
+        end = np.where((side * (level - edge) > 0) & (side * (level - end) < 0), level, end)
     return StableRegion(grid, edge, end)
+
+
+def _levels(x: Floats, y: Floats, grid: Floats) -> Iterator[Floats]:
+    """Loads (len(grid),) at which each segment of a locus has these values of the second parameter; nan where none."""
+    for i in np.flatnonzero(np.diff(x) != 0):
+        share = (grid - x[i]) / (x[i + 1] - x[i])
+        yield np.where((share >= 0) & (share <= 1), y[i] + share * (y[i + 1] - y[i]), np.nan)
 
 
 def _curve(one: Locus) -> tuple[Floats, Floats]:

@@ -67,18 +67,22 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         words, top = f"{heading(path)}{branch}, load {modes.load:.6g}", 1 - 0.1 / figure.get_figheight()
         figure.suptitle(words, fontsize=14, y=top, va="top")
         panels = [_Panel(figure.add_subplot(rows, columns, i), modes, setting, n) for i, n in enumerate(numbers, 1)]
-        if not moving:
+        if moving:
+            _animate(figure, panels, draft)
+        else:
             for panel in panels:
                 panel.draw()
             figure.savefig(draft)
-            return output
-        writer = PillowWriter(fps=20)
-        with writer.saving(figure, str(draft), figure.dpi):
-            for frame in range(FRAMES):
-                for panel in panels:
-                    panel.draw(frame / FRAMES)
-                writer.grab_frame()
     return output
+
+
+def _animate(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
+    writer = PillowWriter(fps=20)
+    with writer.saving(figure, str(path), figure.dpi):
+        for frame in range(FRAMES):
+            for panel in panels:
+                panel.draw(frame / FRAMES)
+            writer.grab_frame()
 
 
 def amplitude(root: complex, grows: bool, time: float) -> complex:
@@ -152,9 +156,12 @@ class _Panel:
         grown = (shape * ((high - low) / shape).max() - (high - low)) / 2
         low, high = low - grown, high + grown
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        size, names = 0.07 * (high - low)[0], dict[tuple[float, ...], list[str]]()
-        corner = low + 1.6 * size
-        for i, way in enumerate(view[:2].T):  # the triad; directions that look alike share a label
+        self._triad(low, 0.07 * (high - low)[0])
+
+    def _triad(self, corner: Floats, size: float) -> None:
+        """The directions e1, e2, e3, near a corner; directions that look alike share a label."""
+        corner, names = corner + 1.6 * size, dict[tuple[float, ...], list[str]]()
+        for i, way in enumerate(self.look.axes[:2].T):
             self.axes.plot(*np.stack([corner, corner + size * way], axis=1), color="0.45", lw=1.2)
             if np.linalg.norm(way) > 0.5:
                 names.setdefault(tuple(np.round(way, 0)), []).append(f"e{i + 1}")

@@ -75,17 +75,10 @@ def draw_shape(
     for solid in solids:
         surface = pyvista.PolyData.from_regular_faces(solid.points, solid.triangles)
         plotter.add_mesh(surface, color=solid.color, split_sharp_edges=True, feature_angle=40.0, **SHINE)
-    stations = np.linspace(0, len(state.s) - 1, 27).round().astype(int)[1:-1]
-    arrow = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
-    for index, colour in ((0, FIRST), (1, SECOND)):
-        points = pyvista.PolyData(state.centres[stations])
-        points["director"] = state.directors[stations, :, index]
-        arrows = points.glyph(orient="director", scale=False, factor=4.5 * look.radius, geom=arrow)
-        plotter.add_mesh(arrows, color=colour, **SHINE)
+    _add_directors(pyvista, plotter, state, look.radius)
     _look_at(plotter, np.concatenate([solid.points for solid in solids]), look, size[0] / size[1])
     plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", color=DARK, x_color=DARK, y_color=DARK, z_color=DARK)
-    loaded = any(solid.color == LOAD for solid in solids)
-    _write(plotter, state.caption if caption is None else caption, state.setting.notes, loaded)
+    _write(plotter, state.caption if caption is None else caption, state.setting.notes, solids)
     plotter.enable_anti_aliasing("ssaa")
     with draft_of(path) as draft:
         picture = plotter.screenshot(str(draft), return_img=True)
@@ -157,6 +150,16 @@ def _import_pyvista() -> Any:
     return pyvista
 
 
+def _add_directors(pyvista: Any, plotter: Any, state: State, radius: float) -> None:
+    stations = np.linspace(0, len(state.s) - 1, 27).round().astype(int)[1:-1]
+    arrow = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
+    for index, colour in ((0, FIRST), (1, SECOND)):
+        points = pyvista.PolyData(state.centres[stations])
+        points["director"] = state.directors[stations, :, index]
+        arrows = points.glyph(orient="director", scale=False, factor=4.5 * radius, geom=arrow)
+        plotter.add_mesh(arrows, color=colour, **SHINE)
+
+
 def _look_at(plotter: Any, points: Floats, look: Look, aspect: float) -> None:
     """Set a camera without perspective that sees all points (n, 3), above the caption."""
     seen = points @ look.axes.T
@@ -171,12 +174,13 @@ def _look_at(plotter: Any, points: Floats, look: Look, aspect: float) -> None:
     plotter.renderer.ResetCameraClippingRange()
 
 
-def _write(plotter: Any, caption: str, notes: Sequence[str], loaded: bool) -> None:
+def _write(plotter: Any, caption: str, notes: Sequence[str], solids: Sequence[Solid | Glyph]) -> None:
     """Write the line at the foot, what is not drawn above it, and the names of what has its colour."""
     font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
     width, height = plotter.window_size
     labels = [(caption, 0.5, 0.03, "black"), (f"not drawn: {', '.join(notes)}" if notes else "", 0.5, 0.095, DARK)]
-    names = [("load" if loaded else "", 184, LOAD), ("d₁", 104, FIRST), ("d₂", 48, SECOND)]
+    loaded = any(solid.color == LOAD for solid in solids)
+    names = [("load" * loaded, 184, LOAD), ("d₁", 104, FIRST), ("d₂", 48, SECOND)]
     labels += [(name, 1.0 - right / width, 1.0 - 70.0 / height, colour) for name, right, colour in names]
     for label, x, y, colour in (label for label in labels if label[0]):
         style = {"font_size": min(20, int(0.875 * width) // len(label)), "color": colour, "font_file": font}

@@ -74,11 +74,16 @@ def rows_of(folder: Path) -> Iterator[Rows]:
         for branch in data["branches"]:
             group = file["branches"][branch["name"]]
             stored = {name: np.asarray(x) for name, x in group.items() if isinstance(x, h5py.Dataset)}
-            columns = {name: x for name, x in stored.items() if x.ndim == 1 and not name.startswith(DRIFT)}
-            for name, column in branch["columns"].items():
-                if all(x is None or isinstance(x, (int, float)) for x in column):
-                    columns[name] = np.array([np.nan if x is None else x for x in column])
-            yield Rows(branch["name"], columns, _fields(stored))
+            yield Rows(branch["name"], _numbers(branch["columns"], stored), _fields(stored))
+
+
+def _numbers(columns: Mapping[str, Any], stored: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Numbers of each row: those of the diagram, nan where there is none, and the scalar unknowns of the states."""
+    out = {name: x for name, x in stored.items() if x.ndim == 1 and not name.startswith(DRIFT)}
+    for name, column in columns.items():
+        if all(x is None or isinstance(x, (int, float)) for x in column):
+            out[name] = np.array([np.nan if x is None else x for x in column])
+    return out
 
 
 def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
@@ -302,17 +307,10 @@ def _dataset(
     data: Mapping[str, Any], branches: Mapping[str, Mapping[str, Floats]], fields: Sequence[Mapping[str, Floats]]
 ) -> Any:
     """Columns of branches by name, and fields of each row at the nodes; those of a coarser mesh end in nan."""
-    nodes = max(len(here["s"]) for here in fields)
-
-    def stacked(name: str) -> Floats:
-        rows = [here[name] for here in fields]
-        sizes = [[(0, nodes - len(row)), *[(0, 0)] * (row.ndim - 1)] for row in rows]
-        return np.stack([np.pad(row, size, constant_values=np.nan) for row, size in zip(rows, sizes, strict=True)])
-
     columns: dict[str, Any] = {n: ("point", np.concatenate([b[n] for b in branches.values()])) for n in COLUMNS}
-    columns["s"] = ("point", "node"), stacked("s")
+    columns["s"] = ("point", "node"), _stacked([here["s"] for here in fields])
     for name, words in VECTORS.items():
-        values = stacked(name)
+        values = _stacked([here[name] for here in fields])
         columns[name] = ("point", "node", *("director", "component")[4 - values.ndim :]), values, {"long_name": words}
     sizes = [len(b["load"]) for b in branches.values()]
     coordinates = {name: columns.pop(name) for name in ("load", "arclength", "s")}
@@ -322,6 +320,11 @@ def _dataset(
     out["load"].attrs |= {"long_name": data["parameter_words"] or data["parameter"], "units": data["parameter_unit"]}
     out["ordinate"].attrs |= {"long_name": data["ordinate"], "units": data["ordinate_unit"]}
     return out
+
+
+def _stacked(rows: Sequence[Floats]) -> Floats:
+    nodes = max(map(len, rows))
+    return np.stack([np.pad(x, [(0, nodes - len(x))] + [(0, 0)] * (x.ndim - 1), constant_values=np.nan) for x in rows])
 
 
 FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv, "netcdf": to_netcdf}

@@ -50,18 +50,24 @@ Data = Mapping[str, Any]
 def in_sentences(data: Data) -> list[str]:
     """Sentences on a diagram, the contents of ``diagram.json``: its branches, ranges of stability, open questions."""
     first, *others = data["branches"]
-    kinds = {branch["name"]: {interval.kind for interval in intervals_of(branch)} for branch in others}
-    shown = [branch for branch in others if kinds[branch["name"]] & {STABLE, PLANAR, UNDECIDED}]
-    quiet = [branch for branch in others if branch not in shown and kinds[branch["name"]]]
+    shown = [branch for branch in others if _kinds(branch) & {STABLE, PLANAR, UNDECIDED}]
     out = [_of_branch(branch, data) + _remarks(data, branch) for branch in (first, *shown[:MOST])]
     if more := shown[MOST:]:
         out.append(f"{_names(more)} have stable states, too." + _remarks(data, *more))
-    if quiet:
+    if quiet := [branch for branch in others if branch not in shown and intervals_of(branch)]:
         verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
         out.append(f"{_names(quiet)} {verb} whole range." + _remarks(data, *quiet))
-    if not is_sweep(data):
-        out += [*_ranges(data), *_coexistence(data)]
-    return [*out, *_open(data["branches"], data), *filter(None, [_remarks(data).strip()])]
+    return [
+        *out,
+        *_ranges(data),
+        *_coexistence(data),
+        *_open(data["branches"], data),
+        *filter(None, [_remarks(data).strip()]),
+    ]
+
+
+def _kinds(branch: Data) -> set[str]:
+    return {interval.kind for interval in intervals_of(branch)}
 
 
 def _remarks(data: Data, *branches: Data) -> str:
@@ -229,15 +235,10 @@ def _directions(special: Data, branch: Data, branches: Sequence[Data]) -> str:
 
 def _ranges(data: Data) -> Iterator[str]:
     """Ranges of the load without a stable state, and those that are not examined."""
-    every = [intervals_of(branch) for branch in data["branches"]]
-    stable, undecided = (
-        _covers([x for found in every for x in found if x.kind == kind]) for kind in (STABLE, UNDECIDED)
-    )
-    lost = []  # steps in which stability is lost or won without a special point
-    for one, after in (pair for found in every for pair in pairwise(found)):
-        if STABLE in (one.kind, after.kind) and UNDECIDED not in (one.kind, after.kind) and not _specials(one):
-            loads = _step(one, after)[1]
-            lost.append((min(loads), max(loads)))
+    if is_sweep(data):
+        return
+    stable, undecided = ([_cover(x.loads) for x in _intervals(data, kind)] for kind in (STABLE, UNDECIDED))
+    lost = list(_unlocated(data))
     for a, b in _without(stable + lost, *sorted(data["range"])):
         doubt = any(low < b and high > a for low, high in undecided)
         but = ", but there are states of undecided stability" if doubt else ""
@@ -247,9 +248,19 @@ def _ranges(data: Data) -> Iterator[str]:
             yield f"Stability is not examined between {_between(data, a, b, 'and')}, where it changes."
 
 
-def _covers(intervals: Sequence[Interval]) -> list[tuple[float, float]]:
-    """Least and greatest load of each interval."""
-    return [(min(x.loads), max(x.loads)) for x in intervals]
+def _intervals(data: Data, kind: str) -> list[Interval]:
+    return [x for branch in data["branches"] for x in intervals_of(branch) if x.kind == kind]
+
+
+def _cover(loads: Sequence[float]) -> tuple[float, float]:
+    return min(loads), max(loads)
+
+
+def _unlocated(data: Data) -> Iterator[tuple[float, float]]:
+    """Loads of the steps in which stability is lost or won without a special point."""
+    for one, after in (pair for branch in data["branches"] for pair in pairwise(intervals_of(branch))):
+        if STABLE in (one.kind, after.kind) and UNDECIDED not in (one.kind, after.kind) and not _specials(one):
+            yield _cover(_step(one, after)[1])
 
 
 def _without(ranges: Sequence[tuple[float, float]], low: float, high: float) -> Iterator[tuple[float, float]]:
@@ -263,8 +274,8 @@ def _without(ranges: Sequence[tuple[float, float]], low: float, high: float) -> 
 
 def _coexistence(data: Data) -> Iterator[str]:
     """Ranges of the load with several stable states."""
-    stable = [x for branch in data["branches"] for x in intervals_of(branch) if x.kind == STABLE]
-    found = [(*pair, *both) for pair in combinations(stable, 2) if (both := _shared(*pair))]
+    pairs = () if is_sweep(data) else combinations(_intervals(data, STABLE), 2)
+    found = [(*pair, *both) for pair in pairs if (both := _shared(*pair))]
     for one, other, a, b in found[:MOST]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
         states, verb = f"From {_between(data, a, b, 'to')} two stable states", f"coexist, of {names}"
@@ -282,7 +293,7 @@ def _shared(one: Interval, other: Interval) -> tuple[float, float] | None:
     Those of one energy, to what linear interpolation leaves, are mirror images, or one branch twice.  Energies of
     other states may be the same at one load, of symmetry, say, but not at two.
     """
-    (a, b), (c, d) = _covers([one, other])
+    (a, b), (c, d) = _cover(one.loads), _cover(other.loads)
     low, high = max(a, c), min(b, d)
     if high - low <= SAME_SPECIAL * max(b - a, d - c):
         return None

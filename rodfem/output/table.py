@@ -148,9 +148,12 @@ def special_values(entry: Data) -> dict[str, Any]:
     read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")]
     values = {ATTRIBUTES.get(name, name): _number(entry.get(name)) for name in read}
     values |= {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
-    values["connects_to"], law = tuple(entry["meets"]) if entry["meets"] else None, entry["law"]
-    known = {name: _number(law[name]) for name in NormalForm.__annotations__ if name in law} if law else None
-    return values | {"law": known and NormalForm(**known)}
+    values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
+    return values | {"law": _law(entry["law"]) if entry["law"] else None}
+
+
+def _law(law: Data) -> NormalForm:
+    return NormalForm(**{name: _number(law[name]) for name in NormalForm.__annotations__ if name in law})
 
 
 def _number(value: Any) -> Any:

@@ -117,9 +117,7 @@ def is_estimated(data: Data) -> bool:
 
 def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
     """Branch, kind, load, ordinate and index of each special point, and remarks; without bars where none is known."""
-    ordinates = [abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"] if x is not None]
-    scale = max([*ordinates, (data.get("natural") or {}).get("ordinate", 0.0)])
-    known = is_estimated(data)
+    scale, known = _scale(data), is_estimated(data)
     for branch, special in ((b, special) for b in data["branches"] for special in b["special"]):
         row = row_of(branch, special["row"])
         found = {name: _read(special, name, inf, scale * (name == "ordinate")) for name in READ}
@@ -127,6 +125,12 @@ def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
         load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in found.values())
         index = index_in_words(special, row) + (f", {special['zero']} zero" if special["zero"] else "")
         yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, _remarks(special, row)
+
+
+def _scale(data: Data) -> float:
+    """Size of the ordinates of a diagram."""
+    values = [abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"] if x is not None]
+    return max([*values, (data.get("natural") or {}).get("ordinate", 0.0)])
 
 
 def _read(special: Data, name: str, unknown: float | None, scale: float = 0.0) -> str:
@@ -175,16 +179,20 @@ def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, st
     Special points have bounds of their own.  Those of other rows are relative, to ``natural`` sizes by the name of the
     number.
     """
-    columns = branch["columns"]
-    found: list[dict[str, str]] = [{} for _ in columns["load"]]
-    for row, error in enumerate(columns.get("estimate") or ()):
-        values = {name: columns[name][row] for name in READ if error is not None and columns[name][row] is not None}
-        found[row] = {name: number(x, error * unit(x, one=natural[name])) for name, x in values.items()}
+    rows = len(branch["columns"]["load"])
+    found = [_reading(row_of(branch, row), natural) for row in range(rows)]
     for special in branch["special"]:
         here = {name: text for name in READ if (text := _read(special, name, None))}
         given = {name: text + GIVEN for name, text in _given(branch, special).items()}
         found[special["row"]] = here | given
     return found
+
+
+def _reading(row: Data, natural: Mapping[str, float]) -> dict[str, str]:
+    """Numbers of a row by name, with bounds of their relative error."""
+    error = row.get("estimate")
+    values = {name: row[name] for name in READ if error is not None and row[name] is not None}
+    return {name: number(x, error * unit(x, one=natural[name])) for name, x in values.items()}
 
 
 # --- rows
