@@ -389,7 +389,18 @@ TABLE = {
             "                branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]\n",
             "hard/test_fuzz.py"),
     },
-    "rodfem/fem/convexity.py": {
+    "rodfem/fem/checks.py": {
+        "straight-rods-have-no-stiffness": (
+            "np.array([first, moved - first])", "np.array([first, first])", "fem/test_quadrature_check.py"),
+        "quadrature-of-halves-alone": (
+            "np.maximum(second, third) / allowed", "second / allowed", "fem/test_quadrature_check.py"),
+        "masses-are-integrated": ("if equations.even:", "if True:", "fem/test_quadrature_check.py"),
+        "rules-as-good-as-they-are": (
+            "np.maximum(0.5**self._pieces.points * ", "np.maximum(1.0 * ", "fem/test_quadrature_check.py"),
+        "composite-rules-of-few-points": (
+            "POINTS, LEAST = 4096, 4", "POINTS, LEAST = 256, 4", "fem/test_quadrature_check.py"),
+        "kinks-to-one-side-are-none": (
+            "(bent | (larger < 2 * change)).any()", "(larger < 2 * change).any()", "diagram/test_kinks.py"),
         "convexity-of-the-undeformed-state-alone": (
             "self.alters = of_state or", "self.alters =", "diagram/test_functions_between_rows.py"),
         "convexity-at-places-of-a-grid-alone": (
@@ -446,19 +457,6 @@ TABLE = {
         "ways-down-that-go-uphill": (
             "if isfinite(longest) and along(system, x, step) < 0:", "if False:", "hard/test_fuzz.py"),
         "constraints-count-as-uphill": ("- first] = -1.0", "- first] = 1.0", "fem/test_way_down.py"),
-    },
-    "rodfem/fem/quadrature_check.py": {
-        "straight-rods-have-no-stiffness": (
-            "np.array([first, moved - first])", "np.array([first, first])", "fem/test_quadrature_check.py"),
-        "quadrature-of-halves-alone": (
-            "np.maximum(second, third) / allowed", "second / allowed", "fem/test_quadrature_check.py"),
-        "masses-are-integrated": ("if equations.even:", "if True:", "fem/test_quadrature_check.py"),
-        "rules-as-good-as-they-are": (
-            "np.maximum(0.5**self._pieces.points * ", "np.maximum(1.0 * ", "fem/test_quadrature_check.py"),
-        "composite-rules-of-few-points": (
-            "POINTS, LEAST = 4096, 4", "POINTS, LEAST = 256, 4", "fem/test_quadrature_check.py"),
-        "kinks-to-one-side-are-none": (
-            "(bent | (larger < 2 * change)).any()", "(larger < 2 * change).any()", "diagram/test_kinks.py"),
     },
     "rodfem/fem/symmetries.py": {
         "sections-that-turn-without-their-shear": (

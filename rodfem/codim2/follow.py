@@ -39,8 +39,7 @@ from rodfem.continuation.branch_solver import ALIGNED, BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, DIVERGENCE, FLUTTER, FOLD, GAP, KINDS
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.fem.convexity import Convexity
-from rodfem.fem.quadrature_check import QuadratureCheck
+from rodfem.fem.checks import Convexity, QuadratureCheck
 from rodfem.fem.shape import halved
 from rodfem.output.files import mesh_of
 from rodfem.stability.cluster import as_vectors

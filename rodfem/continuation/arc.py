@@ -20,7 +20,7 @@ from rodfem.continuation.branch_solver import ALIGNED, BranchSolver, between, cu
 from rodfem.continuation.branch_solver import Knot as Row
 from rodfem.continuation.crossings import Node, places
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
-from rodfem.fem.convexity import Convexity
+from rodfem.fem.checks import Convexity
 from rodfem.fem.newton import correct, linear_step
 from rodfem.roots import zero_between
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
@@ -130,7 +130,7 @@ def lost_between(
 ) -> float | None:
     """First ``t`` between 0 and 1 at which ``W`` is not convex along ``state(t)``, as it is along ``state(0)``.
 
-    The least eigenvalue of the second derivative of ``W`` (:mod:`rodfem.fem.convexity`) is a cubic, by its values and
+    The least eigenvalue of the second derivative of ``W`` (:mod:`rodfem.fem.checks`) is a cubic, by its values and
     difference quotients at both ends.  Where that turns, and at the end, it may not be positive: ``holds(t)`` decides
     by an equilibrium.  None where ``W`` stays convex.
     """

@@ -30,7 +30,7 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import Kind
 from rodfem.continuation.natural_shape import natural_shape, sampled, uniform_turn
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fem.convexity import Convexity
+from rodfem.fem.checks import Convexity
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
 from rodfem.fem.resultants import Reactions, Resultants, reactions
 from rodfem.fem.shape import Shape

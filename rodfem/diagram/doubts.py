@@ -14,8 +14,8 @@ from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import many
+from rodfem.fem.checks import QuadratureCheck
 from rodfem.fem.newton import TOLERANCE
-from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.stability.near_zero import resolve
 
 ROWS = 4

@@ -22,8 +22,8 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem import form_compiler
+from rodfem.fem.checks import QuadratureCheck
 from rodfem.fem.fields import Discretization, check_number
-from rodfem.fem.quadrature_check import QuadratureCheck
 from rodfem.fem.system import System
 from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder

@@ -26,7 +26,7 @@ import ufl
 from numpy.polynomial import legendre
 from petsc4py import PETSc
 
-from rodfem.fem.quadrature_check import Pieces
+from rodfem.fem.checks import Pieces
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import Evaluation
 from rodfem.problem.contribution import Constraint

@@ -27,7 +27,7 @@ from rodfem.adaptivity.error_estimate import Enriched, bound
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.fem.quadrature_check import QuadratureCheck
+from rodfem.fem.checks import QuadratureCheck
 from rodfem.fem.shape import Shape, halved
 from rodfem.fem.state import NodalValues
 from rodfem.linalg.matrices import local_rows, rounding, rounding_of

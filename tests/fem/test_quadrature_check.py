@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, trace
-from rodfem.fem.quadrature_check import QuadratureCheck
+from rodfem.fem.checks import QuadratureCheck
 
 pytestmark = pytest.mark.alone
 STEEP, WIDTH = 0.786, 1e-3
