@@ -43,22 +43,14 @@ def interface() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef, str]]:
                     )
 
 
-def parameters(place: str, node: ast.FunctionDef | ast.ClassDef) -> list[str]:
-    """Parameters of a function; of a class its fields without a docstring, or a comment ``#:``, if there are many."""
-    if isinstance(node, ast.FunctionDef):
-        given = node.args
-        found = [a.arg for a in (*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg) if a]
-        found = [x for x in found if x not in ("self", "cls")]
-        return found if len(found) >= MANY else []
-    made = " ".join(map(ast.unparse, (*node.decorator_list, *node.bases)))
-    lines = (HOME / place.split(":")[0]).read_text().splitlines()
-    fields = [
-        (child.target.id, isinstance(after, ast.Expr) or "  #: " in lines[child.lineno - 1])
-        for child, after in zip(node.body, [*node.body[1:], None], strict=True)
-        if isinstance(child, ast.AnnAssign) and isinstance(child.target, ast.Name)
-    ]
-    many = len(fields) >= MANY and ("dataclass" in made or "NamedTuple" in made)
-    return [field for field, described in fields if many and not described]
+def parameters(node: ast.FunctionDef | ast.ClassDef) -> list[str]:
+    """Parameters of a function, if there are many: a field of a class is described where its name does not say it."""
+    if isinstance(node, ast.ClassDef):
+        return []
+    given = node.args
+    found = [a.arg for a in (*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg) if a]
+    found = [x for x in found if x not in ("self", "cls") and not x.startswith("_")]
+    return found if len(found) >= MANY else []
 
 
 def describes(text: str, parameter: str) -> bool:
@@ -72,7 +64,7 @@ def describes(text: str, parameter: str) -> bool:
 def test_parameters_and_exceptions_are_described() -> None:
     missing = []
     for place, node, text in interface():
-        absent = [p for p in parameters(place, node) if not p.startswith("_") and not describes(text, p)]
+        absent = [p for p in parameters(node) if not describes(text, p)]
         made = (n.exc.func for n in ast.walk(node) if isinstance(n, ast.Raise) and isinstance(n.exc, ast.Call))
         errors = {ast.unparse(x).split(".")[-1] for x in made} if isinstance(node, ast.FunctionDef) else set()
         absent += sorted(x for x in errors - {"AttributeError", "NotImplementedError"} if x not in text)
