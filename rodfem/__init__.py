@@ -54,8 +54,8 @@ _HOMES = {
     name: home
     for home, names in {
         "codim2.locus": "Locus",
-        "problem.ends": "End clamped pinned sliding hinged sliding_hinge free elastic Ring Attachment Constraint "
-        "integral at everywhere",
+        "problem.ends": "End clamped pinned sliding hinged sliding_hinge free elastic Ring",
+        "problem.contribution": "Attachment Constraint integral at everywhere",
         "problem.scene": "Scene Parameter Ordinate Inertia",
         "problem": "section",
         "problem.table": "tabulated path",

@@ -81,9 +81,6 @@ TABLE = {
             'self.uncompared = "" if again.resolved else again.unlike(point.load)', 'self.uncompared = ""',
             "stability/test_soft_modes.py"),
     },
-    "rodfem/app/main.py": {
-        "options-of-petsc-keep-their-dash": ("word[1:].encode()", "word.encode()", "app/test_command_lines.py"),
-    },
     "rodfem/app/persons_file.py": {
         "modules-beside-a-file-come-first": (
             "sys.path.append(str(path.parent))", "sys.path.insert(0, str(path.parent))", "app/test_run_command.py"),

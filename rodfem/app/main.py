@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from rodfem.fem.fields import Discretization
 
 Mesh = Callable[..., "Discretization"]
-NOTED = ("-rodfem_", "-mat_", "-vec_", "-eps_", "-st_", "-ksp_", "-pc_")
-"""Beginnings of options of solvers, all of which have the prefix ``rodfem_`` here, of matrices and of vectors."""
 HELP = """usage: rodfem run FILE.py [--scene NAME] [OPTIONS]
 
 Trace the rod of a file: a Scene, or a function with '-> Scene' whose arguments have defaults and are the rod's
@@ -65,22 +63,6 @@ def main(words: Sequence[str]) -> None:
         complain(f"Memory is exhausted: use fewer elements or a lower degree; {kept}.")
 
 
-def unread(words: Sequence[str]) -> list[str]:
-    """Options among ``words`` that belong to solvers, matrices and vectors, and that PETSc has not read."""
-    from cffi import FFI
-    from petsc4py import PETSc
-
-    ffi = FFI()
-    ffi.cdef("int PetscOptionsUsed(void *options, const char *name, int *used);")
-    library, used = ffi.dlopen(PETSc.__file__), ffi.new("int *")
-    found = []
-    for word in words:
-        if word.startswith(NOTED):
-            library.PetscOptionsUsed(ffi.NULL, word[1:].encode(), used)
-            found += [] if used[0] else [word]
-    return found
-
-
 def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
     """Parser of all options of a rod; raises :class:`InputError` for a constant with the name of another option."""
     parser = Parser(
@@ -110,18 +92,15 @@ def _run(
     from petsc4py import PETSc
 
     from rodfem.app.run import run
-    from rodfem.app.terminal import Report
 
-    if petsc:  # once more, for a PETSc that was running already
-        PETSc.Options().insertString(" ".join(petsc))
+    if petsc:  # once more, for a PETSc that was running already; what it does not read it lists at the end
+        PETSc.Options().insertString(" ".join([*petsc, "-options_left"]))
     constants = statement.values(options)
     own = None if mesh is None else mesh(**constants)
     scene, discretization, plan = statement.scene(**constants), discretization_of(options, own), plan_of(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
     run(scene, discretization, plan, options.output, figures=options.figures, verbose=options.verbose, words=words)
-    if ignored := unread(petsc):
-        Report().warn(f"PETSc did not read the option {', '.join(ignored)}: see whether it is spelled right.")
 
 
 def rod_of(module: ModuleType, name: str | None) -> Callable[..., Scene] | Scene:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from math import isfinite
-from textwrap import fill, wrap
+from textwrap import fill
 from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TextIO
@@ -83,14 +83,6 @@ def _eigenvalues(found: Verdict, modes: Modes | None) -> Iterator[str]:
         yield modes.note
 
 
-def broken(line: str, columns: int) -> list[str]:
-    """A line in parts of at most so many ``columns``; those after the first are indented deeper."""
-    if len(line) <= columns:
-        return [line]
-    indent = " " * (len(line) - len(line.lstrip()) + 4)
-    return wrap(line, columns, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-
-
 def is_screen(stream: TextIO) -> bool:
     """Whether a stream is a terminal on which a line can change.
 
@@ -145,12 +137,11 @@ class Report(Observer):
         """Print one line."""
         if not self.on:
             return
-        lines = self.words(line).split("\n")
         if self.live:
-            for part in (part for one in lines for part in broken(one, self.screen.width)):
+            for part in self.words(line).split("\n"):
                 self.screen.show(part)
         else:
-            self.stream.write("\n".join(lines) + "\n")
+            self.stream.write(f"{self.words(line)}\n")
             self.stream.flush()
 
     def detail(self, line: str) -> None:

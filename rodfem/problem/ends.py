@@ -1,8 +1,8 @@
-"""Supports and loads of the ends of a rod, and what else acts on it: all that a scene is made of, in one place.
+"""Supports and loads of the ends of a rod.
 
-Everything here is plain immutable data.  Functions of the named constants ``c`` return expressions that work on UFL and
-on numbers alike, and a constant may stand in the place of one.  Functions ``f(x, c)`` of a *place* receive the state of
-the rod there:
+Everything here, and in :mod:`rodfem.problem.contribution`, is plain immutable data.  Functions of the named constants
+``c`` return expressions that work on UFL and on numbers alike, and a constant may stand in the place of one.  Functions
+``f(x, c)`` of a *place* receive the state of the rod there:
 
 * ``x.r`` (3,) the centreline, ``x.q`` (4,) the quaternion, ``x.R`` (3, 3) the rotation, ``x.d1, x.d2, x.d3`` (3,) the
   directors, ``x.s`` the arclength;
@@ -31,19 +31,13 @@ from rodfem.problem.contribution import (
     MOMENT,
     POTENTIAL,
     UNIT,
-    Attachment,
     Block,
-    Constraint,
     Contribution,
     Direction,
     Group,
-    Integral,
     Motion,
     Site,
     Unknown,
-    at,
-    everywhere,
-    integral,
 )
 from rodfem.problem.functions import LETTERS, SIDES, Constants, Given, OfPlace, Place, Quaternion, Role, role_field
 from rodfem.problem.setting import AXIS, HELD, TURNS
@@ -51,26 +45,6 @@ from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
-
-__all__ = [
-    "Attachment",
-    "Constants",
-    "Constraint",
-    "End",
-    "Integral",
-    "Ring",
-    "SlidingHinge",
-    "at",
-    "clamped",
-    "elastic",
-    "everywhere",
-    "free",
-    "hinged",
-    "integral",
-    "pinned",
-    "sliding",
-    "sliding_hinge",
-]
 
 
 @dataclass(frozen=True)

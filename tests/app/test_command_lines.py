@@ -11,9 +11,7 @@ from pathlib import Path
 import pytest
 from hemitropic_cases import run_demo
 from mpi4py import MPI
-from petsc4py import PETSc
 
-from rodfem.app.main import unread
 from rodfem.diagram import solver
 from rodfem.output import plot_diagram, plot_modes, render
 
@@ -104,18 +102,6 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
         assert out == "" or (line in AFTER_SET_UP and out.startswith("Compiling the forms for the first time"))
     else:
         assert out == err == ""
-
-
-@pytest.mark.versions
-@pytest.mark.alone
-def test_options_of_petsc_that_are_read() -> None:
-    assert unread(["-rodfem_nothing", "3", "-log_view"]) == ["-rodfem_nothing"]
-    assert unread(["-st_type", "sinvert"]) == ["-st_type"]
-    PETSc.Options()["rodfem_number"] = 3
-    assert unread(["-rodfem_number", "3"]) == ["-rodfem_number"]
-    assert PETSc.Options().getInt("rodfem_number") == 3
-    assert unread(["-rodfem_number", "3"]) == []
-    PETSc.Options().delValue("rodfem_number")
 
 
 @pytest.mark.alone

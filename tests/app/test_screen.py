@@ -156,19 +156,6 @@ def test_a_log_of_a_long_run_has_lines_of_progress(monkeypatch: pytest.MonkeyPat
     assert log.getvalue().count("\n  ... straight, 1 known, 0 branch points left to follow, lam = ") > 2
 
 
-def test_a_narrow_window_breaks_lines_between_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, plan = hemitropic_cases.scene(span=(0.0, 0.2)), Plan(depth=1, error_bars=False)
-    plain = io.StringIO()
-    trace(scene, MESH, plan, Report(stream=plain))
-    monkeypatch.setenv("COLUMNS", "60")
-    with terminal() as (seen, stream), Report(stream=stream) as report:
-        trace(scene, MESH, plan, report)
-    lines = lines_that_stay(seen.text)
-    assert max(map(len, lines)) <= 60 and " ".join(lines).split() == plain.getvalue().split()
-    drawn = re.split(r"[\r\n]", CONTROL.sub("", seen.text))
-    assert any(len(line) == 60 and "…" in line for line in drawn) and max(map(len, drawn)) <= 60
-
-
 @pytest.mark.long
 def test_an_interrupt_is_one_sentence(folder: Path) -> None:
     """By the key, as a person does it: the terminal sends the signal.  The line that changes is gone by then."""

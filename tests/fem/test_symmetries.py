@@ -20,7 +20,8 @@ from rodfem.fem.newton import relax
 from rodfem.fem.shape import link
 from rodfem.fem.system import FEW, System
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.ends import Constants, End, Ring, clamped, free, pinned
+from rodfem.problem.ends import End, Ring, clamped, free, pinned
+from rodfem.problem.functions import Constants
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
 MIDDLE = Ordinate("displacement of the middle", s=0.5, of=lambda r, q: hypot(r[0], r[1]))

@@ -22,19 +22,8 @@ from rodfem.output.pieces import typical_state
 from rodfem.output.render import _read, draw_shape_safely
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
 from rodfem.output.view import view_of
-from rodfem.problem.ends import (
-    Attachment,
-    End,
-    at,
-    clamped,
-    elastic,
-    everywhere,
-    free,
-    hinged,
-    integral,
-    pinned,
-    sliding,
-)
+from rodfem.problem.contribution import Attachment, at, everywhere, integral
+from rodfem.problem.ends import End, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.problem.supports import foundation_of, supports_of, ties_of, write, write_section
 

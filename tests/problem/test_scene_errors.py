@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from math import cos, pi
 from pathlib import Path
 from typing import Any
@@ -19,21 +19,9 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError, SceneError
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.output.files import load_json
-from rodfem.problem import ends, scene
-from rodfem.problem.contribution import Group
-from rodfem.problem.ends import (
-    Attachment,
-    End,
-    Ring,
-    at,
-    clamped,
-    elastic,
-    free,
-    hinged,
-    integral,
-    pinned,
-    sliding,
-)
+from rodfem.problem import contribution, ends
+from rodfem.problem.contribution import Attachment, at, integral
+from rodfem.problem.ends import End, Ring, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
 pytestmark = [pytest.mark.alone, pytest.mark.versions]
@@ -347,8 +335,7 @@ def takes_functions(owner: type) -> list[str]:
     return [f.name for f in fields(owner) if any(word in str(f.type) for word in words)]
 
 
-CLASSES = [x for module in (ends, scene) for x in vars(module).values() if is_dataclass(x) and isinstance(x, type)]
-STATED = [x for x in CLASSES if x.__module__ != "rodfem.problem.functions" and x not in (Group, ends.JoinedEnd)]
+STATED = [End, ends.SlidingHinge, Attachment, contribution.Constraint, contribution.Integral, Inertia, Ordinate, Scene]
 EVERY = sorted({(owner.__name__, name) for owner in STATED for name in takes_functions(owner)})
 
 

@@ -112,13 +112,6 @@ def test_a_column_in_metres_and_newtons(rod: str) -> None:
     assert load * (1 - load * extensible + load * shearable) == pytest.approx(euler, rel=1e-9)  # Haringx, Engesser
 
 
-def test_a_natural_state() -> None:
-    """The energy vanishes at the natural curvatures, and nowhere else."""
-    stored = section.circle(0.5, E=1.0, nu=0.0).energy("unshearable and inextensible", natural=(0.0, 2.0, 1.0))
-    assert float(stored((0, 0, 1), (0.0, 2.0, 1.0), None)) == 0.0
-    assert float(stored((0, 0, 1), (0.0, 2.0, 0.0), None)) == pytest.approx(0.5 * 0.5 * pi / 32)
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [

@@ -105,13 +105,6 @@ def test_linear_between_rows(rows: int, pieces: int, says: float) -> None:
     assert abs(load - expected) <= error < 1e-9 and not warnings
 
 
-@pytest.mark.parametrize(("length", "size"), [(1e-8, 2e-28), (1e4, 1e9)])
-def test_any_units(length: float, size: float) -> None:
-    s, unit = np.linspace(0.0, length, 30), size / length**2
-    load, error, warnings = found(column(tabulated(s, size * wave(s / length)), length, size))
-    assert abs(load / unit - 2.578878879037) <= error / unit < 1e-9 and not warnings
-
-
 def test_cubic_splines() -> None:
     """Between 30 rows the spline is another function than the sine, between 400 the same one."""
     s = np.linspace(0.0, 1.0, 30)
