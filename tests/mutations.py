@@ -280,7 +280,7 @@ TABLE = {
     },
     "rodfem/diagram/collisions.py": {
         "pairs-that-have-just-met-enter": ("if D > 0 or just_met:", "if D > 0:", "diagram/test_flutter_at_a_row.py"),
-        "divergence-by-vectors-of-rigid-motions": ("if not self.still:", "if True:", "literature/test_free_rods.py"),
+        "divergence-by-vectors-of-rigid-motions": ("if not self.zeros:", "if True:", "literature/test_free_rods.py"),
         "pairs-taken-for-one-meet-at-one-load": (
             "noise.of_discriminant + clear.split) /", "noise.of_discriminant) /", HARD),
     },
@@ -292,7 +292,7 @@ TABLE = {
             "diagram/test_all_frequencies.py"),
         "divergence-numbered-across-collisions": (
             "if passed and not negative:", "if passed:", "literature/test_rods.py"),
-        "divergence-of-rigid-motions": ("[self._still :]", "[0:]", "literature/test_free_rods.py"),
+        "divergence-of-rigid-motions": ("[self._zeros :]", "[0:]", "literature/test_free_rods.py"),
         "steps-are-not-parted": ("if self._parted == PARTS or", "if True or", "diagram/test_close_critical_loads.py"),
         "a-pole-is-a-divergence": ("        if pole:", "        if False:", "diagram/test_light_and_slow_rods.py"),
     },
@@ -311,7 +311,7 @@ TABLE = {
             "diagram/test_kinks.py fem/test_quadrature_check.py"),
     },
     "rodfem/diagram/equilibria.py": {
-        "sweeps-leave-their-path": ("(off > np.maximum(ASTRAY * step, FLOOR)).any()", "False", HARD),
+        "sweeps-leave-their-path": ("(astray > np.maximum(ASTRAY * step, FLOOR)).any()", "False", HARD),
         "sweeps-go-in-one-step": ("for parts in (1, 2, 4, 8)", "for parts in (1,)", "diagram/test_load_steps.py"),
     },
     "rodfem/diagram/equivalence.py": {
@@ -366,7 +366,7 @@ TABLE = {
         "the-first-mesh-that-does-not-help-is-the-last": (
             "(3 if least > 1e-6 else 1)", "1", "adaptivity/test_accuracy_control.py"),
         "a-family-of-states-is-not-said": (
-            "        if self._still:", "        if False:", "diagram/test_family_of_states.py"),
+            "        if self._zeros:", "        if False:", "diagram/test_family_of_states.py"),
         "ordinate-of-a-load-that-is-exact": (
             "of_ordinate += self._moved(x, point.load, of_load)", "pass", "literature/test_follower.py"),
         "taut-rods-have-frequencies": (" or self._dependent(state)", "", "stability/test_frequencies.py"),

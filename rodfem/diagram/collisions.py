@@ -56,7 +56,7 @@ class Side:
 class Critical:
     """A critical load, before its state is evaluated, at which a cluster of eigenvalues collides or passes zero.
 
-    ``change`` is that of the number of unstable eigenvalues; ``still`` ones of the cluster, those of rigid motions, are
+    ``change`` is that of the number of unstable eigenvalues; ``zeros`` of the cluster, those of rigid motions, are
     zero at all loads.  Without a cluster round-off hides the collision: the pair is complex at both ends of the step.
     """
 
@@ -67,7 +67,7 @@ class Critical:
     omega2: float
     cluster: Cluster | None = None
     note: str = ""
-    still: int = 0
+    zeros: int = 0
 
 
 def pairs_in_common(mine: Spectrum, others: Spectrum) -> dict[int, int]:
@@ -145,32 +145,24 @@ class Collisions:
             for group in groups(here.spectrum.values[chosen], np.inf, MULTIPLE):
                 event = self._end(here, there, [chosen[i] for i in group])
                 event.change *= sign
-                self._add(events, event, here)
+                self._add(events, event)
         return events
 
-    def _add(self, events: list[Critical], event: Critical, here: Side) -> None:
-        """Take a collision, followed from ``here``, together with others at its load; none is to be found twice."""
-        same = [e for e in events if e.cluster and abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
-        if not same or event.cluster is None:
+    def _add(self, events: list[Critical], event: Critical) -> None:
+        """Take a collision together with others at its load; none is to be found twice."""
+        near = SAME * unit(event.load, one=self.units.load)
+        known = next((e for e in events if e.cluster and event.cluster and abs(e.load - event.load) < near), None)
+        if known is None:
             events.append(event)
             return
-        known = same[0]
-        if known.change * event.change > 0 and self._common(known.cluster, event.cluster, here) > 0.5:
+        if known.change * event.change > 0 and not event.note:
             raise ConvergenceError(
-                f"Two pairs at {self._load} = {here.load:.6g} end in one collision at {event.load:.8g}: use a smaller "
-                "range."
+                f"Two pairs end in one collision at {self._load} = {event.load:.8g}: use a smaller range."
             )
         known.change += event.change
         known.uncertainty = max(known.uncertainty, event.uncertainty + abs(known.load - event.load))
         if abs(event.omega2) < abs(known.omega2):
             known.omega2, known.cluster = event.omega2, event.cluster
-
-    def _common(self, one: Cluster | None, other: Cluster, here: Side) -> float:
-        """Share of the smaller one of two clusters in the other one's subspace, in the mass of a state."""
-        assert one is not None
-        pencil = self.eigensolver.at(here.x)
-        parts = pencil.product(one.basis, pencil.weighed(other.basis))
-        return float((abs(parts) ** 2).sum() / min(parts.shape))
 
     def _end(self, here: Side, there: Side, upper: list[int]) -> Critical:
         """Collision, on the way ``there``, of pairs complex ``here``."""
@@ -212,7 +204,7 @@ class Collisions:
         load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
         outside = (load - there.load) * (here.load - there.load) < 0
         if apart <= uncertainty or (outside and just_met and apart < JUST_MET * width):
-            load, uncertainty = there.load, uncertainty + apart  # at that row, at which they still count as real
+            load, uncertainty = there.load, uncertainty + apart  # at that row, at which they count as real
         low, high = sorted((here.load, there.load))
         inside = low - uncertainty <= load <= high + uncertainty and located.uncertainty <= width
         if not inside or located.slope * (here.load - there.load) > 0:
@@ -238,18 +230,18 @@ def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: f
 
 @dataclass(frozen=True)
 class Mean:
-    """Mean of the eigenvalues of a ``measured`` ``cluster`` against the load, ``still`` of which are zero at all loads.
+    """Mean of the eigenvalues of a ``measured`` ``cluster`` against the load, ``zeros`` of which are zero at all loads.
 
     Vectors of those are no better than round-off: where there are any, the eigenvalues nearest zero are taken.
     """
 
     measured: Measuring
     cluster: Cluster
-    still: int
+    zeros: int
 
     def __call__(self, load: float) -> float:
         """Mean at a load; raises :class:`ConvergenceError` where the cluster is not found."""
-        if not self.still:
+        if not self.zeros:
             return self.measured(load, self.cluster).cluster.mean
         pencil, size = self.measured.pencil(load), self.cluster.size
         values = pencil.near(size + 2, SHIFT * pencil.system.scene.units.omega2).values
@@ -257,7 +249,7 @@ class Mean:
 
     def noise(self, load: float) -> float:
         """Round-off of the matrix in the mean, which does not scatter; unknown, and zero, where some are zero."""
-        return 0.0 if self.still else self.measured.noise(load, self.cluster).mean
+        return 0.0 if self.zeros else self.measured.noise(load, self.cluster).mean
 
 
 def interpolated_zero(mean: Mean, load: float, one: float) -> tuple[float, float]:

@@ -68,16 +68,16 @@ class CriticalLoads:
         """Take equilibria and their eigenvalues from the solvers; ``warn`` gets sentences on what is not clear."""
         self.solver, self.eigensolver, self.warn = solver, eigensolver, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
-        self.collisions, self._still, self._parted = Collisions(solver, eigensolver), 0, 0
+        self.collisions, self._zeros, self._parted = Collisions(solver, eigensolver), 0, 0
         self._ahead = list[Meeting]()
 
-    def between(self, a: Side, b: Side, behind: Side | None, still: int) -> list[Critical]:
+    def between(self, a: Side, b: Side, behind: Side | None, zeros: int) -> list[Critical]:
         """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish.
 
-        Steps are given one after the other, each with the row ``behind`` it; ``still`` eigenvalues are zero at all
+        Steps are given one after the other, each with the row ``behind`` it; ``zeros`` eigenvalues are zero at all
         loads.
         """
-        self._still = still
+        self._zeros = zeros
         sides = [a, *self._met(a, b, behind), b]
         events = [event for step in pairwise(sides) for event in self._step(*step)]
         return sorted(events, key=lambda event: abs(event.load - a.load))
@@ -158,7 +158,7 @@ class CriticalLoads:
             """Real eigenvalues near the origin, in ascending order, but for those that are zero at all loads."""
             values = (sides.get(load) or self._side(a, load)).spectrum.values
             real = values[values.imag == 0].real
-            return float(np.sort(real[np.argsort(abs(real), kind="stable")][self._still :])[number])
+            return float(np.sort(real[np.argsort(abs(real), kind="stable")][self._zeros :])[number])
 
         low, high = sorted(sides)
         try:
@@ -185,16 +185,16 @@ class CriticalLoads:
         is within ``bounds``.
         """
         at, number = self._side(a, loads[0]), len(loads)
-        places = np.argsort(abs(at.spectrum.values), kind="stable")[: number + self._still]
+        places = np.argsort(abs(at.spectrum.values), kind="stable")[: number + self._zeros]
         cluster = cluster_at(
             self.eigensolver.at(at.x), at.spectrum, places[at.spectrum.values[places].imag >= 0.0].tolist()
         )
-        mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, self._still)
+        mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, self._zeros)
         load, uncertainty = interpolated_zero(mean, loads[0], self.units.load)
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
         inside = min(max(load, bounds[0]), bounds[1])
         uncertainty += abs(load - inside)
-        return Critical(DIVERGENCE, inside, sign * number, uncertainty, 0.0, cluster, still=self._still)
+        return Critical(DIVERGENCE, inside, sign * number, uncertainty, 0.0, cluster, zeros=self._zeros)
 
 
 class Meeting(NamedTuple):

@@ -200,8 +200,8 @@ class LoadSteps:
         x, outcome = self.solver.at_load(predicted, load)
         if not outcome.converged:
             return None
-        off, step = (self._sizes(x - other) for other in (predicted, last))
-        if (off > np.maximum(ASTRAY * step, FLOOR)).any():
+        astray, step = (self._sizes(x - other) for other in (predicted, last))
+        if (astray > np.maximum(ASTRAY * step, FLOOR)).any():
             return None
         require_balance(self.solver, x)
         return x

@@ -85,14 +85,14 @@ def _on(step: Step, arc: Arc, load: float) -> Iterator[Point]:
 class Events:
     """The events of one branch, and what is to be said of each.
 
-    By the name of an event, ``_open`` has the loads at the ends of steps in which it was not located, ``_still`` those
+    By the name of an event, ``_open`` has the loads at the ends of steps in which it was not located, ``_flat`` those
     of steps on which it is zero.
     """
 
     def __init__(self, events: Sequence[Event]) -> None:
         self.events = events
         self._open: dict[str, list[float]] = {}
-        self._still: dict[str, list[float]] = {}
+        self._flat: dict[str, list[float]] = {}
         self._last: tuple[Point, End] | None = None
 
     def between(self, step: Step) -> list[SpecialPoint]:
@@ -107,7 +107,7 @@ class Events:
         words = (
             (self._open, observer.warn, "The event {!r} was not located between loads {:.8g} and {:.8g}: {}."),
             (
-                self._still,
+                self._flat,
                 observer.note,
                 "  the event {!r} is zero all along between loads {:.8g} and {:.8g}: no special points",
             ),
@@ -115,7 +115,7 @@ class Events:
         for found, say, sentence in words:
             for name, loads in found.items():
                 say(Remark(sentence.format(name, min(loads), max(loads), SMALLER_STEPS), *loads))
-        self._open, self._still, self._last = {}, {}, None
+        self._open, self._flat, self._last = {}, {}, None
 
     def _end(self, step: Step, row: Point) -> End:
         """The end of a step at a row, which may be that of the step before."""
@@ -128,7 +128,7 @@ class Events:
         """Special points of the event of a piece, which is a step."""
         name, loads = piece.event.name, [step.a.load, step.b.load]
         if piece.is_zero(piece.first) and piece.is_zero(piece.last):
-            self._still.setdefault(name, []).extend(loads)
+            self._flat.setdefault(name, []).extend(loads)
             return []
         try:
             zeros = piece.zeros()

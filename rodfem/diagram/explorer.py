@@ -204,12 +204,12 @@ class Explorer(Tracer):
         """Branch that leaves the special point ``i`` of a parent along a direction, one of ``ways``, in the range."""
         special, margin, depth = parent.special[i], ON_BOUND * (self.high - self.low), parent.depth + 1
         bounds = self.low - margin, self.high + margin  # room for round-off
-        made = start_branch(self.solver, special, direction, ways, bounds, depth)
-        if made is None:
+        leaving = start_branch(self.solver, special, direction, ways, bounds, depth)
+        if leaving is None:
             words = f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
             self.observer.warn(Remark(words, special.point.load, branch=parent.name))
             return None
-        points, begins = made
+        points, begins = leaving
         if not bounds[0] <= points[1].load <= bounds[1]:
             words = f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range"
             self.observer.note(Remark(words, special.point.load, branch=parent.name))

@@ -98,8 +98,8 @@ def _check_equations(data: dict[str, Any], system: System, folder: Path) -> None
 
 def _solver(scene: Scene, formulation: str, mesh: dict[str, Any], comm: MPI.Comm) -> BranchSolver:
     vertices = None if mesh["vertices"] is None else tuple(mesh["vertices"])
-    made = Discretization(formulation, mesh["elements"], mesh["degree"], vertices)
-    return Solver(scene, made, comm).equilibria
+    discretization = Discretization(formulation, mesh["elements"], mesh["degree"], vertices)
+    return Solver(scene, discretization, comm).equilibria
 
 
 def _branch(entry: dict[str, Any], solvers: Sequence[BranchSolver], states: Path) -> Branch:

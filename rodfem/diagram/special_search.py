@@ -158,10 +158,10 @@ class SpecialSearch:
                 break
             self._nearest = -inf
             piece, p, q = self._ends(a, b, self._border(self._on(b).border(self._changing(piece, p, q, halvings))))
-        first, still = p.kept.reduced, min(n.kept.reduced.zero for n in (p, q))
-        if still:
+        first, zeros = p.kept.reduced, min(n.kept.reduced.zero for n in (p, q))
+        if zeros:
             values, vectors = np.linalg.eigh(first.H)
-            piece.leave_out(vectors[:, np.argsort(abs(values))[:still]])
+            piece.leave_out(vectors[:, np.argsort(abs(values))[:zeros]])
             p, q = (piece.node(n.kept.x, n.kept.slope * n.kept.speed, n.kept.reduced) for n in (p, q))
         return piece, p, q
 
@@ -197,9 +197,9 @@ class SpecialSearch:
         """Special points between two rows, of which those between are singular."""
         piece, p, q = self._nodes(a, b)
         self.undecided = piece.still + piece.solver.system.active_drifts(b.x)
-        off = ASIDE * (q.s - p.s)
-        p = p if p.kept.reduced.zero <= piece.still else piece.solve(p, q, p.s + off) or p
-        q = q if q.kept.reduced.zero <= piece.still or not ended else piece.solve(p, q, q.s - off) or q
+        margin = ASIDE * (q.s - p.s)
+        p = p if p.kept.reduced.zero <= piece.still else piece.solve(p, q, p.s + margin) or p
+        q = q if q.kept.reduced.zero <= piece.still or not ended else piece.solve(p, q, q.s - margin) or q
         out, pieces = self._turning(piece, p, q, ended=ended)
         zeros, size = Zeros(piece.solve, piece.solver.inertia.tolerance), self._fourth(piece, p, q)
         for crossing in chain.from_iterable(zeros.between(*ends, size) for ends in pieces):
@@ -235,9 +235,9 @@ class SpecialSearch:
         touch = None if turn is None else self._touching(piece, (p, q), turn, ended=ended)
         if touch is None:
             return [], [(p, q)]
-        s, off = piece.place(touch.point.x), ASIDE * (q.s - p.s)
-        left = piece.solve(p, q, s - min(off, (s - p.s) / 2)) if s > p.s else None
-        right = piece.solve(p, q, s + min(off, (q.s - s) / 2)) if s < q.s else None
+        s, margin = piece.place(touch.point.x), ASIDE * (q.s - p.s)
+        left = piece.solve(p, q, s - min(margin, (s - p.s) / 2)) if s > p.s else None
+        right = piece.solve(p, q, s + min(margin, (q.s - s) / 2)) if s < q.s else None
         return [touch], [(x, y) for x, y in ((p, left), (right, q)) if x is not None and y is not None]
 
     def _fourth(self, piece: Piece, p: Node, q: Node) -> np.ndarray | None:
@@ -251,8 +251,11 @@ class SpecialSearch:
     def _touching(self, piece: Piece, ends: tuple[Node, Node], s: float, *, ended: bool) -> SpecialPoint | None:
         """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""
         (p, q), solver = ends, piece.solver
-        off = ASIDE * (q.s - p.s)
-        left, right = piece.solve(p, q, max(s - off, (p.s + s) / 2)), piece.solve(p, q, min(s + off, (s + q.s) / 2))
+        margin = ASIDE * (q.s - p.s)
+        left, right = (
+            piece.solve(p, q, max(s - margin, (p.s + s) / 2)),
+            piece.solve(p, q, min(s + margin, (s + q.s) / 2)),
+        )
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
         at = of_turn(piece, left, right, turn)
@@ -288,7 +291,7 @@ class SpecialSearch:
         return special
 
     def _imperfect(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> SpecialPoint:
-        """The branch point at a state whose unfolding parameters are not round-off."""
+        """The branch point at a state whose unfolding parameters are not round-margin."""
         gap = self._open_gap(piece, at, found, ended=ended)
         special = special_point(piece, at, found, fold=False)
         if gap is not None:
@@ -296,7 +299,7 @@ class SpecialSearch:
         return special
 
     def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> Gap | None:
-        """The gap at a singular state whose unfolding parameters are not round-off; raised unless it is known."""
+        """The gap at a singular state whose unfolding parameters are not round-margin; raised unless it is known."""
         gap = self.gaps.examine(special_point(piece, at, found, fold=False), found)
         if gap is not None and not ended and self.gaps.open(gap, piece.solver):
             raise gap

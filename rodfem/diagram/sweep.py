@@ -75,7 +75,7 @@ class Sweep:
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, observer.warn)
         self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
-        self._still = self.number  # frequencies that are zero at all loads
+        self._zeros = self.number  # frequencies that are zero at all loads
         self.branches: list[Branch] = []
 
     def run(self) -> list[Branch]:
@@ -97,7 +97,7 @@ class Sweep:
             self._error_bars(branch)
         Quadrature(self.solvers, self.observer, self._load).examine(branch)
         self.observer.finished(branch)
-        if self._still:
+        if self._zeros:
             with without("Whether frequencies stay zero was not examined", comm, self.observer.warn):
                 self._family(last)
         self.finished()
@@ -199,7 +199,7 @@ class Sweep:
             mode.array[:] = found.vectors[:, i].real
             if system.drift(mode) <= DRIFT * system.stiffness_scale * system.norm(mode):
                 moving.append(pencil.motion(found.vectors[:, [i]].real))
-        if number := min(len(moving), self._still):
+        if number := min(len(moving), self._zeros):
             self.observer.warn(
                 f"{many(number, 'frequency stays', 'frequencies stay')} zero that no symmetry of the scene explains "
                 f"({', '.join(dict.fromkeys(moving))}): the rod may turn or move freely, and frequencies and critical "
@@ -249,9 +249,9 @@ class Sweep:
         """Record the frequencies of a row at its point; a special point is not ``on_the_way`` of the curves."""
         point, found = row.point, row.found
         point.negative = row.side.spectrum.unstable
-        still = int((abs(found.values) < min(found.noise, REAL * self.units.omega2)).sum())
-        point.zero += still
-        self._still = min(self._still, still)
+        zeros = int((abs(found.values) < min(found.noise, REAL * self.units.omega2)).sum())
+        point.zero += zeros
+        self._zeros = min(self._zeros, zeros)
         point.omega2 = [[float(v.real), float(v.imag)] for v in found.values[: self.number]]
         point.motion = list(found.kinds[: self.number])
         point.curve = self.curves.numbers(found, keep=on_the_way)[: self.number]
@@ -259,9 +259,9 @@ class Sweep:
     def _between(self, branch: Branch, first: Row, second: Row, following: Row | None) -> None:
         """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
         a, b, behind = first.point, second.point, following and following.side
-        still = min(first.found.still(), second.found.still())
+        zeros = min(first.found.still(), second.found.still())
         with self.solver.system.clock.scope("location"):
-            events = self.critical.between(first.side, second.side, behind, still)
+            events = self.critical.between(first.side, second.side, behind, zeros)
         negative = a.negative
         for event in events:
             after = negative + event.change
@@ -289,7 +289,7 @@ class Sweep:
         row = next((end for end in ends if end.load == event.load), None)
         point = row or self.at(at_load(self.solver, ends[0].x, event.load))
         assert event.cluster is not None
-        self._name(point, event.cluster, event.cluster.size - event.still)
+        self._name(point, event.cluster, event.cluster.size - event.zeros)
         if event.kind == DIVERGENCE and (zero := point.negative - min(negative)) > 0:
             point.negative, point.zero = point.negative - zero, point.zero + zero
         special = SpecialPoint(event.kind, point, *negative, event.uncertainty, omega2=event.omega2)
@@ -346,8 +346,8 @@ class SweepErrors:
             if s.kind == FLUTTER:
                 load, left = self._flutter(measured, cluster, s)
             else:
-                still = cluster.size - abs(s.negative_after - s.negative_before)
-                load, left = zero_near(Mean(measured, cluster, still), point.load, self.units.load)
+                zeros = cluster.size - abs(s.negative_after - s.negative_before)
+                load, left = zero_near(Mean(measured, cluster, zeros), point.load, self.units.load)
                 left = max(left, s.located_to)
             of_load = max(bound(point.load, load, left, rho), s.located_to)
             of_ordinate += self._moved(x, point.load, of_load)

@@ -293,12 +293,12 @@ class Tracer:
 
     def _singular_ends(self, branch: Branch) -> None:
         """Say that a range begins or ends at a singular state: no branch point is located there, and none followed."""
-        first, last, still = branch.points[0], branch.points[-1], persistent_zeros(branch.points)
+        first, last, zeros = branch.points[0], branch.points[-1], persistent_zeros(branch.points)
         known, said = {id(s.point) for s in branch.special if s.kind.branches}, list[Remark]()
-        if branch.parent is None and first.zero > still and id(first) not in known:
-            branch.singular_start = first.zero - still
+        if branch.parent is None and first.zero > zeros and id(first) not in known:
+            branch.singular_start = first.zero - zeros
             said.append(Remark(branch.start_in_words(self.scene.load), first.load))
-        if branch.ended == END_OF_RANGE and last.zero > still and id(last) not in known:
+        if branch.ended == END_OF_RANGE and last.zero > zeros and id(last) not in known:
             where = f"{self.scene.load} = {last.load:.8g}"
             said.append(Remark(f"{branch.name} ends at a singular state, at {where}: use a wider range.", last.load))
         for remark in said:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import sys
 from dataclasses import replace
 from math import inf, pi, sqrt
 from types import SimpleNamespace
@@ -11,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from classics import column, push
 from problem.test_docs import scenes
 
 import rodfem
-from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, clamped, free, trace
+from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, trace
 from rodfem.continuation.observer import Observer
 from rodfem.deflation.symmetries import Mirror
 from rodfem.diagram.special_search import PARTS, SHORTER, SpecialSearch, Unresolved
@@ -51,35 +48,6 @@ def test_two_states_of_a_twisted_ring_are_joined_at_any_step() -> None:
     assert last.point.ordinate == pytest.approx(2.0, abs=1e-9)
     assert diagram["branch 1"].ended.startswith("meets another branch")
     assert not diagram.warnings
-
-
-OFTEN, DEEP = 400, 300
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_no_stack_overflows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four hundred times, where three hundred calls are left: the rows are those that are found without."""
-    scene = column("column", (clamped(), free(push)), (0.0, 4.0), planar="e2")
-    mesh, plan = Discretization("auto", 2, 4), Plan(depth=0, error_bars=False)
-    (expected,) = trace(scene, mesh, plan)
-    after, left = SpecialSearch.after, [OFTEN]
-
-    def doubting(search: SpecialSearch, *step: Any) -> Any:
-        if left[0]:
-            left[0] -= 1
-            raise Unresolved
-        return after(search, *step)
-
-    monkeypatch.setattr(SpecialSearch, "after", doubting)
-    limit = sys.getrecursionlimit()
-    sys.setrecursionlimit(len(inspect.stack()) + DEEP)
-    try:
-        (found,) = trace(scene, mesh, plan)
-    finally:
-        sys.setrecursionlimit(limit)
-    assert not left[0] and found.ended == expected.ended == "end of range"
-    assert [p.load for p in found.points] == pytest.approx([p.load for p in expected.points], abs=1e-9)
 
 
 def test_steps_are_short_about_pieces_that_are_to_be_resolved_and_not_for_ever() -> None:
