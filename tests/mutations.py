@@ -153,6 +153,10 @@ TABLE = {
         "a-gap-of-loci-is-a-crossing-for-sure": (", or turns back within {GAP:g} of the bounds from one", "", LOCI),
     },
     "rodfem/continuation/arc.py": {
+        "events-where-the-sign-changes-from-row-to-row-alone": (
+            "if p.slope.item() * q.slope.item() < 0]", "if False]", "diagram/test_events.py"),
+        "events-know-no-round-off-of-states": (
+            "others = stepped(self.solver, x, self.row), x +", "others = x, x +", "diagram/test_events.py"),
         "curves-turn-into-another-branch": ("dot(tangent) > ALIGNED", "dot(tangent) > 0.0", "diagram/test_events.py"),
         "convexity-is-looked-at-in-rows-alone": (
             "if margin(t) <= 0.0 and not holds(t):", "if margin(t) <= 0.0 and t == 1.0 and not holds(t):",
@@ -187,12 +191,6 @@ TABLE = {
         "location-at-another-zero": ("np.argmin(abs(real))", "np.argmax(abs(real))", LOCATE),
         "flutter-beside-the-collision": (
             "abs(root) < 1 and uncertainty < best.uncertainty", "uncertainty < 10 * best.uncertainty", LOCATE),
-    },
-    "rodfem/continuation/event_piece.py": {
-        "events-where-the-sign-changes-from-row-to-row-alone": (
-            "if p.slope.item() * q.slope.item() < 0]", "if False]", "diagram/test_events.py"),
-        "events-know-no-round-off-of-states": (
-            "others = stepped(self.solver, x, self.row), x +", "others = x, x +", "diagram/test_events.py"),
     },
     "rodfem/continuation/first_equilibrium.py": {
         "states-that-cannot-be-counted": (
@@ -251,7 +249,7 @@ TABLE = {
             "derivative.norm() * solver.units.load <", "derivative.norm() <", "problem/test_units.py"),
         "stiff-strains-hide-the-load": (
             "max(INSENSITIVE * system.stiffness_scale, ", "max(INSENSITIVE * system.matrix_in_units(matrix).norm(), ",
-            "continuation/test_coupling.py"),
+            "continuation/test_unfolding.py"),
     },
     "rodfem/continuation/switching.py": {
         "what-is-free-on-the-trunk-stays-free": (

@@ -30,10 +30,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
-from rodfem.continuation.arc import STEADY, Arc, stepped
+from rodfem.continuation.arc import STEADY, Arc, nearest_event, stepped
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_piece import nearest
 from rodfem.continuation.kinds import END, FOLD
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
@@ -237,7 +236,7 @@ class Enriched:
     def _at_event(self, point: Point, event: Event) -> Again:
         """The point of the richer mesh at which an event happens: the nearest one, of several."""
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
-        node, along = nearest(self.solver, event, x, tangent)
+        node, along = nearest_event(self.solver, event, x, tangent)
         found, units = node.kept.x, self.solver.units
         load, ordinate = self.system.scalar(found), self.solver.shape.ordinate(found)
         slope = abs(ordinate_along(self.solver, found, tangent))

@@ -15,10 +15,9 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from rodfem.continuation.arc import Arc
+from rodfem.continuation.arc import Arc, End, EventPiece, end
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver, between
-from rodfem.continuation.event_piece import End, EventPiece, end
 from rodfem.continuation.kinds import EVENT, USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import SMALLER_STEPS, ConvergenceError

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 from golden_cases import cases, single_branches
 
-import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import PETSC
-from rodfem.fem.newton import CompiledNewton, OnPlane
-from rodfem.linalg.chain import Chain
+from rodfem.fem.newton import OnPlane
 
 pytestmark = pytest.mark.alone
 SAME = 1e-9
@@ -40,20 +38,6 @@ def test_every_row_of_every_scene(name: str) -> None:
             off = abs(a - b) / np.maximum(1.0, abs(b))
             assert off.max() < LOOSE, (branch.name, key, int(off.argmax()))
             assert np.median(off) < SAME, (branch.name, key)
-
-
-@pytest.mark.long
-def test_the_reference_uses_nothing_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With PETSc's factors neither the chain nor the compiled assembly of matrices is used."""
-
-    def never(*arguments: object) -> None:
-        raise AssertionError("compiled code")
-
-    monkeypatch.setattr(Chain, "__call__", never)
-    monkeypatch.setattr(rodfem.fem.system, "matrix_places", never)
-    monkeypatch.setattr(CompiledNewton, "__init__", never)
-    diagram = trace(cases()["demo ruler"](), Discretization("auto", 8, 6, factors=PETSC), Plan(depth=0))
-    assert len(diagram.branches[0].points) > 10
 
 
 def test_unknown_factors_are_refused() -> None:

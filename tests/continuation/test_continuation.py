@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import pi
 from pathlib import Path
 
 import classics
@@ -11,11 +12,12 @@ import numpy as np
 import pytest
 import reference_values
 from hard.published import pressed
+from hard.writhing import clamped_rod
 from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
 from numpy.polynomial.legendre import leggauss
 
 import rodfem
-from rodfem import Branch, Discretization, Plan, Point
+from rodfem import Branch, Discretization, Plan, Point, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.continuation.step_control import IndexStepControl, StepControl
 from rodfem.errors import InputError, SceneError
@@ -40,27 +42,6 @@ def test_user_points_and_ends_lie_at_their_loads_exactly() -> None:
     ]
     assert straight.points[0].load == 0.0
     assert straight.points[-1].load == first.points[-1].load == 0.95
-
-
-@pytest.mark.alone
-def test_energy_grows_by_the_work_of_the_ends() -> None:
-    """``dE/dlam = n . d(r(l) - r(-l))/dlam = -2 l n3``, integrated by Gauss's rule, and energies found by shooting."""
-    first = explored(at=AT)[1]
-    states = [user_points(first, load)[0] for load in GAUSS]
-    power = [-2 * HALF * follower().system.scalar(p.x, "n3") for p in states]
-    work = reference_values.FIRST[0.7][1] - reference_values.FIRST[0.5][1]
-    assert WEIGHTS @ power == pytest.approx(work, abs=5e-9)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_contact_force_is_constant_and_the_same_in_both_formulations() -> None:
-    rich = follower("pointwise", 8, 6)
-    state = user_points(explored("pointwise", 8, 6, at=(0.5,), depth=1)[1], 0.5)[0]
-    n = rich.shape.sample(state.x)["n"].reshape(-1, 3)
-    n3 = follower().system.scalar(user_points(explored(at=AT)[1], 0.5)[0].x, "n3")
-    np.testing.assert_allclose(n[:, 2], n3, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(n, np.broadcast_to(n[0], n.shape), rtol=0, atol=1e-9)
 
 
 @pytest.mark.alone
@@ -141,18 +122,6 @@ def test_restart_on_another_discretisation(formulation: str, folder: Path) -> No
     assert other.shape.ordinate(y) == pytest.approx(reference_values.FIRST[0.5][0], abs=1e-10)
 
 
-@pytest.mark.few(1)
-@pytest.mark.versions
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-def test_polynomials_survive_a_finer_mesh_and_back(formulation: str) -> None:
-    """A finer mesh of a higher degree holds every state of a coarse one, so that nothing is lost on the way back."""
-    coarse, fine = follower(formulation, 8, 6), follower(formulation, 16, 8)
-    (p,) = user_points(explored(formulation, 8, 6, at=AT if formulation == "reduced" else (0.5,), depth=1)[1], 0.5)
-    back = coarse.shape.restore(fine.shape.sample(fine.shape.restore(coarse.shape.sample(p.x))))
-    back.axpy(-1.0, p.x)
-    assert back.norm() < 1e-11 * p.x.norm()
-
-
 @pytest.mark.short
 def test_restart_from_what_is_not_there(folder: Path) -> None:
     branch = explored(at=AT)[0]
@@ -219,3 +188,20 @@ def test_singular_equations_are_told_in_a_sentence() -> None:
     (branch,) = diagram
     assert any(w.startswith(f"{branch.name} ends: {branch.ended}") for w in diagram.warnings)
     assert branch.ended.startswith("no convergence at P = 0 (steps below 1e-05; 1 eigenvalues vanish there")
+
+
+@pytest.mark.long
+@pytest.mark.alone
+@pytest.mark.parametrize("formulation", ["auto", "pointwise"])
+def test_no_part_along_an_orbit_is_handed_on(formulation: str) -> None:
+    """The loop of a turned rod: 350 rows, each of which may turn about the axis.
+
+    A rod turned by 4 pi has the states of one that is not: the loads of the folds have the sum 4 pi, and the branch
+    goes from the planar elastica to itself.
+    """
+    scene = clamped_rod(1.0, "phi", 0.45, (0.0, 4 * pi))
+    (branch,) = trace(scene, Discretization(formulation, 10, 6), Plan(depth=0, error_bars=False))
+    assert branch.ended == "end of range"
+    first, last = (s.point.load for s in branch.special if s.kind == "fold")
+    assert first + last == pytest.approx(4 * pi, abs=1e-9)
+    assert branch.points[-1].energy == pytest.approx(branch.points[0].energy, rel=1e-9)

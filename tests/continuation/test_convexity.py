@@ -7,14 +7,12 @@ from typing import Any
 
 import pytest
 import ufl
-from classics import SUPPORTS, column
+from classics import column
 
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, StepControl, clamped, free, trace
-from rodfem.codim2.follow import locus
 from rodfem.continuation.arc import lost_between
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.functions import Constants
 
 MESH = Discretization("auto", 4, 4)
 Energy = Callable[[Any, Any, Any], Any]
@@ -30,27 +28,19 @@ def coupled(v: Any, k: Any, c: Any) -> Any:
     return bending_and_twist(k, (1.0, 2.0, 1.0)) + c.P * k[0] * k[2]
 
 
-def bowl(v: Any, k: Any, c: Any) -> Any:
-    """Convex while P < 0.8, and where P > 1.2."""
-    return bending_and_twist(k, ((1.0 - c.P) ** 2 - 0.04, 2.0, 1.0))
-
-
 def rod(energy: Energy, span: tuple[float, float] = (0.0, 2.0), **given: Any) -> Scene:
     """Cantilever without a load, but for the stiffness that depends on it."""
     return column("rod", given.pop("ends", (clamped(), free())), span, energy=energy, **given)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("energy", "until"),
-    [(coupled, 1.0), *(pytest.param(*case, marks=pytest.mark.alone) for case in [(softening, 1.0), (bowl, 0.8)])],
-)
-def test_a_stiffness_that_the_load_takes_away(energy: Energy, until: float) -> None:
+@pytest.mark.parametrize("energy", [coupled, pytest.param(softening, marks=pytest.mark.alone)])
+def test_a_stiffness_that_the_load_takes_away(energy: Energy) -> None:
     """Past it 48 eigenvalues of a mesh of 48 nodes were negative, and that was called a branch point."""
     (branch,) = trace(rod(energy), MESH, Plan(depth=0, error_bars=False))
     assert branch.ended.startswith("the stored energy is not convex any more at P = ")
     assert not [s for s in branch.special if not s.kind.given]
-    assert until - 0.15 < branch.points[-1].load < until
+    assert 0.85 < branch.points[-1].load < 1.0
     assert {p.negative for p in branch.points} == {0}
     with pytest.raises(SceneError, match=r"not convex somewhere along the state at P = 1\b"):
         Solver(rod(energy), MESH).equilibrium(1.0)
@@ -80,7 +70,7 @@ def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
 
 @pytest.mark.few(1)
 @pytest.mark.alone
-@pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("beside", [1e-3, 1e-9])
 def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
     """What little stiffness there is left at one end of a step is no unit for that in the step."""
     width = 1e-4
@@ -124,7 +114,7 @@ def test_a_step_and_a_kink_inside_an_element_are_convex() -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("width", [0.1, *(pytest.param(x, marks=pytest.mark.alone) for x in (0.01, 0.001))])
+@pytest.mark.parametrize("width", [0.1, pytest.param(0.001, marks=pytest.mark.alone)])
 def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) -> None:
     """A rod under tension, whose stretch jumps: ``W'' = 10 - 11/(1 + x^2)^(3/2)`` with ``x = (v - 1.3)/width``."""
 
@@ -141,34 +131,12 @@ def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) 
 
 
 @pytest.mark.long
-def test_an_energy_that_is_quadratic_at_the_first_load_alone() -> None:
-    """``k^2/2 - P k^4/4`` under the moment m: convex while ``P < 4/(27 m^2)``."""
-    scene = rod(
-        lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)) - 0.25 * c.P * k[0] ** 4,
-        ends=(clamped(), free(moment=lambda c: (0.5, 0.0, 0.0))),
-        planar="e1",
-    )
-    (branch,) = trace(scene, MESH, Plan(depth=0, error_bars=False))
-    assert branch.ended.startswith("the stored energy is not convex any more")
-    assert 0.5 < branch.points[-1].load < 4 / (27 * 0.25)
-
-
-@pytest.mark.long
 @pytest.mark.alone
-@pytest.mark.parametrize(
-    ("energy", "until"),
-    [
-        (lambda v, k, c: softening(v, k, Constants(P=c.P / 30)), 30.0),
-        (narrow(lambda c: 1 - c.P / 29.7, 0.003), 29.6109),
-    ],
-)
-def test_a_sweep(energy: Energy, until: float) -> None:
-    """Of a stiffness that vanishes, and of one that is negative between two loads of the sweep only.
-
-    Of ten times the follower force there would be sixty critical loads where the stiffness nears zero.
-    """
+def test_a_sweep() -> None:
+    """Of a stiffness that is negative between two of its loads only."""
+    until = 29.6109
     scene = rod(
-        energy,
+        narrow(lambda c: 1 - c.P / 29.7, 0.003),
         (0.0, 60.0),
         ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -1e-3 * c.P))),
         inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
@@ -179,22 +147,7 @@ def test_a_sweep(energy: Energy, until: float) -> None:
 
 
 @pytest.mark.long
-def test_a_locus() -> None:
-    """Euler's load ``pi^2/4`` times the stiffness, which is positive at both bounds of b, but not between them."""
-    scene = column(
-        "locus", SUPPORTS["clamped-free"], (0.0, 4.0), constants={"b": 0.9},
-        energy=lambda v, k, c: bending_and_twist(k, (c.b**2 - 0.25, 2.0, 1.0)),
-    )  # fmt: skip
-    diagram = trace(scene, MESH, Plan(depth=0, error_bars=False))
-    curve = locus(diagram.solvers[0], diagram[0].special[0], "b", ((-4.0, 4.0), (-1.0, 1.0)), error_bars=0)
-    assert any(end.startswith("the stored energy is not convex any more near P = ") for end in curve.ended)
-    assert curve.values[:, 1].min() > 0.5
-    assert {tuple(row) for row in curve.index.tolist()} == {(0, 1)}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("loss", [pytest.param(3.0, marks=pytest.mark.alone), 3.99])
-def test_convexity_lost_in_the_step_to_zero_stretch(loss: float) -> None:
+def test_convexity_lost_in_the_step_to_zero_stretch(loss: float = 3.99) -> None:
     """A thrust squeezes a rod of ``EA = 4`` to nothing at 4; before that its twisting stiffness vanishes."""
     scene = rod(
         lambda v, k, c: bending_and_twist(k, (9.0, 9.0, 1.0 - c.P / c.loss)) + 2.0 * (v[2] - 1) ** 2,

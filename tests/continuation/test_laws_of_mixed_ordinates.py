@@ -6,14 +6,14 @@ Of the pinned elastica with the end slope A (Euler): ``P = pi^2 (1 + A^2/8 + ...
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import pi
 from typing import Any
 
 import pytest
 from classics import ON_AXIS, column, push
 
 import rodfem
-from rodfem import Ordinate, Plan, clamped, free, pinned
+from rodfem import Ordinate, Plan, pinned
 from rodfem.continuation.branch import NormalForm
 from rodfem.forms.energy import bending_and_twist
 
@@ -39,7 +39,7 @@ def on_one_rank(*given: Any) -> list[Any]:
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize("span", [(8.0, 11.0), *on_one_rank(((9.8, 9.9),))])
-@pytest.mark.parametrize("eps", [0.01, *on_one_rank((1.0,), (0.1,), (1e-3,))])
+@pytest.mark.parametrize("eps", [0.01, *on_one_rank((1.0,), (1e-3,))])
 def test_shortening_and_part_of_a_slope(eps: float, span: tuple[float, float]) -> None:
     """``x = A^2/4 + eps A``: the law is quadratic, ``pi^2/(8 eps^2) x^2``, however small eps is."""
     law = law_of(lambda r, q: 1 - r[2] + eps * 2 * q[2] * q[0], span=span)
@@ -61,30 +61,9 @@ def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> N
         assert holds(law, pi**2 / 2, 1e-6 + 120 * eps) and law.uncertainty >= 4 * eps / 0.17 * pi**2 / 2
 
 
-@pytest.mark.long
-@pytest.mark.alone
-def test_mirror_images_of_a_sensor_that_looks_askew() -> None:
-    """A cantilever that a dead force bends buckles out of its plane: across that alone the law goes as 1/sin^2."""
-
-    def law(angle: float) -> NormalForm:
-        scene = column(
-            "askew", (clamped(), free(lambda c: (0.5, 0.0, -c.P))), (0.0, 4.0),
-            energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
-            ordinate=Ordinate("sensor", s=1.0, of=lambda r, q: cos(angle) * r[0] + sin(angle) * r[1]),
-        )  # fmt: skip
-        (found,) = rodfem.trace(scene, plan=Plan(depth=1)).special("branch point", "first branch")
-        assert found.law is not None and found.law.power == 2
-        return found.law
-
-    across, here, there = (law(angle) for angle in (pi / 2, 1.2, -1.2))
-    assert abs(here.coefficient - there.coefficient) < 1e-10
-    for askew in (here, there):
-        assert holds(askew, across.coefficient / sin(1.2) ** 2, 1e-6)
-
-
 @pytest.mark.few(1)
 @pytest.mark.alone
-@pytest.mark.parametrize("part", [1.0, 0.1, 1e-3])
+@pytest.mark.parametrize("part", [1.0, 1e-3])
 def test_transcritical_point(part: float) -> None:
     """``8 beta/pi^3`` is the slope in the middle's displacement, of which the ordinate has a part."""
     law = law_of(lambda r, q: part * r[0] + r[2], s=0.5, cubic=0.3)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import atan, cos, exp, log
+
 import numpy as np
 import pytest
-from hard.bifurcations import MESH, opposite_other
+from hard.bifurcations import MESH
 from hard.case import Change, compare, run, said, singular
 from hard.two_freedoms import scene
-from hemitropic_cases import explored
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
+from scipy.optimize import linear_sum_assignment
 
-from rodfem.continuation.eigenvalue_curves import in_doubt, locate_flutter, real_root
-from rodfem.continuation.kinds import FOLD
+from rodfem.continuation.eigenvalue_curves import assignment, in_doubt, locate_flutter, real_root
+from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured
 
 pytestmark = pytest.mark.alone
@@ -62,20 +65,6 @@ def test_noise_is_no_sharp_zero(noise: float) -> None:
     assert in_doubt(smooth) == abs(smooth[-1])
 
 
-def test_a_fold_is_located_to_round_off() -> None:
-    """The singular system is regular there."""
-    (fold,) = (s for branch in explored() for s in branch.special if s.kind == FOLD)
-    assert fold.located_to < 5e-12
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("apart", [3e-4, 1e-4])
-def test_a_zero_beyond_a_row_is_none_of_the_step_to_it(apart: float) -> None:
-    """Two eigenvalues pass zero, one just before a row and one just after it: neither is taken for the other."""
-    found = opposite_other(apart)
-    assert found.right and not found.said, found
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_crossing_beside_a_negative_eigenvalue_that_stays_near_zero(sign: int) -> None:
     """``-1e-6`` of a stretch all along: where the other one is negative, too, it is farther from zero, and is meant."""
@@ -84,3 +73,48 @@ def test_a_crossing_beside_a_negative_eigenvalue_that_stays_near_zero(sign: int)
     index = (2, 1) if sign > 0 else (1, 2)
     found = compare(singular(diagram[0]), [Change(0.1, *index)], said(diagram))
     assert found.right and not found.said, found
+
+
+CASES: list[tuple[Callable[[float], float], float, float, float]] = [
+    (lambda x: x**3 - 2 * x - 5, 2.0, 3.0, 2.0945514815423265),  # Wallis
+    (lambda x: cos(x) - x, 1.0, 0.0, 0.7390851332151607),
+    (lambda x: exp(-x) - 1e-3, 0.0, 20.0, log(1e3)),
+    (lambda x: atan(50 * (x - 0.7)), 0.0, 1.0, 0.7),
+    (lambda x: 1.0 if x > 0.3 else -1.0, 0.0, 1.0, 0.3),
+    (lambda x: x, -1.0, 0.0, 0.0),
+]
+
+
+@pytest.mark.parametrize("within", [1e-13, 1e-6])
+@pytest.mark.parametrize(("f", "a", "b", "zero"), CASES)
+def test_zero_between(f: Callable[[float], float], a: float, b: float, zero: float, within: float) -> None:
+    """Within the distance asked for, in no more values than bisection takes and few where the function is smooth."""
+    asked: list[float] = []
+
+    def counted(x: float) -> float:
+        asked.append(x)
+        return f(x)
+
+    assert zero_between(counted, a, b, within) == pytest.approx(zero, rel=1e-15, abs=within)
+    assert all(min(a, b) <= x <= max(a, b) for x in asked)
+    assert len(asked) <= (48 if isinstance(f(a), float) and abs(f(a)) == abs(f(b)) == 1 else 14)
+
+
+def test_no_change_of_sign() -> None:
+    with pytest.raises(ValueError, match="one sign, -1, at both 0 and 1"):
+        zero_between(lambda x: -1 - x, 0.0, 1.0, 1e-9)
+
+
+@pytest.mark.parametrize(("m", "k"), [(7, 7), (9, 5), (5, 9), (1, 3), (4, 0)])
+@pytest.mark.parametrize("apart", [True, False])
+def test_assignment_of_least_cost(m: int, k: int, apart: bool) -> None:
+    """With the least entries in different places, and without."""
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        cost = rng.random((m, k))
+        if apart:
+            fewer = min(m, k)
+            cost[rng.permutation(m)[:fewer], rng.permutation(k)[:fewer]] *= 1e-3
+        rows, columns = assignment(cost)
+        assert len(set(rows.tolist())) == len(set(columns.tolist())) == min(m, k)
+        assert cost[rows, columns].sum() == pytest.approx(cost[linear_sum_assignment(cost)].sum(), rel=1e-14)

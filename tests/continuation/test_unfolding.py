@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 from typing import Any
 
+import demo_cases
 import numpy as np
 import pytest
-from classics import ON_AXIS, SUPPORTS, Found, column, push, turned
+from classics import ON_AXIS, SUPPORTS, Found, column, deep_arch, push, turned
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
@@ -36,7 +38,7 @@ pytestmark = pytest.mark.alone
 EULER = pi**2 / 4
 
 
-def cantilever(lateral: float, more: Any = None) -> Scene:
+def cantilever(lateral: float) -> Scene:
     """A column that bends in the plane of e2, under a dead load -P along e3 and a small one along e2."""
     ends = (clamped(), free(lambda c: (0.0, c.e, -c.P)))
     return column(
@@ -76,7 +78,7 @@ def fold_of(lateral: float) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("lateral", [1e-3, pytest.param(1e-9, marks=pytest.mark.long), 1e-12, 1e-6])
+@pytest.mark.parametrize("lateral", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     """The first branch is stable all along; the detached one has a fold, and no branch point is left.
 
@@ -101,9 +103,7 @@ def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     assert {round(p.load, 9) for p in (detached.points[0], detached.points[-1])} == {4.0}
 
 
-@pytest.mark.few(1)
-@pytest.mark.parametrize("lateral", [1e-5, 2e-4])
-def test_a_jump_at_which_nothing_can_be_located_is_one_across_a_gap(lateral: float) -> None:
+def test_a_jump_at_which_nothing_can_be_located_is_one_across_a_gap(lateral: float = 2e-4) -> None:
     """Long steps end on the other branch, and shorter ones after them do not: the gap is known from the first."""
     found = diagram(cantilever(lateral), steps=StepControl(first=0.05, largest=0.3))
     first, detached = found.branches
@@ -162,11 +162,9 @@ def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("beside", [1e-11, 1e-9, 1e-6])
+@pytest.mark.parametrize("beside", [1e-11, 1e-6])
 def test_a_load_beside_a_branch_point(beside: float) -> None:
     """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P).
-
-    The branch point itself is located to 6e-12.
 
     The tip grows with the root of what P exceeds the critical load by, which round-off changes by 4e-15.
     """
@@ -179,14 +177,6 @@ def test_a_load_beside_a_branch_point(beside: float) -> None:
     k = brentq(lambda k: ellipk(k * k) ** 2 - row.load, 1e-9, 0.9, xtol=1e-16)
     expected = 2 * k / np.sqrt(row.load)
     assert abs(row.ordinate) == pytest.approx(expected, rel=4e-15 / beside + 1e-8)
-
-
-@pytest.mark.long
-def test_a_search_finds_the_detached_branch_once() -> None:
-    """Its mirror image is nearly an equilibrium at 1e-9: deflating that would hide it."""
-    found = diagram(cantilever(1e-9), 0, at=(3.0,), tries=2)
-    assert [b.name for b in found.branches] == ["straight", "found 1 at 3"]
-    assert [s.kind for s in found.branches[1].special if s.kind != "user"] == ["end", "fold", "end"]
 
 
 @pytest.mark.long
@@ -217,32 +207,7 @@ def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     assert below[1] / below[2] == pytest.approx(10 ** (2 / 3), rel=1e-3)
 
 
-@pytest.mark.long
-def test_the_bend_of_a_broken_pitchfork_with_default_steps() -> None:
-    """A twisted rod, curved a little, under thrust: its branch bends at 39.2, where a step may end just before.
-
-    The tangent at the prediction of that row is 35 degrees off.  Steps eight times as short find the same points.
-    """
-    turn = 0.7332631042882616
-
-    def energy(v: Any, k: Any, c: Any) -> Any:
-        return bending_and_twist((k[0] - 1.0374387e-3, k[1], k[2]), (1.0, 1.27042886, 1.24232511))
-
-    scene = Scene(
-        "bend", (0.0, 1.0), "unshearable and inextensible", energy, {"P": Parameter(0.0)}, "P",
-        (clamped(), sliding(ON_AXIS, (np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)), lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("end shortening", s=1.0, of=lambda r, q: 1 - r[2]), (0.0, 60.0),
-        start=lambda s: np.stack([np.cos(turn * s / 2), 0 * s, 0 * s, np.sin(turn * s / 2)], axis=1),
-    )  # fmt: skip
-    (branch,) = trace(scene, Discretization("pointwise", 12, 6), Plan(depth=0, error_bars=False))
-    assert branch.ended == "end of range"
-    found = [(s.kind, s.negative_before, s.negative_after) for s in branch.special[:-1]]
-    assert found == [(FOLD, 0, 1), (BRANCH_POINT, 1, 2), (FOLD, 2, 1)]
-    assert [s.point.load for s in branch.special[:-1]] == pytest.approx([53.4992006, 9.7171269, 9.0176032], abs=1e-6)
-
-
-@pytest.mark.parametrize("largest", [0.05, 0.15])
-def test_the_other_sides_are_found_with_long_steps(largest: float) -> None:
+def test_the_other_sides_are_found_with_long_steps() -> None:
     """A column with a lateral force at a spring: its rows resolve the bends, and an eigenvalue turns back near zero."""
     rod = Scene(
         name="imperfect",
@@ -256,8 +221,51 @@ def test_the_other_sides_are_found_with_long_steps(largest: float) -> None:
         ordinate=Ordinate("mid", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1]))),
         span=(0.0, 90.0),
     )
-    steps = StepControl(first=0.03, largest=largest)
+    steps = StepControl(first=0.03, largest=0.15)
     found = trace(rod, Discretization("auto", 8, 6), Plan(depth=1, steps=steps, error_bars=False))
     folds = [s.point.load for branch in found for s in branch.special if s.kind == FOLD]
     for expected in (5.37, 63.67, 66.86, 39.70):
         assert min(abs(np.array(folds) - expected)) < 5e-3
+
+
+def stiff(strains: float) -> Scene:
+    """A deep arch with strains of this stiffness."""
+
+    def energy(v: Any, k: Any, c: Any) -> Any:
+        stretched = c.GA * (v[0] ** 2 + v[1] ** 2 + (v[2] - 1.0) ** 2) / 2
+        return stretched + bending_and_twist((k[0], k[1] - 1.0, k[2]), (c.B1, c.B2, c.C))
+
+    arch = deep_arch()
+    return replace(arch, rod="flexible", energy=energy, parameters={**arch.parameters, "GA": strains}, span=(0.0, 9.5))
+
+
+@pytest.mark.long
+@pytest.mark.alone
+def test_stiff_strains_do_not_hide_the_load() -> None:
+    """The fold of an arch of DaDeppo & Schmidt is one however stiff its strains are, and at 8.97.
+
+    Beside strains of 1e11 its load was taken for none: the coupling was zero, as at a branch point, and an arch that
+    buckles sideways ended at "two branch points" that are one fold.
+    """
+    plan = Plan(depth=0, error_bars=False)
+    found = [trace(stiff(GA), Discretization(elements=8, degree=4), plan).special("fold") for GA in (1e6, 1e11)]
+    (soft,), (hard,) = found
+    assert hard.point.load == pytest.approx(8.9731, abs=2e-4)
+    assert soft.coupling > 1e-3
+    assert hard.coupling == pytest.approx(soft.coupling, rel=1e-2)
+
+
+@pytest.mark.long
+@pytest.mark.alone
+def test_a_branch_that_meets_its_mirror_image_turns_at_no_fold() -> None:
+    """A cord as a figure eight: its ends stay together, so that the load does no work, and another branch crosses it.
+
+    The load turns back there only because the branch goes on as its mirror image, and the index is that before.  On 18
+    elements of degree 7 it is at 56.2198048707; 9 elements take it apart.
+    """
+    plan = Plan(depth=1, at=(40.0,), tries=24, error_bars=False)
+    diagram = trace(demo_cases.scene("cord"), Discretization("auto", 12, 6), plan)
+    found = [s for branch in diagram for s in branch.special if 56.0 < s.point.load < 57.0 and s.kind.singular]
+    assert [s.kind for s in found] == [BRANCH_POINT]
+    assert found[0].point.load == pytest.approx(56.2198048707, abs=2e-6)
+    assert found[0].negative_before == found[0].negative_after
