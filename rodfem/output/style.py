@@ -1,4 +1,4 @@
-"""Style of all pictures: size, fonts, colours, lines, text, how they are written, and the programs that draw them."""
+"""Style of all pictures: size, fonts, colours, lines, text, and how they are written."""
 
 from __future__ import annotations
 
@@ -31,12 +31,7 @@ PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the sam
     *("#303030", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"),
     *("#003F62", "#753400", "#00573F", "#70435C", "#2F6380", "#7E5700"),
 )
-NAME = re.compile("([A-Za-z]+?)([0-9]*)")
-"""A name of letters with a number behind."""
-GREEK = (
-    *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "pi"),
-    *("rho", "sigma", "tau", "phi", "chi", "psi", "omega"),
-)
+GREEK = "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi chi psi omega".split()
 ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
 """A rod in space, the line along d1 on it, and arrows along d1 and d2."""
 GREY, DARK, STEEL, LOAD = "#9A9A9A", "#6E6E6E", "#707C8A", "#B3123E"
@@ -136,7 +131,7 @@ def named(words: str, label: str, unit: str = "") -> str:
 
 def symbol_of(label: str) -> str:
     """TeX for a parameter whose label is its name alone: ``phi`` is a Greek letter, ``t0`` has an index."""
-    found = NAME.fullmatch(label)
+    found = re.fullmatch("([A-Za-z]+?)([0-9]*)", label)
     if not found:
         return label
     letter, index = found.groups()

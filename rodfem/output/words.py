@@ -190,8 +190,9 @@ def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, st
 
 def _reading(row: Data, natural: Mapping[str, float]) -> dict[str, str]:
     """Numbers of a row by name, with bounds of their relative error."""
-    error = row.get("estimate")
-    values = {name: row[name] for name in READ if error is not None and row[name] is not None}
+    if (error := row.get("estimate")) is None:
+        return {}
+    values = {name: row[name] for name in READ if row[name] is not None}
     return {name: number(x, error * unit(x, one=natural[name])) for name, x in values.items()}
 
 

@@ -24,27 +24,14 @@ import h5py
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.output.states import check_run
 from rodfem.output.style import mesh_in_words, ordinate_in_words
-from rodfem.output.words import with_unit
-from rodfem.report.branches import DERIVED, loci_of, ordinates_of
-from rodfem.report.markup import html_of, plain_of, script_json
+from rodfem.report.branches import DERIVED, html_of, label_of, loci_of, ordinates_of, plain_of, script_json
 from rodfem.report.rods import rods_of
 from rodfem.whole_files import write_whole
 
 STATIC = files("rodfem.report") / "static"
 LIBRARIES = {"three": "three.module.min.js", "three/orbit": "OrbitControls.js"}
-PLACE = re.compile(r"\{\{(\w+)\}\}")
-"""A place in the template."""
-NEEDED = (
-    "scene",
-    "parameter",
-    "parameter_label",
-    "constants",
-    "branches",
-    "meshes",
-    "discretization",
-    "ordinate",
-    "range",
-)
+NEEDED = tuple("scene parameter parameter_label constants branches meshes discretization ordinate range".split())
+"""Entries of a diagram that has a page."""
 
 
 @dataclass(frozen=True)
@@ -93,18 +80,15 @@ def page_of(payload: Mapping[str, Any]) -> str:
         "plotly": _text(STATIC / "vendor" / "plotly-basic.min.js"),
         "imports": script_json({"imports": _modules()}),
     }
-    return PLACE.sub(lambda found: parts[found[1]], _text(STATIC / "template.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _text(STATIC / "template.html"))
 
 
 def _modules() -> dict[str, str]:
     """Names of all modules, and each as a data URL."""
     own = {f"report/{file.name.removesuffix('.js')}": file for file in (STATIC / "js").iterdir()}
     libraries = {name: STATIC / "vendor" / file for name, file in LIBRARIES.items()}
-    return {name: _url(_text(file)) for name, file in sorted({**own, **libraries}.items())}
-
-
-def _url(source: str) -> str:
-    return f"data:text/javascript;charset=utf-8;base64,{b64encode(source.encode()).decode()}"
+    head = "data:text/javascript;charset=utf-8;base64,"
+    return {name: head + b64encode(file.read_bytes()).decode() for name, file in sorted({**own, **libraries}.items())}
 
 
 def _text(file: Traversable) -> str:
@@ -138,7 +122,7 @@ def payload_of(folder: Path) -> dict[str, Any]:
 def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Titles, labels, constants and origin."""
     units = {x: str(data.get(f"{name}_unit") or "") for x, name in (("load", "parameter"), ("ordinate", "ordinate"))}
-    words, unit = str(data.get("parameter_words") or "").replace("$", ""), with_unit("", units["load"]).strip()
+    words = str(data.get("parameter_words") or "").replace("$", "")
     names = {"ordinate": data["ordinate"], **DERIVED}
     labels = names | {"ordinate": ordinate_in_words(data)}
     return {
@@ -146,7 +130,7 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         "title": plain_of(data["title"]),
         "parameter": data["parameter"],
         "symbol": plain_of(data["parameter_label"], always=True),
-        "label": " ".join(filter(None, (escape(words), html_of(data["parameter_label"], always=True), escape(unit)))),
+        "label": label_of(words, data["parameter_label"], units["load"]),
         "ordinates": [
             {"key": key, "name": names.get(key, key), "label": html_of(labels.get(key, key))}
             for key in ordinates_of(data)

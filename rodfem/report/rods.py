@@ -26,8 +26,7 @@ from rodfem.output.words import eigenvalue_in_words
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting
 from rodfem.problem.setting import read as read_setting
-from rodfem.report.branches import branch_data
-from rodfem.report.markup import packed, plain
+from rodfem.report.branches import branch_data, packed, plain
 from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
 
 Floats = NDArray[np.float64]
@@ -41,10 +40,7 @@ BUDGET = 400_000
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
-    """Branches with their shapes, and what they share; ``groups`` are those of ``states.h5`` in the ``folder``.
-
-    ``data`` are those of the diagram.
-    """
+    """Branches with their shapes, and what they share: ``data`` of the diagram, ``groups`` of ``states.h5``."""
     lengths = {branch["name"]: len(branch["columns"]["load"]) for branch in data["branches"]}
     states = sum(lengths.values())
     count = stations(max(groups[name]["s"].shape[1] for name in lengths), states)
@@ -94,9 +90,8 @@ def profiles_data(group: Any, states: int) -> dict[str, Any]:
 
 def _loaded(group: Any) -> list[float]:
     """Arclengths at which something holds or loads the rod."""
-    places: list[Mapping[str, Any]] = [*group.get("supports", {}).values(), *group.get("constraints", {}).values()]
-    found = [float(place.attrs["s"]) for place in places]  # type: ignore[attr-defined]
-    return [s for s in found if np.isfinite(s)]
+    places = [float(place.attrs["s"]) for kind in (SUPPORTS, TIES) for place in group.get(kind, {}).values()]
+    return [s for s in places if np.isfinite(s)]
 
 
 def _drawn(shapes: Shapes, group: Any, stage: Stage, shelf: dict[tuple[str, str], int]) -> dict[str, Any]:
@@ -132,16 +127,11 @@ def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
 
 def _solids(shelf: dict[tuple[str, str], int]) -> list[dict[str, Any]]:
     """Bodies in their colours; a box and a wedge have sharp edges."""
-    made = [(*body_of(body), body, color) for body, color in shelf]
-    return [
-        {
-            "points": packed(points),
-            "triangles": triangles.ravel().tolist(),
-            "colour": color,
-            "flat": body in ("box", "wedge"),
-        }
-        for points, triangles, body, color in made
-    ]
+    out = []
+    for body, color in shelf:
+        points, triangles = packed(body_of(body)[0]), body_of(body)[1].ravel().tolist()
+        out.append({"points": points, "triangles": triangles, "colour": color, "flat": body in ("box", "wedge")})
+    return out
 
 
 # --- shapes
@@ -184,11 +174,7 @@ def shapes_of(group: Any, count: int) -> Shapes:
 
 @dataclass(frozen=True)
 class Stage:
-    """The picture of the typical state.
-
-    ``branch`` and ``row`` are those of the state, ``look`` size and directions of the picture, ``load`` the unit vector
-    along the dead load (3,), or None, and ``setting`` what holds and loads the rod.
-    """
+    """The picture of the typical state: its place, and the unit vector (3,) along the dead ``load``, or None."""
 
     branch: str
     row: int
@@ -263,8 +249,7 @@ def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[Shown]:
 def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Setting, look: Look) -> list[dict[str, Any]]:
     """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one.
 
-    ``shapes`` are those of the branch, ``setting`` is what holds and loads the state, ``look`` that of the picture, and
-    ``modes`` are those of :func:`modes_of`.
+    ``shapes`` are those of the branch, ``modes`` those of :func:`modes_of`.
     """
     r, frames = shapes[row]
     span = float(np.linalg.norm(np.ptp(r, axis=0)))

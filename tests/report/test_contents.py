@@ -16,8 +16,7 @@ from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
 from rodfem.output.plot_frequencies import curves
 from rodfem.output.words import number, readings_of, words_of
-from rodfem.report.branches import _spectrum, _without_noise
-from rodfem.report.markup import html_of, packed, plain, plain_of, script_json
+from rodfem.report.branches import _spectrum, _without_noise, html_of, packed, plain, plain_of, script_json
 from rodfem.report.rods import shapes_of
 from rodfem.writhe import writhe
 
