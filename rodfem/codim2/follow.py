@@ -233,8 +233,8 @@ class RicherMesh:
         """Relative change of the strains of a state, or of one of its null vectors."""
         norm, changed = self.richer.system.norm, self.richer.indicator.changed
         pairs = zip(near.modes[: near.multiplicity], found.modes, strict=False)
-        of_modes = (changed(v / norm(v), w / norm(w), state=False) for v, w in pairs)
-        return max(changed(near.x, found.x, state=True), *of_modes)
+        of_modes = [changed(v / norm(v), w / norm(w), state=False) for v, w in pairs]
+        return max([changed(near.x, found.x, state=True), *of_modes])
 
 
 def locus(
