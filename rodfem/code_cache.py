@@ -48,10 +48,7 @@ def refused(error: OSError) -> str:
 
 
 def have_home() -> None:
-    """Have a home folder, which dolfinx asks for even where XDG_CACHE_HOME says where its kernels are.
-
-    Raises :class:`RuntimeError` where there is neither.
-    """
+    """Have a home folder, which dolfinx asks for in any case; raises :class:`RuntimeError` where there is none."""
     try:
         Path.home()
     except RuntimeError:

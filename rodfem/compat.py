@@ -196,10 +196,7 @@ def local_table(form: Any) -> sp.csr_matrix:
 
 
 class Integral(NamedTuple):
-    """An integral of a compiled form: its kernel, a function pointer of cffi, and ``entities`` (count, ``kind``).
-
-    An entity is a cell, with a facet on the boundary, of both sides inside.
-    """
+    """An integral of a compiled form: its kernel of cffi, and ``entities`` (count, kind), cells with facets."""
 
     kernel: Any
     kind: int
@@ -273,10 +270,7 @@ def slepc_errors() -> Iterator[None]:
 
 
 def destroy_garbage(comm: Any) -> None:
-    """Destroy the PETSc objects that Python has collected; collective over ``comm``.
-
-    Since PETSc 3.18 their memory is kept until then, as ranks may collect them in another order.
-    """
+    """Destroy the PETSc objects that Python has collected, as PETSc does not since 3.18; collective over ``comm``."""
     if hasattr(PETSc, "garbage_cleanup"):
         for communicator in (comm, PETSc.COMM_SELF):
             PETSc.garbage_cleanup(communicator)

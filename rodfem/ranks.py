@@ -120,10 +120,7 @@ def launched() -> bool:
 
 
 def end_with_launcher() -> None:
-    """Have the system end this process with its parent, where that started it as a rank, and the system is Linux.
-
-    It could not do so itself: a rank that waits for another one in a message hears nothing.
-    """
+    """Have the system end this process with its parent, where that started it as a rank, and the system is Linux."""
     if sys.platform == "linux" and launched():
         PR_SET_PDEATHSIG = 1  # the signal that this process gets at the end of its parent
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

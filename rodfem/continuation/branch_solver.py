@@ -351,7 +351,7 @@ class BranchSolver:
         f = self.system.fields
         nodes = f.coordinates(f.discretization.degree).shape
         named = {f.turning.name: turned.reshape(*nodes, -1), "v": v, LOAD: load}
-        return self.shape.with_centreline(NodalValues(f, f.filled(named), self.system.line))
+        return self.shape.with_centreline(NodalValues(self.system.equations, f.filled(named), self.system.line))
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = FAR) -> tuple[PETSc.Vec, NewtonResult]:
         """Equilibrium at exactly ``load`` by Newton's method from ``guess``, at a distance of ``reach`` at most."""

@@ -137,10 +137,7 @@ class Assembler:
 
 
 def bordered_pattern(fields: Fields) -> sp.csr_matrix:
-    """Nonzero pattern (local_unknowns, unknowns) of this rank's rows, with ones, and the diagonal.
-
-    Couplings inside the cells, dense rows and columns of the scalars.
-    """
+    """Nonzero pattern, with the diagonal, of this rank's rows: couplings inside cells; rows and columns of scalars."""
     comm, n, own = fields.comm, fields.unknowns, len(fields.free_owned)
     rows = _own_rows(fields, list(fields.dofs))
     scalars = np.array(list(fields.scalars.values()), dtype=np.int32)  # beyond all fields: the last columns of each row
@@ -192,10 +189,7 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
 
 
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
-    """Zero PETSc AIJ matrix with a pattern, and maps from local degrees of freedom to its rows and columns.
-
-    Its values are shared with numpy where compiled code assembles it.
-    """
+    """Zero PETSc AIJ matrix with a pattern; its values are shared with numpy where compiled code assembles it."""
     if fields.compiled:
         matrix = shared_matrix(fields.comm, pattern)
     else:

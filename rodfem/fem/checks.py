@@ -35,7 +35,7 @@ from rodfem import compat
 from rodfem.expressions import Variable, differentiated, extract_coefficients, extract_type
 from rodfem.fem.assembly import Assembler, Cells, Places, vector_places
 from rodfem.fem.equations import Equations
-from rodfem.fem.state import Evaluation
+from rodfem.fem.state import NodalValues
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature, strain
 from rodfem.linalg.matrices import EPS
@@ -112,10 +112,7 @@ class Convexity:
         return np.asarray(np.sqrt(np.max(diagonals, axis=0).max(axis=1, keepdims=True)))
 
     def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
-        """Least eigenvalue over the whole rod at the state ``x``, in units of the ``scales`` of states nearby.
-
-        So stiff strains do not hide bending, as they do from :meth:`lowest`, and it depends smoothly on the state.
-        """
+        """Least eigenvalue over the whole rod at ``x``, in units of the ``scales`` of states nearby: smooth."""
         least = np.linalg.eigvalsh(self._by_element(x) / scales[..., None] / scales[..., None, :])[..., 0]
         mine = least.min(initial=1.0)
         if self.varies:
@@ -257,7 +254,7 @@ class QuadratureCheck:
         def changes(size: float) -> tuple[np.ndarray, np.ndarray]:
             # largest sum of the changes in two opposite motions, and largest change, by kind of row
             ahead, back = (
-                Evaluation(state.equations, state.local + sign * size * motion, state.line).covector() - here
+                NodalValues(state.equations, state.local + sign * size * motion, state.line).covector() - here
                 for sign in (1.0, -1.0)
             )
             return self._largest([ahead[rows] + back[rows] for rows in dofs]), self._largest(
@@ -306,10 +303,7 @@ class QuadratureCheck:
     def _place(
         self, values: list[np.ndarray], term: int, cell: int, rows: np.ndarray, fine: np.ndarray, least: float
     ) -> tuple[float, float, float, float]:
-        """Ends of a cell, and of the smallest part of it that an error above the ``least`` comes from.
-
-        ``fine`` are the rows of a term of that cell, of all its pieces.
-        """
+        """Ends of a cell, and of the smallest part of it that an error above the ``least`` comes from."""
         pieces, place = 1, 0
         while pieces < len(fine):
             halves = self._terms(values, 2 * pieces)[term, :, cell, rows].T

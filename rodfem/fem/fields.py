@@ -176,10 +176,7 @@ class Fields:
         self.clamps = self._clamps()
 
     def bound(self, scene: Scene) -> Fields | None:
-        """The same for a scene with other constants, load or range; None where its unknowns are others.
-
-        To be asked before drifts are added, and anything else.
-        """
+        """The same, without drifts, for a scene with other constants; None where its unknowns are others."""
         out = copy(self)
         out.scene, out.scalars = scene, dict(self.scalars)
         out.formulation = formulations.chosen(self.asked.formulation, scene)
@@ -376,10 +373,7 @@ class Fields:
 
     @cached_property
     def derivative(self) -> sp.csr_matrix:
-        """Matrix (local size, local size) of the derivative in arclength at nodes, the mean of cells that share one.
-
-        Zero for scalars and at clamped degrees of freedom.
-        """
+        """Matrix (local size,) * 2 of the derivative in arclength at free nodes, the mean of cells that share one."""
         size = len(self.number)
         mean = sp.csr_matrix((size, size))
         for block in self.blocks:

@@ -42,10 +42,7 @@ _JOBS: list[Job] = []
 
 
 def _cached(module_name: str, object_names: Sequence[str], cache_dir: str | Path, timeout: int) -> Any:
-    """Objects of a module of FFCx's cache, and the module; two times None if it is to be compiled.
-
-    In the place of FFCx's own function, which lists the folder: that takes 10 ms with thousands of files.
-    """
+    """Objects of a module of FFCx's cache, and the module; without listing its folder, which takes 10 ms."""
     files = (Path(cache_dir) / f"{module_name}{end}" for end in EXTENSION_SUFFIXES)
     file = next((f for f in files if f.is_file()), None)
     if file is None or not (Path(cache_dir) / f"{module_name}.c.cached").is_file():
@@ -148,10 +145,7 @@ def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable
 
 
 def compile_ahead(forms: Sequence[Any]) -> list[Any]:
-    """Compiled forms; None for those that the cache lacks, which are now compiled into it in the background.
-
-    One of several ranks begins nothing: there dolfinx compiles on the first rank, while the others wait.
-    """
+    """Compiled forms; None for those that the cache lacks: one process alone now compiles them in the background."""
     if not ALONE:
         return [None] * len(forms)
     _wait()

@@ -34,10 +34,7 @@ Start = Callable[[np.ndarray], np.ndarray] | None
 
 
 class QuaternionField:
-    """Rotation as a quaternion ``q`` of four components, whose unit norm is a constraint.
-
-    Values (..., ``size``) of a field of rotations stand for quaternions (..., 4); here they are these.
-    """
+    """Rotation as a quaternion ``q``, whose unit norm is a constraint: values (..., ``size``) of a field."""
 
     name = "q"
     size = 4
@@ -73,8 +70,7 @@ class QuaternionField:
     def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
         """Values (m, size) at arclengths (m,) of a scene's ``start``, a straight rod without one.
 
-        The signs that the start gives its quaternions are a matter of choice: values are made to be continuous along
-        the rod from its left end.
+        The signs of its quaternions are a matter of choice: values are made continuous along the rod from its left end.
         """
         every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
         q = np.tile(IDENTITY, (len(every), 1)) if start is None else np.asarray(start(every), dtype=float)
@@ -93,8 +89,7 @@ class QuaternionField:
 class AngleField(QuaternionField):
     """The angle about the normal of the plane, e1 or e2 (``normal`` 0 or 1), from the undeformed state.
 
-    It is not confined to one turn: rotations tell angles apart up to ``2 pi``, and the number of whole turns is that of
-    the scene's start.
+    It is not confined to one turn: the number of whole turns is that of the scene's start.
     """
 
     name = "angle"
@@ -157,9 +152,8 @@ def turning_of(scene: Scene) -> QuaternionField:
 class Formulation:
     """Which unknowns a rod has in addition to rotations and strains, its Lagrangian in them, and where they say it is.
 
-    ``name`` is that in files and options, ``words`` are what is unknown, and ``centreline`` says whether that is a
-    field, ``r``.  Here centreline and contact force are fields, ``r`` measured from the lift of the ends' positions:
-    that applies to all scenes.
+    Here centreline and contact force are fields, ``r`` measured from the lift of the ends' positions: that applies to
+    all scenes. ``name`` is that in files and options.
     """
 
     name, words, centreline = "pointwise", "all fields", True
@@ -195,8 +189,7 @@ class Formulation:
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Share of this rank in the position at a place without its offset (3,), or in that and the chord (2, 3).
 
-        ``integral`` are weights (2, points) of slopes in their integrals to the place and over the rod, ``value``
-        (nodes,) of nodal values in the value there.
+        ``integral`` are weights (2, points) of slopes in their integrals, ``value`` (nodes,) of nodal values.
         """
         return value @ state.values("r")[shape.cells].reshape(-1, 3)
 

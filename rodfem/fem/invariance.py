@@ -33,7 +33,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import SceneError
-from rodfem.fem.state import LOAD, Evaluation, State
+from rodfem.fem.state import LOAD, NodalValues, State
 from rodfem.fem.symmetries import SYMMETRIC_STATE, Symmetry, derivative, elementary_generators
 from rodfem.linalg.matrices import rounding
 from rodfem.problem.contribution import Block, Motion
@@ -104,10 +104,7 @@ def _moving(motions: np.ndarray, moved: np.ndarray) -> np.ndarray:
 
 
 def _kept(motions: np.ndarray, conditions: np.ndarray, magnitudes: np.ndarray, exact: float) -> np.ndarray:
-    """Combinations of ``motions`` (m, n) that fulfil ``conditions`` (..., m), of terms of these ``magnitudes`` (m,).
-
-    They do so ``exact`` to that, relative to the magnitudes of the terms that cancel in each.
-    """
+    """Combinations of ``motions`` (m, n) that fulfil ``conditions`` (..., m), ``exact`` relative to their terms."""
     terms = abs(motions.T) @ magnitudes
     terms = np.where(terms > 0, terms, terms.max(initial=0.0) or 1.0)
     return np.asarray(motions @ (_null_space(conditions @ motions / terms, exact) / terms[:, None]))
@@ -132,17 +129,14 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     return np.asarray(_null_space(np.array([row for row, _ in along]) / size, round_off) / lengths[:, None])
 
 
-def _along(state: Evaluation, changes: np.ndarray, step: float = 1e-3) -> tuple[np.ndarray, float]:
-    """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its largest value.
-
-    By central differences of fourth order.
-    """
+def _along(state: NodalValues, changes: np.ndarray, step: float = 1e-3) -> tuple[np.ndarray, float]:
+    """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its largest value."""
     equations, loads = state.equations, state.equations.loads
     assert loads is not None
     values = np.array(
         [
             [
-                Evaluation(equations, state.local + side * step * change, state.line).integral(loads)
+                NodalValues(equations, state.local + side * step * change, state.line).integral(loads)
                 for side in (-2, -1, 1, 2)
             ]
             for change in changes
@@ -152,10 +146,7 @@ def _along(state: Evaluation, changes: np.ndarray, step: float = 1e-3) -> tuple[
 
 
 def find_motion_along(equations: Equations) -> Symmetry | None:
-    """Find the motion of a closed rod along itself, with what has to go with it; None where that is no symmetry.
-
-    For a scene whose equations have the arclength in them the mesh must be fine.
-    """
+    """Find the motion of a closed rod along itself, with what has to go with it, on a fine mesh; None if it is none."""
     fields, parts = equations.fields, elementary_generators(equations.fields)
     none = np.zeros(len(parts))
     if equations.uniform:
@@ -192,7 +183,7 @@ def _null_space(rows: np.ndarray, exact: float = EXACT) -> np.ndarray:
 
 
 def _change_of_equations(
-    state: Evaluation, single: list[Symmetry], changes: np.ndarray
+    state: NodalValues, single: list[Symmetry], changes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,).
 
@@ -258,7 +249,7 @@ def _held(fields: Fields) -> np.ndarray:
     return used[fields.number[used] < 0]
 
 
-def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_multipliers: bool = False) -> Evaluation:
+def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_multipliers: bool = False) -> NodalValues:
     """Generic state with a random load: the same on any number of ranks, ends held.
 
     Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients, of which each
@@ -276,7 +267,7 @@ def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_mul
     named[LOAD] = low + (high - low) * part
     for size in (1.0, 0.1, 0.01, 1e-3):  # of displacements: a barrier admits no large ones
         moved = {"r": size * named["r"]} if "r" in named else {}
-        state = Evaluation(equations, fields.filled(named | moved), equations.line)
+        state = NodalValues(equations, fields.filled(named | moved), equations.line)
         loads = 0.0 if equations.loads is None else state.integral(equations.loads)
         if fields.comm.allreduce(bool(np.isfinite(loads) and np.isfinite(state.covector()).all()), op=MPI.LAND):
             break
@@ -401,10 +392,7 @@ class Verification:
         return out
 
     def _holds(self, matrix: PETSc.Mat, chosen: list[int], state: State, equations: PETSc.Vec | None) -> bool:
-        """Whether a generic combination of the ``chosen`` generators is a null vector of ``S`` at the ``state``.
-
-        ``matrix`` is ``S``, ``equations`` those there, zero at an equilibrium (None).
-        """
+        """Whether a generic combination of the ``chosen`` generators is a null vector of ``S`` at the ``state``."""
         system, left, generators = self.system, self._left, state.generators
         weights = generic_weights(len(chosen))
         g, own = self._generator, generators.shape[1]

@@ -40,10 +40,7 @@ exactly; there were no factors at all."""
 
 
 class Correction(NamedTuple):
-    """What an iteration has changed, by a ``size`` that is to vanish, and the ``distance`` from where it all began.
-
-    It is by ``fresh`` factors, those of the state itself, or by older ones: a chord step.
-    """
+    """Change by a ``size`` that is to vanish, ``distance`` from the guess, by ``fresh`` factors or older ones."""
 
     distance: float
     size: float
@@ -126,10 +123,7 @@ def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, mo
 
 
 class OnPlane:
-    """Iterations for the equations on the plane through ``x`` orthogonal to ``row``.
-
-    On one rank each is one call of compiled code, without damping and where its factors serve.
-    """
+    """Iterations for the equations on the plane through ``x`` orthogonal to ``row``; compiled where that serves."""
 
     def __init__(self, system: System, x: PETSc.Vec, row: PETSc.Vec) -> None:
         self.system, self.x, self.row, self.origin = system, x, row, x.copy()
@@ -226,10 +220,7 @@ def _arrival(system: System, x: PETSc.Vec, row: PETSc.Vec, accepts: Callable[[PE
 
 
 def along(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:
-    """``dx.(K + M/tau) dx`` of a damped step (dx, dy) that solves ``(K + M/tau, C; C^t, 0) (dx, dy) = (F, c)``.
-
-    It is ``dx.F - dy.c``, of the equations (F, c) of the ``system`` at ``x``.
-    """
+    """``dx.(K + M/tau) dx = dx.F - dy.c`` of a damped step ``(K + M/tau, C; C^t, 0) (dx, dy) = (F, c)``."""
     equations = system.new_vector()
     system.at(x).residual(equations)
     fields, sign = system.fields, np.ones(step.local_size)
@@ -332,8 +323,7 @@ class CompiledNewton:
     def iterate(self, x: PETSc.Vec, row: PETSc.Vec, fresh: bool) -> tuple[int, float, float]:
         """Move ``x`` by one correction on the plane across ``row``, with factors of the Jacobian there if ``fresh``.
 
-        Returns what it did, the distance of ``x`` from :attr:`origin` in the metric, and the size of the correction in
-        it, or relative to ``x``, the larger.
+        Returns what it did, the distance of ``x`` from :attr:`origin` in the metric, and the size of the correction.
         """
         newton = self.newton
         with self.system.clock("solve"):

@@ -28,7 +28,7 @@ from petsc4py import PETSc
 
 from rodfem.fem.checks import Pieces
 from rodfem.fem.shape import Shape
-from rodfem.fem.state import Evaluation
+from rodfem.fem.state import NodalValues
 from rodfem.problem.contribution import Constraint
 from rodfem.problem.functions import LETTERS, derived
 from rodfem.problem.quaternions import directors, product
@@ -99,9 +99,8 @@ class Resultants:
     def at(self, x: PETSc.Vec) -> dict[str, np.ndarray]:
         """Fields by their :data:`NAMES` at the state ``x``, (elements, points, 3) each, as a :class:`Profile` has them.
 
-        ``points`` (elements, points) has the arclengths: as many in each element as the degree of the rotation, at
-        equal distances, ends included where there is more than one.  Strain and curvature jump from element to element,
-        by as much as they are accurate.
+        ``points`` (elements, points) has the arclengths, as many in each element as the degree of the rotation, at
+        equal distances. Strain and curvature jump from element to element, by as much as they are accurate.
         """
         points = self.shape.from_left(self.shape.start[:, None] + self.shape.size[:, None] * self.places)
         whole = self._table(x)
@@ -191,10 +190,7 @@ class Reaction(NamedTuple):
 
 
 class Reactions(NamedTuple):
-    """Reactions of the supports of the ``left`` and ``right`` end, and of what is attached inside, from left to right.
-
-    A closed rod has no supports: zero.
-    """
+    """Reactions of the ``left`` and ``right`` supports, and of what is attached inside, from left to right."""
 
     left: Reaction
     right: Reaction
@@ -232,7 +228,7 @@ def _of_support(resultants: Resultants, x: PETSc.Vec, side: int, contact: np.nda
     for unknown, copies in zip(fields.unknown_scalars, fields.copies.T, strict=False):
         if unknown.group.name in {"m" + LETTERS[side], "f" + LETTERS[side]}:  # moments of a hinge, forces of a guide
             local[copies] = 0.0
-    work = Evaluation(state.equations, local, state.line).covector()
+    work = NodalValues(state.equations, local, state.line).covector()
     cell, node = int((shape.start if side == 0 else -shape.start).argmin()), shape.order[-side]
     mine = np.isclose(shape.start[cell] + side * shape.size[cell], scene.interval[side])
     turned = fields.dofs[fields.turning.name][cell, node]

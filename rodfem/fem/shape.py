@@ -24,10 +24,7 @@ from rodfem.writhe import writhe
 
 
 def minimum(powers: list[float], t: float, spacing: float) -> float:
-    """Value of a polynomial, given by rising powers, at its minimum within ``spacing`` of ``t`` in [-1, 1].
-
-    By Newton's method for its slope; the value somewhere nearby where there is no such minimum.
-    """
+    """Value of a polynomial, given by rising powers, at its minimum within ``spacing`` of ``t``, by Newton's method."""
     low, high = max(t - spacing, -1.0), min(t + spacing, 1.0)
     slopes = [i * p for i, p in enumerate(powers)][1:]
     bends = [i * p for i, p in enumerate(slopes)][1:]
@@ -103,9 +100,8 @@ class Shape:
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
 
-        The least value at many points picks a place in each element that may hold it, on whatever rank: one whose least
-        value is above that of the rod by less than a change between neighbours.  Newton's method finds the minimum of
-        the polynomial nearby.
+        Newton's method finds the minimum of the polynomial in each element whose least value at many points is above
+        that of the rod by less than a change between neighbours.
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
@@ -174,11 +170,7 @@ class Shape:
         return system.vector(out)
 
     def weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Weights at an arclength ``s``, for :meth:`place`.
-
-        Of slopes at Gauss points in their integrals to ``s`` and over the rod, (2, cells * points), and of nodal values
-        at ``s``, (cells * nodes,).
-        """
+        """Weights (2, cells * points) of slopes in integrals to ``s`` and over the rod; (cells * nodes,) of values."""
         local = (s - self.start) / self.size
         integral = self.gauss.integrals(np.clip(local, 0, 1)) * self.size[:, None]
         first = self.system.scene.interval[0]
@@ -191,10 +183,7 @@ class Shape:
     def place(
         self, state: NodalValues, s: float, weights: tuple[np.ndarray, np.ndarray] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Centreline (3,) and unit quaternion (4,) of a ``state`` at an arclength ``s`` of these ``weights``.
-
-        Without weights ``s`` is the arclength of the ordinate.
-        """
+        """Centreline (3,) and unit quaternion (4,) of a ``state`` at ``s`` by its weights, or those of the ordinate."""
         system, f = self.system, self.system.fields
         integral, value = weights or self._probe_weights[0]
         turned = value @ state.turned[self.cells].reshape(-1, f.turning.size)
@@ -265,9 +254,6 @@ def link(sample: dict[str, Any]) -> tuple[int, float, float]:
     The linking number of the edge traced by a director with the centreline is ``Lk = Tw + Wr`` (Calugareanu 1959, White
     1969), with the twist ``Tw = 1/(2 pi) int k3 ds`` and the writhe ``Wr`` of the centreline.  It is an integer, and
     does not change while the rod is deformed without passing through itself: it belongs to the scene's start.
-
-    Raises :class:`InputError` if the sum of the last two is not near an integer: the rod is not closed, or touches
-    itself.
     """
     from scipy.interpolate import CubicSpline
 

@@ -24,7 +24,6 @@ from rodfem.problem.functions import Constants
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
-    from rodfem.fem.fields import Fields
     from rodfem.fem.symmetries import Phase
     from rodfem.fem.system import System
     from rodfem.problem.scene import Scene
@@ -59,16 +58,30 @@ def load_line(scene: Scene) -> Line:
     return line(scene, {scene.load: 0.0}, {scene.load: 1.0})
 
 
+class Energies(NamedTuple):
+    """Energies of a state; those of the loads are nan where a load has no potential.
+
+    ``energy`` is the stored one, ``int W ds``, and ``potential`` the total ``V``, of the rod, loads, springs and
+    foundations: what is stationary at an equilibrium.  ``conjugate`` is ``-dV/dload`` at fixed state: what the load
+    does work on, as the displacement of its point or the angle of its end.  The distinguished ordinate of Maddocks,
+    Arch. Ration. Mech. Anal. 99 (1987): along a branch ``dV = -conjugate dload``.
+    """
+
+    energy: float
+    potential: float
+    conjugate: float
+
+
 class NodalValues:
-    """Values of fields and scalars, of a state or of a change of one; they never change.
+    """Values of fields and scalars, of a state or of a change of one, and the ``equations`` there; they never change.
 
     ``local`` has each local degree of freedom, clamped ones and ghosts included; ``line`` are the parameters that the
     load stands for.
     """
 
-    def __init__(self, fields: Fields, local: np.ndarray, line: Line) -> None:
+    def __init__(self, equations: Equations, local: np.ndarray, line: Line) -> None:
         local.setflags(write=False)
-        self.fields, self.local, self.line = fields, local, line
+        self.equations, self.fields, self.local, self.line = equations, equations.fields, local, line
 
     def values(self, name: str) -> np.ndarray:
         """Nodal values of a field in all local cells, ghosts last, (cells, nodes, components)."""
@@ -97,28 +110,6 @@ class NodalValues:
     def constants(self) -> Constants:
         """Parameters as numbers, at the middle of the rod."""
         return self.line.constants(self.load)
-
-
-class Energies(NamedTuple):
-    """Energies of a state; those of the loads are nan where a load has no potential.
-
-    ``energy`` is the stored one, ``int W ds``, and ``potential`` the total ``V``, of the rod, loads, springs and
-    foundations: what is stationary at an equilibrium.  ``conjugate`` is ``-dV/dload`` at fixed state: what the load
-    does work on, as the displacement of its point or the angle of its end.  The distinguished ordinate of Maddocks,
-    Arch. Ration. Mech. Anal. 99 (1987): along a branch ``dV = -conjugate dload``.
-    """
-
-    energy: float
-    potential: float
-    conjugate: float
-
-
-class Evaluation(NodalValues):
-    """Values with the equations that are evaluated there."""
-
-    def __init__(self, equations: Equations, local: np.ndarray, line: Line) -> None:
-        super().__init__(equations.fields, local, line)
-        self.equations = equations
 
     def _register(self) -> None:
         """Put these values where the compiled forms read them."""
@@ -175,7 +166,7 @@ class Evaluation(NodalValues):
         return expression()
 
 
-class State(Evaluation):
+class State(NodalValues):
     """State of a :class:`~rodfem.fem.system.System`, whose borders and matrices it uses; collective over its ranks.
 
     ``drifts`` are its drift scalars, and ``phases`` its phase conditions by the symmetries that are left out.

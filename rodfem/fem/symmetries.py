@@ -56,10 +56,7 @@ to the round-off of its eigenvalue, and dropped.
 
 @dataclass(frozen=True)
 class Elementary:
-    """A generator of one ``target`` (a field or a group of scalars): ``change = matrix value + constant``.
-
-    ``name`` is that of the motion, in words.
-    """
+    """A generator, with its name in words, of a field or a group of scalars: ``change = matrix value + constant``."""
 
     target: str
     matrix: Matrix
@@ -174,10 +171,7 @@ def _of_strains(free: list[int]) -> list[Elementary]:
 
 
 def rigid_motions(parts: tuple[Elementary, ...]) -> dict[str, Symmetry]:
-    """Rotation about, and translation along, each axis of space, by name: sums of elementary generators of all fields.
-
-    Those of which the rod of a plane is not capable are without any part.
-    """
+    """Rotation about, and translation along, each axis of space, by name; without parts where a planar rod has none."""
     out = {}
     for i, axis in enumerate(AXES, start=1):
         turn, move = f"rotation about e{i}", f"translation along e{i}"
@@ -256,7 +250,7 @@ class Generators:
         fields, line = self.system.fields, state.line
 
         def at(load: float) -> np.ndarray:
-            values = NodalValues(fields, fields.filled({LOAD: load}), line)
+            values = NodalValues(self.system.equations, fields.filled({LOAD: load}), line)
             return np.array([motion.change(values)[self._rows] for motion in self.motions])
 
         if line is not self._line:

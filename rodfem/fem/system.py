@@ -174,10 +174,7 @@ class System:
         return self.norm(a - b)
 
     def at(self, x: PETSc.Vec, line: Line | None = None) -> State:
-        """State of the values ``x`` has now, with the parameters of a ``line``, :attr:`line` unless given.
-
-        On one rank the same object as lately where values and line are the same.
-        """
+        """State of the values that ``x`` has now, with a ``line`` or :attr:`line`; the same object as lately."""
         line = line or self.line
         # each row is asked for the same state ten times over: what it has derived of itself is kept with it
         values = x.array_r.tobytes() if self.comm.size == 1 else b""
@@ -193,10 +190,7 @@ class System:
         return state
 
     def tidy(self, vectors: int = 1) -> None:
-        """Destroy the vectors that Python has collected, if they are long, or so many at a time; collective.
-
-        A hundred of them, as one location of a special point leaves, are as much memory as all matrices.
-        """
+        """Destroy the vectors that Python has collected, if they are long, or so many at a time; collective."""
         if vectors * self.fields.unknowns > FEW:
             compat.destroy_garbage(self.comm)
 
@@ -204,7 +198,7 @@ class System:
         """Nodal values of a change of state: zero where a state is clamped."""
         local = np.zeros(len(self.fields.number))
         local[self._numbered] = self.gathered(d)[: len(self._numbered)]
-        return NodalValues(self.fields, local, self.line)
+        return NodalValues(self.equations, local, self.line)
 
     def changes(self, columns: np.ndarray) -> np.ndarray:
         """Local values of changes of state whose own rows are ``columns`` (own rows, k): (k, local size)."""
@@ -330,11 +324,7 @@ class System:
             self.phase = phases[dropped]
 
     def verify(self, matrix: PETSc.Mat, state: State) -> bool:
-        """Verify the symmetries at an equilibrium, where ``S`` is ``matrix``.
-
-        Where one is none the phase conditions are taken anew without it, and False is returned: the borders of the
-        matrix are to be assembled again.
-        """
+        """Verify the symmetries at an equilibrium; False, with other phase conditions, where one of them is none."""
         if not self.symmetries or self.verification(matrix, state):
             return True
         reference = self.phase.reference
