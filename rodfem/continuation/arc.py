@@ -44,8 +44,6 @@ STRAYED, LEAST = 0.3, 1e-9
 singular state over the piece.  The second one, in the metric, is round-off."""
 DIFFERENCE, GENERIC = 1e-5, 1e-2
 """Steps of differences along an arc or a tangent, and in a generic direction, in natural sizes."""
-REACH = 0.02
-"""Distance along the branch, in the metric, to which an event is sought again on another mesh."""
 
 
 def corrected(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
@@ -171,8 +169,7 @@ def _number(s: float, value: float, slope: float) -> Node:
 def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
     """The equilibrium ``x`` after more steps of Newton's method, on the plane across ``row`` and without damping.
 
-    Where an equilibrium was solved for with damping its factors see little of what a soft mode has left.  A state that
-    slides away along a family makes one step with it.
+    A state that slides away along a family makes one step with it.
     """
     system, settled = solver.system, x.copy()
     given = system.damping
@@ -388,7 +385,7 @@ def nearest_event(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PET
     Raises :class:`ConvergenceError` where the event does not happen there.
     """
     row, both = solver.row(tangent), list[End]()
-    for s in (-REACH, REACH):
+    for s in (-0.02, 0.02):  # in the metric
         there = corrected(solver, x + tangent * s, row)
         both.append(end(solver, s, there, solver.tangent(row, at=there)))
     piece = EventPiece(solver, event, *both)

@@ -383,10 +383,9 @@ class Branch:
 def breaks(points: Sequence[Point], specials: Sequence[SpecialPoint], begins: int | None = None) -> list[Unexplained]:
     """Neighbours among rows in order of arclength, some of them special points, whose indices do not agree.
 
-    Each special point has its own index before and after.  A row allows an interval: eigenvalues that are zero within
-    the tolerance of the count may be of either sign.  If the intervals of two neighbours are disjoint an eigenvalue has
-    crossed zero unseen, or a number is wrong.  ``begins`` is the index right after the first row, where it is known
-    although it is none of these special points.
+    A row allows an interval: eigenvalues that are zero within the tolerance of the count may be of either sign.  If the
+    intervals of two neighbours are disjoint an eigenvalue has crossed zero unseen, or a number is wrong.  ``begins`` is
+    the index right after the first row, where it is known although it is none of these special points.
     """
     at = {id(s.point): s for s in specials if s.kind.singular}
     persistent = persistent_zeros(points)

@@ -21,10 +21,6 @@ from rodfem.stability.cluster import Cluster, Measured
 from rodfem.stability.nonsymmetric import ALIKE, Frequencies, groups, orthonormal, product, squares
 from rodfem.tolerances import ROUND_OFF, TINY
 
-STRANGE = 1.0
-"""Sum of the share of a vector outside a curve's and of the relative change, above which another curve begins."""
-RANK = 1e-6
-"""Relative distance of eigenvalues above which their vectors span their invariant subspace well."""
 SHARP, ENOUGH = 1e-11, 1e-8
 """Uncertainties of a load, relative to it, at which the search ends: at once, and at an interval that is no better."""
 NODES = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
@@ -58,7 +54,7 @@ class Curves:
             cost = self._distances(last, found, abs(product(self.comm, self._basis, found.weighed)) ** 2 / energy)
             rows, columns = assignment(cost)
             for i, j, c in zip(rows.tolist(), columns.tolist(), cost[rows, columns].tolist(), strict=True):
-                if c < STRANGE:
+                if c < 1.0:  # else another curve begins
                     numbers[j] = self._numbers[i]
         fresh = [j for j, number in enumerate(numbers) if number < 0]
         for j in fresh:
@@ -95,14 +91,7 @@ class Curves:
 
 
 def assignment(cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns, a pair for each of the fewer, whose entries in ``cost`` (m, k) have the least sum.
-
-    Where the least entries of all of the fewer are in different places they are that.
-    """
-    m, k = cost.shape
-    nearest = cost.argmin(axis=0 if k <= m else 1)
-    if len(set(nearest.tolist())) == len(nearest):
-        return (nearest, np.arange(k)) if k <= m else (np.arange(m), nearest)
+    """Rows and columns, a pair for each of the fewer, whose entries in ``cost`` (m, k) have the least sum."""
     from scipy.optimize import linear_sum_assignment  # slow to load
 
     rows, columns = linear_sum_assignment(cost)
@@ -130,15 +119,14 @@ class Located:
 def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> Located:
     """Load at which ``D`` of a cluster vanishes, from about ``load``; raises :class:`ConvergenceError`.
 
-    Chebyshev interpolation on a piece that is moved to the zero and shrunk until the last coefficient says that it is
-    sharp.  The cluster is taken over from where its eigenvalues are farthest apart.  ``at`` computes eigenvalues at a
-    load, ``width`` is the first half length of the piece, in the load.
+    Chebyshev interpolation on a piece, of the half length ``width`` at first, that is moved to the zero and shrunk
+    until the last coefficient says that it is sharp.  The cluster is that where its eigenvalues are farthest apart.
     """
     best, clear, half = Located(load, np.inf, cluster, *3 * (np.nan,), load), load, width
     for _ in range(12):
         found = [(at(node, cluster), node) for node in (load + half * NODES).tolist()]
         clearest, node = max(found, key=lambda pair: pair[0].spread)
-        if clearest.spread > RANK:
+        if clearest.spread > 1e-6:  # their vectors span the invariant subspace well
             cluster, clear = clearest.cluster, node
         series, means = _series(found)
         root = real_root(series)

@@ -148,10 +148,7 @@ def _may_move(solver: BranchSolver, x: PETSc.Vec) -> bool:
 
 
 def displaced_saddle(solver: BranchSolver, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
-    """State next to the saddle ``x``, along its most unstable mode on the side of ``start``.
-
-    Also the longest time step by which that mode grows: half of its time.
-    """
+    """State next to the saddle ``x``, along its most unstable mode on the side of ``start``, and half of its time."""
     modes = SymmetricSolver(solver.inertia).at(x).leftmost(1)
     displaced, mode = x.copy(), modes.vectors[0]
     size = 0.1 / solver.system.norm(mode)

@@ -40,8 +40,6 @@ AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 RESOLVED = 1e-3
 """Uncertainty of a coefficient, relative to it, part by which a load is no even function, and other terms of an
 ordinate, of a resolved series."""
-ODD = 0.1
-"""Part of the change of the load that is odd in the amplitude, from which on a branch is transcritical."""
 SEEN = 100
 """Ratio of a change of a load or an ordinate to the uncertainty of where it is measured from, for which it counts."""
 SIZE, LINEAR, QUADRATIC = "size", "linear", "quadratic"
@@ -216,7 +214,7 @@ def _at_scale(
     uneven = float(2 * abs(odd[-1]) / change)
     x = leading_term(amplitudes, ordinates / one, origin.ordinate_left / one)
     slope = leading(amplitudes, odd, 1, origin.load_left)
-    if uneven > ODD:
+    if uneven > 0.1:
         return _transcritical(slope, x, one), uneven, change
     hidden = (abs(slope.best) + abs(slope.best - slope.rough)) / float(amplitudes[-1])
     return _pitchfork(leading(amplitudes, even, 2, origin.load_left), hidden, x, one), uneven, change

@@ -59,8 +59,6 @@ from rodfem.stability.inertia import Factored
 from rodfem.stability.reduced_stiffness import DIFFERENCE, Bordered
 from rodfem.tolerances import TINY
 
-FARTHEST = 0.5
-"""A point farther than this from where it is expected, in the metric, is another one."""
 FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""
 Vectors = Sequence[PETSc.Vec]
@@ -210,7 +208,7 @@ class SingularSystem:
             moved += size
             return Correction(moved, size)
 
-        reach = section.reach if section else FARTHEST
+        reach = section.reach if section else 0.5  # in the metric: farther away it is another one
         outcome = newton(iteration, Limits(reach=reach, lost=lambda: self._lost(x, at, step)))
         if not outcome.converged or at is None or step is None:
             return None

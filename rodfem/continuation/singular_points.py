@@ -34,8 +34,6 @@ LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
 INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
 """A derivative of the equations in the load smaller than this, relative to bending, or to the Jacobian, is zero."""
-NEARBY = 1e-2
-"""Eigenvalue, over the lowest bending one, of modes that the border of a singular system has as well."""
 
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
@@ -88,17 +86,13 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     values, own = np.linalg.eigh(reduced.H)
     order = np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0))
     before, after, count = crossing.before, crossing.after, crossing.vectors.shape[1]
-    near = [i for i in order[count:] if abs(values[i]) < NEARBY * piece.solver.inertia.scale]
+    near = [i for i in order[count:] if abs(values[i]) < 0.01 * piece.solver.inertia.scale]
     modes, negative = _modes(piece, reduced, own[:, [*order[:count], *near]]), before - (count + before - after) // 2
     return Candidate(x, slope, modes, count, before, after, negative, q.s - p.s, width=crossing.width)
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
-    """Candidate at the place ``s`` where the load turns back between nodes ``p``, ``q`` of a ``piece``.
-
-    An eigenvalue may touch zero there.  The state may be one of more symmetry than its neighbours: its modes are its
-    own.
-    """
+    """Candidate at the place ``s`` where the load turns back: the state may have more symmetry than others."""
     x, slope = piece.curve(p, q, s)
     reduced = _reduced(piece, x, slope, piece.condensation.border(x))
     values, own = np.linalg.eigh(reduced.H)

@@ -32,8 +32,6 @@ NEAREST, FIRST = 1e-3, 0.05
 eigenvalues are zero to round-off."""
 CLOSE, STEEP = 2.0, 50.0
 """How far from its prediction the first point of a branch may lie, in amplitudes: usually, and at most."""
-CIRCLE = 48
-"""Directions of half a circle in which the force is computed: on no axis of a symmetry."""
 
 
 def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
@@ -65,8 +63,7 @@ def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
 def _load_response(solver: BranchSolver, special: SpecialPoint) -> PETSc.Vec:
     """Change of state with the load off the null vectors: the other branch where a side branch ends.
 
-    The Jacobian is singular there, and the load is orthogonal to its null vectors up to an error that its inverse would
-    blow up: it is shifted, which changes the answer by about as much as the shift, :data:`STILL`, relative to it.
+    The Jacobian is singular there, and its inverse would blow up the error of the load along them: it is shifted.
     """
     system = solver.system
     out = system.new_vector()
@@ -144,7 +141,7 @@ def neighbouring_index(special: SpecialPoint, load: float, ways: int) -> int | N
     """Index with which a branch begins that leaves towards ``load``; None where the trunk's does not determine it.
 
     By exchange of stability the eigenvalue that crosses zero has the sign opposite to that on the trunk at the same
-    load.  Of one way to leave the eigenvalues of the other null vectors belong to a symmetry, and stay zero.
+    load.
     """
     low, high = sorted((special.negative_before, special.negative_after))
     if special.test_function != "mu" or ways != 1 or high - low != special.multiplicity or not special.point.slope:
@@ -166,11 +163,7 @@ def _side(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec) -> 
 
 
 def _early(special: SpecialPoint, side: float, begins: int | None, first: Point, bounds: tuple[float, float]) -> bool:
-    """Whether something happens on a branch before its point ``first``.
-
-    Its load is out of ``bounds``, has turned back to another ``side``, or its index is not the one that it ``begins``
-    with.
-    """
+    """Whether a branch leaves the ``bounds``, turns back to another ``side``, or changes its index before ``first``."""
     if not bounds[0] <= first.load <= bounds[1]:
         return True
     if special.law is not None and special.law.kind == VERTICAL_BRANCH:
@@ -238,7 +231,7 @@ def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], a
 
 def _zeros(force: Callable[[float], float]) -> list[float]:
     """Angles in half a circle at which a force is zero."""
-    angles = np.pi * (np.arange(CIRCLE + 1) + (np.sqrt(5) - 1) / 2) / CIRCLE
+    angles = np.pi * (np.arange(49) + (np.sqrt(5) - 1) / 2) / 48  # on no axis of a symmetry
     values = np.array([force(angle) for angle in angles])
     felt = 1e-6 * np.nanmax(abs(values), initial=0.0)  # round-off: a symmetry turns the direction
     return [

@@ -12,9 +12,8 @@ from hard.case import Change, compare, run, said, singular
 from hard.two_freedoms import scene
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
-from scipy.optimize import linear_sum_assignment
 
-from rodfem.continuation.eigenvalue_curves import assignment, in_doubt, locate_flutter, real_root
+from rodfem.continuation.eigenvalue_curves import in_doubt, locate_flutter, real_root
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured
 
@@ -103,18 +102,3 @@ def test_zero_between(f: Callable[[float], float], a: float, b: float, zero: flo
 def test_no_change_of_sign() -> None:
     with pytest.raises(ValueError, match="one sign, -1, at both 0 and 1"):
         zero_between(lambda x: -1 - x, 0.0, 1.0, 1e-9)
-
-
-@pytest.mark.parametrize(("m", "k"), [(7, 7), (9, 5), (5, 9), (1, 3), (4, 0)])
-@pytest.mark.parametrize("apart", [True, False])
-def test_assignment_of_least_cost(m: int, k: int, apart: bool) -> None:
-    """With the least entries in different places, and without."""
-    rng = np.random.default_rng(4)
-    for _ in range(50):
-        cost = rng.random((m, k))
-        if apart:
-            fewer = min(m, k)
-            cost[rng.permutation(m)[:fewer], rng.permutation(k)[:fewer]] *= 1e-3
-        rows, columns = assignment(cost)
-        assert len(set(rows.tolist())) == len(set(columns.tolist())) == min(m, k)
-        assert cost[rows, columns].sum() == pytest.approx(cost[linear_sum_assignment(cost)].sum(), rel=1e-14)
