@@ -76,10 +76,8 @@ class Inertia:
         if system.has_scalars:  # the load is no part of a perturbation
             self.metric.setValue(system.load_index, system.load_index, 0.0)
         self.metric.assemble()
-        self._weights = local_rows(self.metric) if system.comm.size == 1 else None
-        self._shared, self._on_metric = shared(self.matrix), np.zeros(0, dtype=int)
-        if self._shared is not None and self._weights is not None:
-            self._on_metric = places_in(self._shared.pattern, self._weights)
+        self._weights, self._shared = local_rows(self.metric).real, shared(self.matrix)
+        self._on_metric = None if self._shared is None else places_in(self._shared.pattern, self._weights)
         self.factors = factors_of("cholesky", system.comm, fields.along, fields.dense_rows, system.natural_sizes)
         self.constraints, self.scale = fields.constraints(), system.stiffness_scale
         self.tolerance, self.resolution = ZERO_BAND * self.scale, 0.0
@@ -139,22 +137,23 @@ class Inertia:
     def move(self, sigma: float) -> None:
         """Let the matrix be ``S - sigma M``, whatever its shift was."""
         by, self.shift = self.shift - sigma, sigma
-        if by and self._shared is not None and self._weights is not None:
+        if not by:
+            return
+        if self._shared is not None:
             self._shared.values[self._on_metric] += by * self._weights.data
-        elif by:
+        else:
             self.matrix.axpy(by, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        if by:
-            self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
+        self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
 
     def _settle_band(self) -> None:
-        system = self.system
-        if not self.resolution:  # the band of round-off, eps |S| / m, for the smallest weight m of the metric
-            weights = self.metric.getDiagonal()  # not the load's, which has the units of the span
-            weights.pointwiseMult(weights, system.sizes * system.sizes)
-            mass = weights.array_r[weights.array_r > 0]
-            smallest = system.comm.allreduce(float(mass.min()) if len(mass) else np.inf, op=MPI.MIN)
-            self.resolution = 10 * EPS * system.matrix_in_units(self.matrix).norm(PETSc.NormType.INFINITY) / smallest
-            self.tolerance = max(self.tolerance, self.resolution)
+        """The band of round-off, ``eps |S| / m`` for the smallest weight m of the metric, of the first state."""
+        if self.resolution:
+            return
+        system, weights = self.system, self.metric.getDiagonal()  # without the load's, which has the units of the span
+        weights.pointwiseMult(weights, system.sizes * system.sizes)
+        smallest = system.comm.allreduce(weights.array_r[weights.array_r > 0].min(initial=np.inf), op=MPI.MIN)
+        self.resolution = 10 * EPS * system.matrix_in_units(self.matrix).norm(PETSc.NormType.INFINITY) / smallest
+        self.tolerance = max(self.tolerance, self.resolution)
 
     def forget_band(self) -> None:
         """Settle the band of round-off, and that of symmetries, at the next state."""
@@ -178,18 +177,16 @@ class Inertia:
 
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors, the columns of ``own`` (own rows, count)."""
-        return np.asarray(self._weights @ own) if self._weights is not None else self._products(self.metric, own)
+        return np.asarray(self._weights @ self._whole(own))
 
     def times(self, own: np.ndarray) -> np.ndarray:
         """The matrix times vectors, the columns of ``own`` (own rows, count)."""
-        known = self._shared
-        return np.asarray(known.matrix @ own) if known is not None else self._products(self.matrix, own)
+        rows = local_rows(self.matrix).real if self._shared is None else self._shared.matrix
+        return np.asarray(rows @ self._whole(own))
 
-    def _products(self, matrix: PETSc.Mat, own: np.ndarray) -> np.ndarray:
-        out = np.empty_like(own)
-        for i, column in enumerate(own.T):
-            out[:, i] = (matrix * self.vector(column)).array_r.real
-        return out
+    def _whole(self, own: np.ndarray) -> np.ndarray:
+        """Rows of all ranks."""
+        return own if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(own))
 
     def counted(self, factors: Factors, sigma: float, drifts: int) -> int:
         """Number of eigenvalues below ``sigma`` by ``factors`` of ``S - sigma M`` with ``drifts`` phase conditions.

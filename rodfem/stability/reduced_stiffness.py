@@ -24,12 +24,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.chain import factors_of
+from rodfem.linalg.matrices import local_rows
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.near_zero import quotient_error
 
@@ -49,25 +51,19 @@ class Bordered:
 
     def __init__(self, system: System, matrix: PETSc.Mat, borders: int, constraints: int | None) -> None:
         self.system, self.k, self.constraints = system, borders, constraints
-        self.comm, self.n = system.comm, system.fields.unknowns
+        self.comm, self.n, fields = system.comm, system.fields.unknowns, system.fields
         self.extra = borders if system.has_scalars else 0  # rows of the borders on this rank, the last one
-        start, columns, _ = matrix.getValuesCSR()
-        rows, along = len(start) - 1, self.n + borders
-        lengths = np.concatenate([np.diff(start) + borders, np.full(self.extra, along)])
-        self.start = np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType)
-        self.own = int(self.start[rows])
-        self._border = np.zeros(self.own, dtype=bool)
-        self._border[(self.start[1 : rows + 1, None] - 1 - np.arange(borders)[::-1]).ravel()] = True
-        self.columns = np.empty(self.start[-1], dtype=PETSc.IntType)
-        self.columns[: self.own][~self._border] = columns
-        self.columns[: self.own][self._border] = np.tile(self.n + np.arange(borders), rows)
-        self.columns[self.own :] = np.tile(np.arange(along), self.extra)
-        self.values, size = np.zeros(self.start[-1]), (rows + self.extra, along)
-        self.matrix = PETSc.Mat().createAIJ((size, size), comm=self.comm)
+        inner, along = local_rows(matrix), self.n + borders
+        inner.data[:] = 1.0
+        above = sp.hstack([inner, np.ones((inner.shape[0], borders))], format="csr")
+        pattern = sp.vstack([above, np.ones((self.extra, along))], format="csr")
+        self.start, self.columns = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
+        self.values, self.own, self._border = np.zeros(pattern.nnz), above.nnz, above.indices >= self.n
+        self.matrix = PETSc.Mat().createAIJ(((pattern.shape[0], along),) * 2, comm=self.comm)
         self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
         kind, natural = "lu" if constraints is None else "cholesky", system.natural_sizes and self._sizes
-        chain = along if system.fields.along else 0
-        self.factors = factors_of(kind, self.comm, chain, system.fields.dense_rows + borders, natural)
+        chain = along if fields.along else 0
+        self.factors = factors_of(kind, self.comm, chain, fields.dense_rows + borders, natural)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
 
     def _sizes(self) -> PETSc.Vec:
