@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any
 
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
-from rodfem.problem.arguments import a, real, reals, whole, yes_or_no
+from rodfem.problem.arguments import a, convert, each, interval, optional, real, reals, whole, yes_or_no
 from rodfem.problem.events import Event
 from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
@@ -28,6 +29,18 @@ COUNTS = {
 GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
 FINEST, ACCURACY, COARSEST = 1e-11, 1e-8, 1e-1
 """Least accuracy that can be asked for, which is near round-off, one that an error suggests, and the greatest one."""
+
+
+EVENTS = each(a(Event, "Events, as in events=(Event('ends meet', of=f),)"))
+
+
+def _locus(name: str, value: Any) -> tuple[str, float, float]:
+    """Name of a parameter and an interval."""
+    parts = tuple(value) if isinstance(value, (tuple, list)) else ()
+    if len(parts) != 3 or not isinstance(parts[0], str):
+        raise InputError(f"{name} is {value!r}: give a name and an interval, as in {name}=('A', -3.0, 0.0).")
+    low, high = reals(f"{name}[1:]", parts[1:], (-3.0, 0.0))
+    return parts[0], low, high
 
 
 @dataclass(frozen=True)
@@ -83,26 +96,24 @@ class Plan:
 
     def __post_init__(self) -> None:
         """Check that all is of the right kind; raises :class:`InputError`."""
-        if self.span is not None:
-            object.__setattr__(self, "span", reals("span", self.span, (0.0, 1.0), 2))
-        object.__setattr__(self, "at", tuple(dict.fromkeys(reals("at", self.at, (0.5, 1.0)))))
-        for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3), ("most_branches", 20)):
-            object.__setattr__(self, name, whole(name, getattr(self, name), example))
-        a(StepControl, "StepControl, as in steps=StepControl(largest=0.02)")("steps", self.steps)
-        a(str, "the name of one, as in method='auto'")("method", self.method)
+        convert(
+            self,
+            span=optional(interval(0.0, 1.0, real)),
+            at=lambda name, values: tuple(dict.fromkeys(reals(name, values, (0.5, 1.0)))),
+            depth=partial(whole, example=2),
+            steps=a(StepControl, "StepControl, as in steps=StepControl(largest=0.02)"),
+            error_bars=yes_or_no,
+            spectrum=partial(whole, example=4),
+            tries=partial(whole, example=24),
+            locus=optional(_locus),
+            method=a(str, "the name of one, as in method='auto'"),
+            modes=partial(whole, example=3),
+            accuracy=optional(partial(real, example=ACCURACY)),
+            events=lambda name, values: tuple(EVENTS(name, values)),
+            most_branches=partial(whole, example=20),
+        )
         if self.method not in ("", AUTO):
             find(self.method)
-        if self.accuracy is not None:
-            object.__setattr__(self, "accuracy", real("accuracy", self.accuracy, ACCURACY))
-        yes_or_no("error_bars", self.error_bars)
-        events = a((tuple, list), "Events, as in events=(Event('ends meet', of=f),)")("events", self.events)
-        for i, event in enumerate(events):
-            a(Event, "Events, as in events=(Event('ends meet', of=f),)")(f"events[{i}]", event)
-        if self.locus is not None:
-            parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
-            if len(parts) != 3 or not isinstance(parts[0], str):
-                raise InputError(f"locus is {self.locus!r}: give a name and an interval, as in locus=('A', -3.0, 0.0).")
-            object.__setattr__(self, "locus", (parts[0], *reals("locus[1:]", parts[1:], (-3.0, 0.0))))
 
     def over(self, scene: Scene) -> tuple[float, float]:
         """Range of the load: that of the plan, or that of the scene."""
@@ -220,13 +231,11 @@ def entries(plan: Plan, scene: Scene) -> dict[str, Any]:
 
 def not_held(asked: dict[str, Any]) -> str:
     """What of a plan that was ``asked`` for no file holds: ``events`` or ``steps``; empty if all of it is there."""
-    held = asked["plan"]
-    return "events" if held["events"] else "steps" if held["steps"] != repr(StepControl()) else ""
+    plan = asked["plan"]
+    return "events" if plan["events"] else "steps" if plan["steps"] != repr(StepControl()) else ""
 
 
 def plan_without(asked: dict[str, Any]) -> Plan:
     """Plan that was ``asked`` for, without what no file holds."""
     names = ({f.name for f in fields(Plan)} - {"steps", "events"}) & asked["plan"].keys()
-    given: dict[str, Any] = {name: asked["plan"][name] for name in names}
-    lists = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
-    return Plan(**(given | lists))
+    return Plan(**{name: asked["plan"][name] for name in names})
