@@ -44,20 +44,6 @@ def horner(powers: list[float], t: float) -> float:
     return value
 
 
-class Gauss:
-    """Gauss rule on [0, 1], exact to degree ``2 points - 1``, and integrals of its Lagrange basis from 0."""
-
-    def __init__(self, points: int) -> None:
-        x, weights = legendre.leggauss(points)
-        self.points, self.weights = (x + 1) / 2, weights / 2
-        self._coefficients = np.linalg.inv(legendre.legvander(x, points - 1))
-
-    def integrals(self, x: np.ndarray) -> np.ndarray:
-        """Integrals of the Lagrange basis from 0 to ``x`` of shape (m,): (m, points)."""
-        antiderivative = legendre.legint(self._coefficients, lbnd=-1, axis=0) / 2
-        return legendre.legval(2 * np.asarray(x, dtype=float) - 1, antiderivative).T
-
-
 class Shape:
     """Evaluates shapes of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks.
 
@@ -74,10 +60,11 @@ class Shape:
         self.order = np.argsort(compat.nodes(k))
         self.nodes = np.sort(compat.nodes(k))
         self.s = self.start[:, None] + self.size[:, None] * self.nodes
-        self.gauss = Gauss(system.equations.quadrature_degree(k) // 2 + 1)
-        self._to_nodes = self.gauss.integrals(self.nodes)
-        self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
-        self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
+        x, w = legendre.leggauss(system.equations.quadrature_degree(k) // 2 + 1)
+        self._gauss, self._gauss_coefficients = w / 2, np.linalg.inv(legendre.legvander(x, len(x) - 1))
+        self._to_nodes = self._integrals(self.nodes)
+        self._q_at_gauss = compat.lagrange_basis(k, (x + 1) / 2)
+        self._v_at_gauss = compat.lagrange_basis(k - 1, (x + 1) / 2)
         self._v_at_samples = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         free = system.scene.free_strains
@@ -172,12 +159,12 @@ class Shape:
     def weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
         """Weights (2, cells * points) of slopes in integrals to ``s`` and over the rod; (cells * nodes,) of values."""
         local = (s - self.start) / self.size
-        integral = self.gauss.integrals(np.clip(local, 0, 1)) * self.size[:, None]
+        integral = self._integrals(np.clip(local, 0, 1)) * self.size[:, None]
         first = self.system.scene.interval[0]
         inside = (local > 0) & (local <= 1) if s > first else np.isclose(self.start, first)
         value = np.zeros((len(local), len(self.nodes)))
         value[inside] = compat.lagrange_basis(len(self.nodes) - 1, local[inside])
-        whole = np.outer(self.size, self.gauss.weights)
+        whole = np.outer(self.size, self._gauss)
         return np.stack([integral.ravel(), whole.ravel()]), value.ravel()
 
     def place(
@@ -216,10 +203,15 @@ class Shape:
 
         From the left end to each cell (cells, 1, 3), from there to its nodes (cells, nodes, 3), and over the rod (3,).
         """
-        pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, values, self.size)
+        pieces = np.einsum("g,cgi,c->ci", self._gauss, values, self.size)
         inside = np.einsum("ng,cgi,c->cni", self._to_nodes, values, self.size)
         before = np.vstack([np.zeros(3), np.cumsum(self.from_left(pieces), axis=0)])
         return before[self._first][:, None, :], inside, before[-1]
+
+    def _integrals(self, x: np.ndarray) -> np.ndarray:
+        """Integrals from 0 to ``x`` (m,) of the Lagrange basis of the Gauss points on [0, 1], (m, points)."""
+        antiderivative = legendre.legint(self._gauss_coefficients, lbnd=-1, axis=0) / 2
+        return legendre.legval(2 * np.asarray(x, dtype=float) - 1, antiderivative).T
 
     def slopes(self, state: NodalValues) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""

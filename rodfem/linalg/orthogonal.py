@@ -24,30 +24,15 @@ def project_out(vector: PETSc.Vec, basis: Sequence[PETSc.Vec], metric: PETSc.Mat
 
 def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:
     """Make vectors orthonormal in a metric, in place, by Gram-Schmidt twice."""
-    basis = Basis(metric)
-    for v in vectors:
-        basis.add(v)
-
-
-class Basis:
-    """Orthonormal vectors, one by one, with their ``duals``: the ``metric`` times each."""
-
-    def __init__(self, metric: PETSc.Mat) -> None:
-        self.metric = metric
-        self.vectors: list[PETSc.Vec] = []
-        self.duals: list[PETSc.Vec] = []
-
-    def add(self, vector: PETSc.Vec) -> None:
-        """Add what a vector has across the others, in place."""
-        for _ in range(2):
-            if self.vectors:
-                vector.maxpy([-dual.dot(vector) for dual in self.duals], self.vectors)
-        dual = self.metric * vector
-        left = np.sqrt(max(vector.dot(dual).real, 0.0))
-        vector.scale(1.0 / max(left, TINY))
-        dual.scale(1.0 / max(left, TINY))
-        self.vectors.append(vector)
-        self.duals.append(dual)
+    duals: list[PETSc.Vec] = []
+    for number, vector in enumerate(vectors):
+        for _ in range(2 if number else 0):
+            vector.maxpy([-dual.dot(vector) for dual in duals], vectors[:number])
+        dual = metric * vector
+        left = max(np.sqrt(max(vector.dot(dual).real, 0.0)), TINY)
+        vector.scale(1.0 / left)
+        dual.scale(1.0 / left)
+        duals.append(dual)
 
 
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:

@@ -107,7 +107,7 @@ class Motions(Shape):
 
     def node_weights(self) -> np.ndarray:
         """Weights (m,) of the nodes in an integral over the rod: Gauss-Lobatto quadrature in each element."""
-        each, sizes = self.gauss.weights @ self._q_at_gauss[:, self.order], self.from_left(self.size)
+        each, sizes = self._gauss @ self._q_at_gauss[:, self.order], self.from_left(self.size)
         out = np.zeros(len(sizes) * (len(each) - 1) + 1)
         for node, weight in enumerate(each):
             out[node : len(out) - len(each) + node + 1 : len(each) - 1] += weight * sizes

@@ -10,10 +10,9 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Discretization, End, Plan, Scene, SceneError, Solver, trace
+from rodfem import Discretization, End, Scene, SceneError, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram import sweep
 from rodfem.stability.assessment import assess
 
 
@@ -80,19 +79,3 @@ def test_a_motion_that_a_load_drives(kind: str) -> None:
     """A moment at one end that nothing balances turns the rod for ever."""
     with pytest.raises(SceneError, match="nothing holds the rod against the rotation about e3"):
         classics.sweep(scene(kind, balanced=False))
-
-
-@pytest.mark.long
-@KINDS
-@pytest.mark.alone
-def test_a_double_divergence_is_one(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beside zero round-off makes a complex pair of a double eigenvalue: it is not two simple ones, nor flutter."""
-    monkeypatch.setattr(sweep, "LOADS", 15)
-    loads = []
-    for span in ((6.0, 6.5), (6.2, 6.3)):
-        (branch,) = trace(scene(kind), Discretization("auto", 2, 4), Plan(span, error_bars=False))
-        found, _ = branch.special
-        assert (found.kind, found.negative_before, found.negative_after) == ("divergence", 0, 2)
-        loads.append(found.point.load)
-    assert loads[0] == pytest.approx(loads[1], abs=found.located_to)
-    assert loads[0] == pytest.approx(2 * pi, abs=1e-4)
