@@ -86,23 +86,6 @@ def test_a_coefficient_that_is_not_told_from_zero() -> None:
     assert "undetermined form" in diagram.in_words()
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("slow", "span"), [(1e-4, 0.02)])
-def test_an_eigenvalue_that_passes_zero_slowly(slow: float, span: float) -> None:
-    """``u (slow (u - P) + u^2) = 0``: the trunk, u = 0, has the eigenvalue ``-slow P``, the tolerance of a count or so.
-
-    The branch point was located at -1.2e-5 with a bar of 2e-8, and the trunk ended there or at 0.08.
-    """
-    model = scene(
-        lambda u, f2, c: c.a * (u**3 / 3 - 0.5 * c.P * u * u) + 0.25 * u**4 + 0.5 * f2, (-span, span), a=slow, b=0.0
-    )
-    trunk = trace(model, Discretization("auto", 4, 3), Plan(depth=1))[0]
-    assert trunk.ended == "end of range"
-    (special,) = (s for s in trunk.special if s.kind == BRANCH_POINT)
-    assert abs(special.point.load) <= special.error_estimate < 1e-9
-    assert (special.negative_before, special.negative_after) == (0, 1)
-
-
 WEAK = 1e-7
 """Stiffness of a spring; that of the rod in bending, and its length, are one."""
 

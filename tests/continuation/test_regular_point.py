@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import demo_cases
 import hemitropic_cases
 import numpy as np
 import pytest
-import small_states
 
-from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import NEAR, BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.diagram.diagram import Diagram, trace
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
 from rodfem.fem.symmetries import phase_at
-from rodfem.linalg.matrices import shared
 
 BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}
 
@@ -92,47 +85,11 @@ def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
     assert np.median(seen) < 1.5
 
 
-SCENES = ["hemitropic", "cord", "ruler"]
-BOTH = [(name, formulation) for name in SCENES for formulation in ("reduced", "pointwise")]
-
-
-def traced(name: str, formulation: str) -> Diagram:
-    plan = Plan(depth=1, error_bars=False)
-    return trace(small_states.scene(name), Discretization(formulation, 4, 4), plan)
-
-
-@cache
-def rows(name: str, formulation: str) -> tuple[BranchSolver, list[Point]]:
-    """A solver and all rows of a scene."""
-    found = traced(name, formulation)
-    solver = found.solvers[0]
-    points = [point for branch in found.branches for point in branch.points if point.mesh == 0]
-    assert len(points) > 40
-    return solver, points
-
-
-@pytest.mark.few(3)
-@pytest.mark.parametrize(("name", "formulation"), BOTH)
-def test_second_variation_is_that_of_petsc(name: str, formulation: str) -> None:
-    """To the last bit: the same kernels, and the same sums."""
-    solver, points = rows(name, formulation)
-    inertia, matrix = solver.inertia, shared(solver.inertia.matrix)
-    assert inertia.compiled is not None
-    assert matrix is not None
-    for point in points:
-        solver.system.set_phase(point.x)
-        inertia.compiled.assemble(point.x)
-        ours, border = matrix.values.copy(), inertia.compiled.border.copy()
-        inertia._assemble_by_petsc(solver.system.at(point.x))
-        np.testing.assert_array_equal(ours, matrix.values)
-        np.testing.assert_array_equal(border, inertia.border.array_r)
-
-
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
     """In whatever order rows are asked for, the phase conditions are those that are found anew."""
-    solver, points = rows("hemitropic", formulation)
-    system = solver.system
+    solver, branches = demo("hemitropic", formulation)
+    system, points = solver.system, [point for branch in branches for point in branch.points]
     some = points[::9]
     for point in [*some, *some[:3], some[1], some[0], *some[::-1]]:
         system.set_phase(point.x)
@@ -143,11 +100,3 @@ def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
         np.testing.assert_array_equal(system.phase.offsets, anew.offsets)
         assert system.phase.reference is not None
         assert system.phase.reference.equal(point.x)
-
-
-def test_convexity_by_factors_is_that_by_eigenvalues() -> None:
-    solver, points = rows("ruler", "reduced")
-    assert solver.convexity is not None
-    for point in points[::5]:
-        assert solver.convexity.holds(point.x)
-        assert solver.convexity.lowest(point.x) > 0

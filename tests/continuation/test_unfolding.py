@@ -6,7 +6,6 @@ from dataclasses import replace
 from math import pi
 from typing import Any
 
-import demo_cases
 import numpy as np
 import pytest
 from classics import ON_AXIS, SUPPORTS, Found, column, deep_arch, push, turned
@@ -253,19 +252,3 @@ def test_stiff_strains_do_not_hide_the_load() -> None:
     assert hard.point.load == pytest.approx(8.9731, abs=2e-4)
     assert soft.coupling > 1e-3
     assert hard.coupling == pytest.approx(soft.coupling, rel=1e-2)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_a_branch_that_meets_its_mirror_image_turns_at_no_fold() -> None:
-    """A cord as a figure eight: its ends stay together, so that the load does no work, and another branch crosses it.
-
-    The load turns back there only because the branch goes on as its mirror image, and the index is that before.  On 18
-    elements of degree 7 it is at 56.2198048707; 9 elements take it apart.
-    """
-    plan = Plan(depth=1, at=(40.0,), tries=24, error_bars=False)
-    diagram = trace(demo_cases.scene("cord"), Discretization("auto", 12, 6), plan)
-    found = [s for branch in diagram for s in branch.special if 56.0 < s.point.load < 57.0 and s.kind.singular]
-    assert [s.kind for s in found] == [BRANCH_POINT]
-    assert found[0].point.load == pytest.approx(56.2198048707, abs=2e-6)
-    assert found[0].negative_before == found[0].negative_after
