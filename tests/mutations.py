@@ -144,7 +144,7 @@ TABLE = {
             "len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0))", "0", "codim2/test_places.py"),
         "ends-of-folds-counted": ("dx=dx / size, s=s,", "dx=dx / size, s=s, rest=0,", "codim2/test_locus.py"),
         "a-fold-that-passes-a-branch-point-ends": (" and (a.dp * b.dp < 0)[moves].all()", "", LOCI),
-        "a-passage-is-a-cusp": ("if _coupling_vanishes(cusp, a, b, PASSED):", "if False:", LOCI),
+        "a-passage-is-a-cusp": ("if _coupling_vanishes(cusp, a, b, 1e-3):", "if False:", LOCI),
         "cusps-are-turns": ("sides[0].curvature * sides[1].curvature < 0", "False", LOCI),
         "cusps-hide-in-a-step": ("pairwise([a, *self._hidden(a, b, other), b])", "pairwise([a, b])", LOCI),
         "no-turn-beside-a-cusp": ("        if sides and depth:\n", "        if False:\n", LOCI),

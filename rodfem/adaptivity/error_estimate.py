@@ -29,7 +29,7 @@ from functools import cache
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
+from rodfem.adaptivity.grading import SmoothnessIndicator
 from rodfem.continuation.arc import STEADY, Arc, nearest_event, stepped
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
@@ -53,12 +53,8 @@ RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
 LEFT = 0.5
 """Part of an error of an event that is left at most: that of a number of the nodes falls with their distance."""
-LOCATED, ALONG = 1e-10, 1e-11
-"""Uncertainty of the load at which the stretch vanishes on one mesh, relative to it or to one, and of the arclength."""
-ASIDE = 1e-4
-"""Distance before an end at which the stretch vanishes, relative to the step, at which the index is counted."""
-FIRST = 2e-4
-"""First step, in spans, to where the stretch vanishes on a richer mesh."""
+LOCATED = 1e-10
+"""Uncertainty of the load at which the stretch vanishes on one mesh, relative to it or to one."""
 
 
 def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
@@ -156,8 +152,7 @@ class Enriched:
         self.origins: list[tuple[SpecialPoint, Origin, float]] = []
         self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
         self._ordinate = OrdinateBound(solver.shape, self.solver.shape)
-        weights = weights_of(self.system.scene)
-        self._coarse, self.indicator = (SmoothnessIndicator(each, weights) for each in (solver, self.solver))
+        self._coarse, self.indicator = SmoothnessIndicator(solver), SmoothnessIndicator(self.solver)
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
         """Ratio of the errors of a state (and its null vector) on the richer mesh and on the first."""
@@ -275,16 +270,18 @@ class Enriched:
 def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
     """The point between ``a`` and ``b`` at which the smallest stretch vanishes."""
     arc, first = Arc(solver, a, b), a.arclength + INSIDE * (b.arclength - a.arclength)
-    return arc.point(zero_between(lambda s: solver.shape.stretch(arc.state(s)), first, b.arclength, ALONG))
+    along = 1e-11  # an arclength, in the metric
+    return arc.point(zero_between(lambda s: solver.shape.stretch(arc.state(s)), first, b.arclength, along))
 
 
 def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
-    """A point right before the ``last`` admissible one after the row ``a``; None if it is not found.
+    """A point right before the ``last`` admissible one after the row ``a``, at which to count; None if not found.
 
     At the end a rod that is squeezed to nothing has no stiffness against some motions, whose eigenvalues are zero.
     """
+    aside = 1e-4 * (last.arclength - a.arclength)  # a part of the step
     try:
-        return Arc(solver, a, last).point(last.arclength - ASIDE * (last.arclength - a.arclength))
+        return Arc(solver, a, last).point(last.arclength - aside)
     except ConvergenceError:
         return None
 
@@ -342,7 +339,7 @@ def _vanishing(solver: BranchSolver, x: PETSc.Vec, coarse: Point) -> PETSc.Vec:
 def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
     """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
     a, value = coarse.load, stretch(coarse.load)
-    step = np.copysign(FIRST * span, coarse.slope if value > 0 else -coarse.slope)
+    step = np.copysign(2e-4 * span, coarse.slope if value > 0 else -coarse.slope)  # the first one: they grow
     for _ in range(14):
         if abs(value) <= ROUND_OFF:  # it has no sign
             return a

@@ -70,14 +70,14 @@ class Smoothness:
 class SmoothnessIndicator:
     """Measures how smooth the states of one discretisation are; collective."""
 
-    def __init__(self, solver: BranchSolver, weights: list[tuple[str, np.ndarray]]) -> None:
-        """Tabulate the transformation from nodal values to Legendre coefficients; ``weights`` by :func:`weights_of`."""
-        self.solver, self.weights = solver, weights
+    def __init__(self, solver: BranchSolver) -> None:
+        """Tabulate the transformation from nodal values to Legendre coefficients."""
+        self.solver, self.weights = solver, _weights_of(solver.system.scene)
         fields = solver.system.fields
         self._cells = slice(0, fields.owned_cells)
         degrees = {b.name: b.degree for b in fields.blocks}
         self._series = {}
-        for name, _ in weights:
+        for name, _ in self.weights:
             d = degrees[name]
             series = np.linalg.inv(legendre.legvander(2 * compat.nodes(d) - 1, d))
             series = legendre.legder(series, axis=0) if name == fields.turning.name else series
@@ -123,7 +123,7 @@ class SmoothnessIndicator:
         return squares
 
 
-def weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:
+def _weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:
     """Weights of curvature (derivative of q or an angle) and of free strains v: root of stiffness over bending."""
     stiffness = np.diag(scene.stiffness())
     free = len(scene.free_strains)

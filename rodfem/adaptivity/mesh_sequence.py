@@ -20,7 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched
-from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, pieces_of, weights_of
+from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, pieces_of
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
@@ -101,8 +101,7 @@ class Meshes:
     def indicator(self, number: int) -> SmoothnessIndicator:
         """Smoothness indicator of a mesh."""
         if number not in self._indicators:
-            solver = self.solvers[number]
-            self._indicators[number] = SmoothnessIndicator(solver, weights_of(solver.system.scene))
+            self._indicators[number] = SmoothnessIndicator(self.solvers[number])
         return self._indicators[number]
 
     def richer(self, number: int) -> Enriched:

@@ -34,8 +34,6 @@ from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure, noi
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import NEGLIGIBLE, ROUND_OFF, TINY
 
-MET = 1e-4
-"""Imaginary part, relative to the eigenvalue, below which a pair has only just met: it has a square root there."""
 VANISHED = "another eigenvalue has vanished since the row before, seen from the start"
 UNSTABLE = "another frequency has become unstable, or stable, since the row before, seen from the start"
 """Marks of a row where their number has changed, with a potential and without one."""
@@ -47,9 +45,8 @@ IMPERFECT = 1e-7
 FEWER = 1e-5
 """Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
 their mean, are not equal by a symmetry."""
-FIRST, FAR = 1e-4, 1e-6
-"""First step of the secants, relative to the bounds, below which they end where they no longer shrink; the least step
-that tells the slope of ``D``."""
+FIRST = 1e-4
+"""First step of the secants, relative to the bounds, below which they end where they no longer shrink."""
 DIFFERENCE = 1e-3
 """Step of the central differences of ``D``, and of a count next to a divergence load, relative to the bounds."""
 Interval = tuple[float, float]
@@ -399,7 +396,7 @@ class Collision(Criterion):
             step = -now.discriminant * (other - t) / (at_other - now.discriminant)
             if abs(step) < NEGLIGIBLE or (abs(step) < FIRST and abs(step) > 0.3 * before):
                 return self._by_both_sides((t, abs(step), now, x), slope)
-            if abs(other - t) > FAR:
+            if abs(other - t) > 1e-6:  # else round-off hides the slope
                 slope = (at_other - now.discriminant) / (other - t)
             other, at_other, before = t, now.discriminant, abs(step)
             t += step
@@ -440,7 +437,8 @@ def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None
     own = -abs(spectrum.values) if basis is None else pencil.shares(basis)
     chosen = np.argsort(own, kind="stable")[: len(own) - size]
     values, noise = spectrum.values[chosen], np.maximum(spectrum.zero, spectrum.noise[chosen])
-    return int(((values.real < -noise) | (abs(values.imag) > np.maximum(noise, MET * abs(values)))).sum())
+    met = np.maximum(noise, 1e-4 * abs(values))  # a pair that has only just met: its imaginary part is a square root
+    return int(((values.real < -noise) | (abs(values.imag) > met)).sum())
 
 
 def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:

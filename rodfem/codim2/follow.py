@@ -35,7 +35,7 @@ from rodfem.codim2.criteria import (
 from rodfem.codim2.locus import Locus, Mark, Row
 from rodfem.codim2.points import Codim2Points, place
 from rodfem.continuation.branch import SpecialPoint
-from rodfem.continuation.branch_solver import ALIGNED, BranchSolver
+from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, DIVERGENCE, FLUTTER, FOLD, GAP, KINDS
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
@@ -75,7 +75,7 @@ class Half:
         step, failures = control.first, 0
         while not self.ended and len(self.steps) < control.most:
             # beyond a sharp bend the polynomial through the last nodes has another tangent than the curve
-            recent = self.steps if failures < 2 else self.steps[-1:]
+            recent = self.steps[-ROWS:] if failures < 2 else self.steps[-1:]
             try:
                 moved = self._advance(recent, step)
             except Destroyed as trouble:

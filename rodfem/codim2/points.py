@@ -39,8 +39,6 @@ POINTS = 8
 """Points of a window: an even number, none of them in the middle, where the end of a fold is singular."""
 PLACES = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
 """Chebyshev's points of a window of half width one; what is sought must be in the inner half of it."""
-LOCATED = 1e-8
-"""Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
 UNPLACED = 1e-5
 """Uncertainty along the curve, an arclength, of what cannot be placed: what differences for a tangent displace."""
 CERTAIN = 10.0
@@ -48,8 +46,6 @@ CERTAIN = 10.0
 NONE = 1e-10
 """Part of a unit tangent along one parameter, or of a coupling over that with the other one, that is round-off: it has
 no sign."""
-VANISHED, PASSED = 0.05, 1e-3
-"""Share that is left of a coupling where it vanishes, at an end and next to a cusp: its place is known to no more."""
 TRIES = 8
 """Parabolas by which a least value in a step is sought, and times that a step is parted for more cusps than one."""
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
@@ -165,7 +161,7 @@ class Codim2Points:
         """
         if _reverses(a, b, NONE * self.plane.width):
             coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
-            if coupling is None or _coupling_vanishes(coupling, a, b, VANISHED):
+            if coupling is None or _coupling_vanishes(coupling, a, b, 0.05):
                 share = float(a.coupling @ a.coupling) / float((a.coupling - b.coupling) @ a.coupling)
                 row, where = self._end(a, b, share, coupling and self._end_of_fold(coupling, a, b))
                 return [(row, ENDS)], f"{ENDS} {where}, or turns back within {GAP:g} of the bounds from one"
@@ -178,7 +174,8 @@ class Codim2Points:
     def located(self, a: LocusPoint, b: LocusPoint, f: Test) -> LocusPoint | None:
         """Point between two others at which ``f`` vanishes; None where it cannot be located."""
         try:
-            return self._at(a, b, zero_between(lambda s: f(self._at(a, b, s)), a.s, b.s, LOCATED))
+            s = zero_between(lambda s: f(self._at(a, b, s)), a.s, b.s, 1e-8)  # an arclength: before it is placed
+            return self._at(a, b, s)
         except (ConvergenceError, ValueError):
             return None
 
@@ -207,7 +204,7 @@ class Codim2Points:
         if sides and depth:
             (p, q), less = sides, depth - 1
             left, right = self._rows(a, p, q, less), self._rows(q, b, p, less)
-        if _coupling_vanishes(cusp, a, b, PASSED):
+        if _coupling_vanishes(cusp, a, b, 1e-3):  # the place of a cusp is known to no more
             # no solution locates it: corrections slide along the curve of branch points
             return [*left, (_within(cusp, a, b), PASSES), *right]
         return [*left, (self._placed(cusp, _reversal(self.plane, a, b)), "cusp"), *right]

@@ -40,9 +40,6 @@ from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
-STILL = 1e-20
-"""Squared norm of a part of the velocity, relative to that of the state, below which it is round-off."""
-
 
 @dataclass(frozen=True)
 class Mirror:
@@ -202,7 +199,8 @@ class Orbit:
     def amount(self, image: PETSc.Vec) -> float:
         """Amount for the state nearest to ``x``, given the metric times ``x``: the best of many, refined."""
         G, c = self.products, np.array([part.dot(image) for part in self.parts])
-        start = (c[1] - G[0, 1]) / G[1, 1] if G[1, 1] > STILL * G[0, 0] else 0.0
+        moves_on = G[1, 1] > 1e-20 * G[0, 0]  # squared norms: less is round-off
+        start = (c[1] - G[0, 1]) / G[1, 1] if moves_on else 0.0
         amounts = start + np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)
         w = self.weights(amounts)
         a = float(amounts[np.argmin(np.einsum("im,ij,jm->m", w, G, w) - 2 * c @ w)])
