@@ -14,8 +14,6 @@ from mpi4py import MPI
 from numpy.polynomial import legendre
 from scipy.spatial.transform import Rotation
 
-from rodfem.app.terminal import Report
-
 pytestmark = pytest.mark.short
 
 ELEMENTS, DEGREE, HALF = 8, 6, DEFAULT[3]
@@ -47,7 +45,6 @@ SPECIAL = {
     "resolved": bool,
     "located_to": float,
 }
-TIMING = ("assembly_s", "solve_s", "stability_s", "total_s")
 
 
 @pytest.fixture(scope="module")
@@ -62,30 +59,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def diagram(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "diagram.json").read_text(), parse_constant=pytest.fail)  # no NaN, no Infinity
-
-
-@pytest.mark.long
-@pytest.mark.versions
-@FORMULATIONS
-def test_diagram_says_what_was_computed(results: dict[str, Path], formulation: str) -> None:
-    data = diagram(results[formulation])
-    assert (data["scene"], data["parameter"], data["range"]) == ("hemitropic", "lam", [0.0, 0.4])
-    assert isinstance(data["ordinate"], str)
-    assert {"A": -3.0, "B": 1.0, "C": 1.0}.items() <= data["constants"].items()
-    free_nodes = ELEMENTS * DEGREE - 1
-    strains = ELEMENTS * DEGREE
-    fields = {"reduced": 5 * free_nodes + strains + 3, "pointwise": 8 * free_nodes + 4 * strains}[formulation]
-    assert data["discretization"] == {
-        "formulation": formulation,
-        "elements": ELEMENTS,
-        "degree": DEGREE,
-        "unknowns": fields + 2,  # with the load and the drift
-    }
-    timing = data["timing"]
-    assert all(timing[name] > 0 for name in TIMING)
-    assert sum(timing[name] for name in TIMING[:3]) < timing["total_s"]
-    assert timing["points"] == sum(len(branch["columns"]["load"]) for branch in data["branches"])
-    assert timing["ranks"] == MPI.COMM_WORLD.size
 
 
 @FORMULATIONS
@@ -158,28 +131,3 @@ def test_shapes_are_those_of_a_clamped_unshearable_rod(results: dict[str, Path],
                     turn = legendre.legval(lobatto, legendre.legfit(x, q[row, nodes], DEGREE)).T
                     d3 = Rotation.from_quat(turn[:, [1, 2, 3, 0]]).as_matrix()[:, :, 2]
                     np.testing.assert_allclose(slope.T, v[row, e] * d3, rtol=0, atol=2e-3)
-
-
-@pytest.mark.versions
-def test_interrupted_run_keeps_finished_branches(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    begun = []
-    announce = Report.branch
-
-    def stop(self: Report, branch: Any) -> None:
-        begun.append(branch.name)
-        if len(begun) == 3:
-            raise KeyboardInterrupt
-        announce(self, branch)
-
-    monkeypatch.setattr(Report, "branch", stop)
-    with pytest.raises((KeyboardInterrupt, SystemExit)):
-        run_demo(*ARGUMENTS, "--output", str(folder))
-    MPI.COMM_WORLD.barrier()
-    branches = diagram(folder)["branches"]
-    assert [branch["name"] for branch in branches] == begun[:2]
-    assert [branch["ended"] for branch in branches] == ["end of range", "end of range"]
-    with h5py.File(folder / "states.h5", "r") as file:
-        assert [len(file["branches"][b["name"]]["load"]) for b in branches] == [
-            len(b["columns"]["load"]) for b in branches
-        ]
-    assert not list(folder.glob("*.part"))

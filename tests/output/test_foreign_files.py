@@ -124,10 +124,6 @@ STATES: list[tuple[bytes | Callable[[h5py.File], None], str]] = [
     (put(f"{HERE}/q", 3.0), "states.h5"),
     (put(f"{HERE}/s", np.full((50, 49), np.nan)), "states.h5"),
 ]
-LOADED: list[tuple[bytes | Callable[[h5py.File], None], str]] = [
-    (attribute("formulation", "foo"), "of the foo formulation"),
-    (put(f"{HERE}/q", np.ones((500, 7, 4))), "is no state of the scene"),
-]
 
 
 def spoil(path: Path, change: bytes | Callable[[h5py.File], None]) -> None:
@@ -150,12 +146,6 @@ def test_states(change: Any, words: str, bad: Path, capfd: Any) -> None:
         sentence = refused(read, capfd)
         assert words in sentence
         assert "\n" not in sentence
-
-
-@pytest.mark.parametrize(("change", "words"), LOADED)
-def test_states_of_no_rod(change: Any, words: str, bad: Path, capfd: Any) -> None:
-    spoil(bad / "states.h5", change)
-    assert words in refused(lambda: rodfem.load(bad, SCENE), capfd)
 
 
 @pytest.mark.parametrize("name", ["q", "motion"])
@@ -243,14 +233,3 @@ def test_links_out_of_a_folder(bad: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"), locked(bad, MPI.COMM_SELF):
         pass
     assert mine.read_text() == "mine"
-
-
-def test_results_of_many(tmp_path: Path) -> None:
-    """A result that cannot be read is computed anew; one of another format is not written over."""
-    path = tmp_path / "rod-00000.json"
-    for text in ("", "[]", '{"key": 3', "\0"):
-        path.write_text(text)
-        assert rodfem.many([SCENE], lambda rod: {"a": 1}, tmp_path) == [{"a": 1}]
-    path.write_text('{"format": {"name": "rodfem diagram", "version": 1}}')
-    with pytest.raises(InputError, match="has the format 'rodfem diagram'"):
-        rodfem.many([SCENE], lambda rod: {"a": 1}, tmp_path)

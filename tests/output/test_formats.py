@@ -273,25 +273,6 @@ def test_page_has_what_files_have(results: Path, file: str) -> None:
     assert [(name, k, told[name][0]) for name in names for k in found[name] if not fits(k, told[name][0])] == []
 
 
-def test_units_are_told() -> None:
-    units = {name: unit for name, kind, unit, *_ in rows(PAGE) if re.match("number|integer", kind)}
-    assert len(units) > 100
-    assert [name for name, unit in units.items() if not unit] == []
-
-
-@pytest.mark.long
-def test_example_of_the_page(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(results.parent)
-    (block,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    names: dict[str, Any] = {}
-    exec(block, names)
-    assert (names["r"].shape, names["q"].shape) == ((25, 3), (25, 4))
-    data = rodfem.load_json(results / "pinned" / "diagram.json")
-    (branch,) = [b for b in data["branches"] if b["name"] == "branch 1"]
-    assert np.hypot(*names["r"][12, :2]) == pytest.approx(branch["columns"]["ordinate"][names["row"]], abs=1e-12)
-    assert branch["columns"]["load"][names["row"]] == 11.0
-
-
 # --- versions --------------------------------------------------------------------------------------------------------
 
 

@@ -47,11 +47,6 @@ def test_each_name_has_one_entry() -> None:
     assert all(text[-1] == "." and text == " ".join(text.split()) for text in ENTRIES.values())
 
 
-def test_a_code_of_several_kinds() -> None:
-    assert [title.split(",")[0] for title, _ in explanation("bp")] == ["branch point", "divergence"]
-    assert explanation("Branch  Point") == explanation("branch point")
-
-
 def test_words_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     console.main(["explain", "branch", "point"])
     assert capsys.readouterr().out.startswith("branch point, BP: An equilibrium in which branches cross")

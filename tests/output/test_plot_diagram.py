@@ -7,21 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from demo_cases import scene
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from scipy.special import ellipe, ellipk
 
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
-from rodfem.fem.shape import link
 from rodfem.file_format import LOCUS
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
 from rodfem.output.plot_diagram import (
-    SINGULAR,
-    UNEXPLAINED,
     between,
     dense,
     draw_branches,
@@ -93,19 +86,6 @@ def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
     assert [p.label for p in pieces_of(planar)] == ["0", "1"]
 
 
-def test_what_is_unexplained_is_marked(folder: Path) -> None:
-    yellow = "#F0E442"
-    plain = branch("a", [0.0, 1.0, 2.0, 3.0], [0, 0, 2, 2])
-    assert UNEXPLAINED not in legend(plain) and UNEXPLAINED not in legend(plain | {"unexplained": []})
-    assert not pixels(draw_diagram(diagram(plain), folder / "plain.png"), yellow).any()
-    warned = plain | {"unexplained": [{"row": 1, "before": 0, "after": 2}]}
-    assert UNEXPLAINED in legend(warned)
-    seen = pixels(draw_diagram(diagram(warned), folder / "warned.png"), yellow)
-    y, x = (places.mean() for places in np.nonzero(seen[300:700, 400:1100]))  # the mark, without the legend
-    dots = pixels(folder / "plain.png", PALETTE[0])[300:700, 400:1100]
-    assert abs(y - 150) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
-
-
 def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) -> None:
     def point(row: int, **more: Any) -> dict[str, Any]:
         found = {"kind": "imperfect bifurcation", "row": row, "load": float(row), "ordinate": 0.0}
@@ -161,15 +141,6 @@ def test_an_ordinate_that_is_round_off_is_drawn_as_zero() -> None:
     assert figure_of(diagram(real)).axes[0].get_ylim()[1] < 1e-10
 
 
-def test_the_load_is_named_in_words() -> None:
-    plain = branch("a", [0.0, 1.0], [0, 0])
-    assert figure_of(diagram(plain)).axes[0].get_xlabel() == "$P$"
-    assert figure_of(diagram(plain) | {"parameter_words": "dead force"}).axes[0].get_xlabel() == "dead force $P$"
-    units = {"parameter_words": "dead force", "parameter_unit": "N", "ordinate_unit": "m"}
-    axes = figure_of(diagram(plain) | units).axes[0]
-    assert axes.get_xlabel() == "dead force $P$ [N]" and axes.get_ylabel().endswith(" [m]")
-
-
 def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Below a line at P = 2 as far as another one from (0, 0) to (1, 1), which ends there, and then to the bound -1."""
     mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
@@ -189,23 +160,6 @@ def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypat
     assert [region.get_paths()[0].contains_point(place) for place in places] == [True, False, False, True, False]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$A$", "force $P$")
     assert axes.get_legend().get_window_extent().y1 < axes.xaxis.label.get_window_extent().y0
-
-
-def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
-    """The ordinate, an integral of the discretised strains, beside the writhe of polygons (Klenin & Langowski)."""
-    demo = scene("ring", twisting=1.5, span=(1.0, 1.2))
-    found = trace(demo, Discretization("reduced", 8, 6), Plan(depth=1, error_bars=False))
-    circle, buckled = found.branches[:2]
-    np.testing.assert_allclose([p.ordinate for p in circle.points], 0.0, atol=1e-11)
-    checked = 0
-    for point in buckled.points[:: max(len(buckled.points) // 6, 1)]:
-        if 0.1 < point.ordinate < 0.9:  # before it passes through itself
-            number, _, Wr = link(found.solvers[0].shape.sample(point.x))
-            assert point.ordinate == pytest.approx(number - Wr, abs=2e-4)
-            checked += 1
-    assert checked > 1
-    unstable = [p.ordinate for p in buckled.points if p.negative]
-    assert unstable and min(unstable) > 0.1  # nowhere where a circle is stable
 
 
 # --- curves between rows
@@ -230,16 +184,6 @@ def test_long_steps_are_no_chords() -> None:
     assert all(row in curve for row in np.column_stack([branch["columns"][x] for x in ("load", "ordinate")]))
 
 
-def test_rows_close_to_each_other_and_corners_stay_as_they_are() -> None:
-    assert not between(elastica(np.linspace(0.0, 0.7, 200)), "ordinate")
-    assert between(elastica(np.linspace(0.0, 0.7, 5)), "ordinate")
-    zigzag = abs(np.linspace(-0.2, 0.2, 9))
-    corner = elastica(np.linspace(0.0, 0.7, 9))
-    corner["columns"]["ordinate"] = zigzag
-    values = np.concatenate([found[:, 1] for found in between(corner, "ordinate").values()])
-    assert values.min() >= -1e-12 and values.max() <= 0.2 + 1e-12
-
-
 def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
     """A parabola of few rows, none at its top, is that parabola."""
     branch = elastica(np.linspace(0.0, 0.7, 7))
@@ -254,9 +198,3 @@ def test_branches_of_one_hue_have_other_marks() -> None:
     axes = Figure().subplots()
     handles = draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
     assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
-
-
-def test_a_singular_first_state_is_marked() -> None:
-    plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
-    assert SINGULAR not in legend(plain | {"singular_start": 0})
-    assert SINGULAR in legend(plain | {"singular_start": 1})

@@ -17,7 +17,7 @@ from matplotlib.image import imread
 from rodfem.errors import InputError
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.glyphs import FLATTEST, SIDES, Look, glyphs_of, profile_of, turn
+from rodfem.output.glyphs import SIDES, Look, glyphs_of, profile_of, turn
 from rodfem.output.pieces import typical_state
 from rodfem.output.render import _read, draw_shape_safely
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
@@ -86,41 +86,6 @@ def colors(path: Path) -> set[str]:
     """Colours of what is drawn at the right end, beside the rod."""
     state = _read(path, "straight", 0)
     return {x.color for x in state.solids(Look(0.01, state.view()))[2:] if x.points[:, 2].mean() > 0.5}
-
-
-@pytest.mark.parametrize("kind", ENDS)
-def test_each_end_is_named_by_its_properties(kind: str) -> None:
-    right = supports_of(column(clamped(), ENDS[kind]), STRAIGHT | {"load": 4.0})["right end"]
-    assert right.kind == kind
-    held = {"clamp": [1, 1, 1], "slide": [1, 1, 0], "hinge": [1, 1, 1], "pin": [1, 1, 0]}.get(kind, [0, 0, 0])
-    np.testing.assert_array_equal(right.held, np.array(held, dtype=bool))
-    force, follower = (
-        [0, 0, -4.0] if kind in kinds else [0, 0, 0] for kinds in (("slide", "pin", "spring"), ("free",))
-    )
-    np.testing.assert_array_equal(right.force, force)
-    np.testing.assert_array_equal(right.follower, follower)
-    np.testing.assert_array_equal(right.axis, [0, 2.0, 0] if kind == "hinge" else [0, 0, 0])
-    np.testing.assert_allclose(right.frame, [cos(2.0), 0, 0, sin(2.0)] if kind == "clamp" else [1, 0, 0, 0], atol=1e-15)
-    sprung = kind == "spring"
-    np.testing.assert_allclose(right.translation_stiffness, sprung * np.diag([10.0, 20.0, 0.0]), atol=1e-6)
-    np.testing.assert_allclose(right.rotation_stiffness, sprung * 3.0 * np.eye(3), atol=1e-3)
-
-
-def test_potentials_that_are_no_springs_are_loads() -> None:
-    """Minus their derivative: of crossed dead forces M/2 (d1 x e2 - d2 x e1), where the arms have turned."""
-    a, b, c, d = q = np.array([0.8, 0.2, -0.4, 0.4])
-    d1, d2 = (a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)), (
-        2 * (b * c - a * d), a * a - b * b + c * c - d * d, 2 * (c * d + a * b),
-    )  # fmt: skip
-    state = STRAIGHT | {"load": 4.0, "q": np.tile(q, (31, 1))}
-    torque = End(energy=lambda x, c: loads.semi_tangential(x.d1, x.d2, c.P) + loads.dead(x.r, (1.0, 2.0, -c.P)))
-    right = supports_of(column(clamped(), torque), state)["right end"]
-    np.testing.assert_allclose(right.moment, 2.0 * (np.cross(d1, E2) - np.cross(d2, E1)), atol=1e-12)
-    np.testing.assert_allclose(right.force, [1.0, 2.0, -4.0], atol=1e-12)
-    both = End(energy=lambda x, c: loads.spring(x.r, (10.0, 20.0, 0.0)) + loads.dead(x.r, push(c)))
-    right = supports_of(column(clamped(), both), state)["right end"]
-    assert right.kind == "spring"
-    np.testing.assert_allclose(right.force, [0.0, 0.0, -4.0], atol=1e-12)  # what no spring holds
 
 
 def test_curved_arrow_has_the_sense_of_the_moment() -> None:
@@ -318,14 +283,3 @@ def test_a_load_arrow_has_the_direction_of_the_load(folder: Path) -> None:
     (arrow,) = [x for x in state.solids(Look(0.01, state.view())) if x.color == LOAD]
     head, tail = (arrow.points[arrow.points[:, 0].argsort()[[0, -1]]]) @ E1
     assert 1.0 < head < tail  # it pushes against the tip, from outside
-
-
-def test_cross_sections_stay_visible() -> None:
-    """Tapered as the stiffness is, ``B = a^4``; never flatter than a bound, and round without a record."""
-    s, angles = np.array([0.0, 1.0]), np.linspace(0, 2 * pi, 401)
-    flat = [np.array([np.diag([1.0, thin])] * 2) for thin in (1e-9, 0.0)]
-    both = (np.array([16 * np.eye(2), np.eye(2)]), *flat)
-    size = [[np.ptp(x, axis=0) for x in profile_of(s, (s, J), angles)] for J in both]
-    np.testing.assert_allclose(size[0], [[2, 2], [1, 1]], rtol=1e-6)
-    np.testing.assert_allclose([a / b for a, b in (*size[1], *size[2])], FLATTEST, rtol=1e-6)
-    np.testing.assert_allclose(np.ptp(profile_of(s, None, angles), axis=1), 2.0)

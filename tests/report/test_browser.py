@@ -238,22 +238,6 @@ def test_labels_cover_neither_marks_nor_each_other(opened: Callable[..., Any], n
     assert (apart | np.eye(len(labels), dtype=bool)).all()
 
 
-def test_keys_move_along_and_between_branches(opened: Callable[..., Any]) -> None:
-    page = opened("pinned")
-    branch, _ = shown(page)
-    press(page, Keys.HOME)
-    until(page, lambda: shown(page) == (branch, 0))
-    press(page, Keys.ARROW_RIGHT)
-    until(page, lambda: shown(page) == (branch, 1))
-    press(page, Keys.ARROW_LEFT)
-    press(page, Keys.ARROW_LEFT)
-    until(page, lambda: shown(page) == (branch, 0))
-    press(page, Keys.ARROW_DOWN)
-    until(page, lambda: shown(page)[0] != branch)
-    press(page, Keys.ARROW_UP)
-    until(page, lambda: shown(page)[0] == branch)
-
-
 def test_the_slider_shows_all_states_of_a_load(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     slide = """const slider = document.getElementById("load"); slider.value = arguments[0];

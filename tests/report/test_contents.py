@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
 from rodfem.output.plot_frequencies import curves
-from rodfem.output.words import number, readings_of, words_of
+from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise, html_of, packed, plain, plain_of, script_json
 from rodfem.report.rods import shapes_of
 from rodfem.writhe import writhe
@@ -91,15 +90,6 @@ def test_rigid_motions_have_no_frequency() -> None:
     bending, rigid = curves(columns)
     assert rigid.motion == RIGID and rigid.real.tolist() == [0.0, 0.0] and bending.real.tolist() == [5.0, 6.0]
     assert all(np.isnan(part).all() for curve in (bending, rigid) for part in curve.parts.values())
-
-
-def test_words_warn() -> None:
-    doubtful = branch([0, 1, 1], special(2, "fold", 1, 0, resolved=False)) | {"unexplained": [{"row": 0}]}
-    words = words_of(doubtful | {"singular_start": 1})
-    assert words[0].sentence.count("Warning") == 2 and "without a special point" in words[1].sentence
-    assert "does not resolve" in words[2].sentence
-    given = words_of(branch([0, 0], special(1, "user", 0, 0, multiplicity=0)))
-    assert given[1].verdict == "stable"
 
 
 def gauss_integral(curve: np.ndarray, tangent: np.ndarray) -> float:
@@ -179,18 +169,6 @@ def test_shapes_of_a_helix() -> None:
     )
 
 
-def test_rows_of_coarser_meshes_end_in_nan() -> None:
-    s = np.linspace(0, 1, 9)
-    q = np.tile([1.0, 0, 0, 0], (9, 1))
-    r = np.outer(s, [0, 0, 1.0])
-    cut = [np.concatenate([x, np.full((3, *x.shape[1:]), np.nan)]) for x in (s, r, q)]
-    shapes = shapes_of(group_of(s=cut[0], r=cut[1], q=cut[2]), 49)
-    assert np.isfinite(shapes.r).all() and shapes.s[-1] == 1.0
-    r[4, 1] = np.nan
-    with pytest.raises(InputError, match="no curve"):
-        shapes_of(group_of(s=s, r=r, q=q), 49)
-
-
 def test_packed_arrays_and_texts() -> None:
     array = np.array([[1.5, np.nan], [-2.0, 3e-8]])
     data = packed(array)
@@ -215,8 +193,3 @@ def test_readings_are_those_of_the_file() -> None:
     first, second, third, fourth = readings_of(one | {"ended": ""}, {"load": 10.0, "ordinate": 1.0})
     assert first == {"load": "0.00 (1e-02)", "ordinate": "0.500 (1e-03)"}
     assert second == {"load": "1.000000 (1e-06)"} and third == {} and fourth == {"load": "3 (given)"}
-
-
-def test_round_off_without_an_error_bar_is_zero() -> None:
-    assert number(1.8e-17, np.inf, scale=0.4) == "0 (no estimate)" != number(1.8e-17, np.inf)
-    assert number(0.25, np.inf, scale=0.4) == "0.25 (no estimate)"
