@@ -123,7 +123,6 @@ def test_programs_that_draw(main, line: str, words: str, capfd: pytest.CaptureFi
     assert words in err
 
 
-@pytest.mark.few(6)
 @pytest.mark.alone
 @pytest.mark.parametrize(
     ("program", "line", "words"),
@@ -131,10 +130,7 @@ def test_programs_that_draw(main, line: str, words: str, capfd: pytest.CaptureFi
         ("map", "--couplings 99999999999999", "at most 10000"),
         ("map", "--couplings 2 --loads 2 --output /proc/x", "cannot be written"),
         ("map", "--couplings 2 --loads 2 --output ''", "name of the folder is empty"),
-        ("cord", "--turns 1e308", "k0 = inf is not a finite number"),
         ("follower", "--formulation reduced", "use --formulation pointwise"),
-        ("follower", "--mass 1e-320", "no floats"),
-        ("ring", "--range 0 1e-320", "as narrow as round-off"),
     ],
 )
 def test_other_demos(

@@ -213,6 +213,14 @@ PLANS: list[tuple[Callable[[], Any], str]] = [
     (lambda: control(first=1e-7), "first step of 1e-07 is out of bounds"),
     *((lambda x=x: Plan(steps=IndexStepControl(resolved=x)), "resolved is") for x in (NAN, INF, -1.0, "a")),
     (lambda: Discretization(elements=10**9), "too large"),
+    (lambda: Discretization(elements=8.0), "elements is 8.0: give a whole number, as in elements=8"),  # type: ignore[arg-type]
+    (lambda: Discretization(elements=1, vertices=("0", "1")), r"vertices\[0\] is '0': give a number"),  # type: ignore[arg-type]
+    (lambda: control(largest="0.1"), "largest is '0.1': give a number, as in largest=0.1"),
+    (lambda: control(most=0), "most is 0: a branch has at least one point"),
+    (lambda: Plan(at=0.5), "at is 0.5: give a tuple of numbers"),  # type: ignore[arg-type]
+    (lambda: Plan(depth=-1), "-1 is not a depth"),
+    (lambda: Plan(locus=("A", 0, "b")), r"locus\[1:\]\[1\] is .b.: give a number"),  # type: ignore[arg-type]
+    (lambda: Plan(steps=0.1), r"steps is 0.1: give StepControl"),  # type: ignore[arg-type]
     (lambda: Discretization(8, 6), "formulation 8: choose .*, and give numbers by name, as in elements=8, degree=6"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=2, vertices=(0.0, 1e-300, 1.0)), "must ascend"),
     (lambda: Discretization(elements=2, vertices=(0.0, 0.5, 2.0)), "must begin and end at 0 and 1"),

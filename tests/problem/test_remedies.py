@@ -16,7 +16,6 @@ import rodfem
 from rodfem.app.cli import ARGUMENT, Parser
 from rodfem.app.main import Statement, parser_of
 from rodfem.errors import POINTWISE, Argument, ConvergenceError, InputError, Remedy, SceneError, SetupError
-from rodfem.problem.scene import Scene
 
 HOME = Path(__file__).parents[2] / "rodfem"
 COMMAND_LINE = ("app/cli.py", "app/main.py", "app/console.py")
@@ -77,25 +76,6 @@ def test_words_of_python_and_of_the_command_line() -> None:
 def test_classes_of_errors() -> None:
     assert issubclass(SceneError, InputError) and issubclass(InputError, ValueError)
     assert all(issubclass(kind, RuntimeError) for kind in (ConvergenceError, SetupError))
-    with pytest.raises(InputError) as option:
-        rodfem.Plan(depth=-1).check(column())
-    assert not isinstance(option.value, SceneError)
-    with pytest.raises(SceneError):
-        column(span=(0.0, 0.0))
-
-
-def column(span: tuple[float, float] = (0.0, 1.0)) -> Scene:
-    return Scene(
-        name="column",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: 0.5 * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
-        parameters={"P": 0.0},
-        load="P",
-        ends=(rodfem.clamped(), rodfem.free(lambda c: (0.0, 0.0, -c.P))),
-        ordinate=rodfem.Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        span=span,
-    )
 
 
 def test_terminal_of_the_command_line_names_options(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,6 @@ from rodfem import (
     clamped,
     free,
     path,
-    sliding,
     tabulated,
     trace,
 )
@@ -203,20 +202,6 @@ def test_corners_are_rows() -> None:
     straight = moved(lambda t: tuple(r[1] + (t - 0.3) / 0.25 * (r[2] - r[1])), None, None, (0.3, 0.55), at=(0.5,))
     (c,) = straight.at(0.5)
     assert [a.ordinate, b.ordinate] == pytest.approx([c.ordinate] * 2, abs=1e-10)
-
-
-def test_turning_by_corners() -> None:
-    """A sliding clamp that turns about the rod, stays, and turns on: the middle turns by half of that."""
-    angle = np.array([0.0, 0.5, 0.5, 1.2])
-    q = np.transpose([np.cos(angle / 2), 0 * angle, 0 * angle, np.sin(angle / 2)])
-    turn = path(range(4), q * [[1], [-2], [1], [3]], smooth=False)
-    scene = Scene(
-        "turned", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
-        {"t": Parameter(0.0)}, "t", (clamped(), sliding(lambda c: (0.0, 0.0, None), lambda c: turn(c.t))),
-        Ordinate("turn", s=0.5, of=lambda r, q: 2 * float(np.arctan2(q[3], q[0]))), (0.0, 3.0),
-    )  # fmt: skip
-    points = trace(scene, MESH, Plan(depth=0)).branches[0].points
-    assert [p.ordinate for p in points if p.load in (1.0, 2.0, 3.0)] == pytest.approx([0.25, 0.25, 0.6], abs=1e-9)
 
 
 @pytest.mark.long

@@ -121,44 +121,30 @@ def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> Non
     assert not diagram.warnings
 
 
+MOLECULE = [
+    *("demo hemitropic", "demo ruler", "demo follower", "classic haringx", "classic heavy", "classic greenhill"),
+    *("classic semi-tangential", "classic pressed ring", "docs on_a_plane", "docs pflueger"),
+]
+BAR = ["classic haringx", "classic bow", "classic Beck"]
+
+
 @pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize(
-    "name",
+    ("name", "units"),
     [
-        "demo hemitropic",
-        "demo ruler",
-        "demo follower",
-        "classic haringx",
-        "classic heavy",
-        "classic greenhill",
-        "classic semi-tangential",
-        "classic pressed ring",
-        "docs on_a_plane",
-        "docs pflueger",
+        *((name, METRES_AND_NEWTONS) for name in MOLECULE),
+        *((name, STEEL) for name in BAR),
+        ("classic pressed arch", (*STEEL[:2], 1e13)),
     ],
 )
-def test_recorded_scenes(name: str) -> None:
+def test_recorded_scenes(name: str, units: tuple[float, ...]) -> None:
     """Ends, loads and constraints of all kinds in metres and newtons of a molecule: the diagrams that are recorded.
 
-    What mixes units takes a fold for a branch point, loses symmetries, and finds others that are none.
+    What mixes units takes a fold for a branch point, loses symmetries, and finds others that are none.  A bar of steel
+    has loads of 1e7; an arch a unit of 1e-13, in which the load is as small as equations that do not feel it.
     """
-    assert not differences(name, *METRES_AND_NEWTONS)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-@pytest.mark.parametrize("name", ["classic haringx", "classic bow", "classic Beck"])
-def test_loads_have_units_too(name: str) -> None:
-    """Loads of 1e7 newtons on a bar of steel."""
-    assert not differences(name, *STEEL)
-
-
-@pytest.mark.long
-@pytest.mark.alone
-def test_a_fold_feels_a_load_of_any_unit() -> None:
-    """In a unit of 1e-13 the derivative in the load is as small as that of equations that do not feel it."""
-    assert not differences("classic pressed arch", *STEEL[:2], 1e13)
+    assert not differences(name, *units)
 
 
 @pytest.mark.long
