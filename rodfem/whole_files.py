@@ -172,9 +172,8 @@ def remove_earlier(folder: Path, names: Iterable[str]) -> None:
 def picture_at(path: Path, suffixes: Sequence[str]) -> None:
     """Make the folder of a picture; raises :class:`InputError` where it cannot be written, or has another suffix."""
     if path.suffix.lower() not in suffixes:
-        raise InputError(
-            f"The picture {path} has an unknown format: choose one of {', '.join(filter(None, suffixes))}."
-        )
+        known = ", ".join(filter(None, suffixes))
+        raise InputError(f"The picture {path} has an unknown format: choose one of {known}.")
     if path.is_dir():
         raise InputError(f"The picture {path} is a folder: give a name in it, as in {path / 'picture.png'}.")
     with writing(path.parent):

@@ -168,7 +168,7 @@ class End(Contribution):
             self._check_force(where, c)
         if self.fixed_rotation is not None and (self.moment or self.follower_moment):
             raise SceneError(
-                f"A moment acts on the {where}, whose directors are held: leave its rotation free, or use a hinge."
+                f"A moment acts on the {where}, whose directors are held: leave them free, or use a hinge."
             )
 
     def _check_rotation(self, where: str, rotation: Any) -> None:
@@ -186,16 +186,11 @@ class End(Contribution):
     def _check_force(self, where: str, c: Constants) -> None:
         fixed = self.fixed(c)
         if len(fixed) == 3 and (self.force or self.follower):
-            raise SceneError(
-                f"A force acts on the {where}, whose position is held: leave it out, or leave the position free in one "
-                "direction."
-            )
+            raise SceneError(f"A force acts on the {where}, whose position is held: leave a component free.")
         force = np.array([0.0] * 3 if self.force is None else [number_of(x) for x in self.force(c)])
         if (abs(fixed @ force) > NEGLIGIBLE * np.linalg.norm(force)).any():
-            raise SceneError(
-                f"A force acts on the {where} in a direction in which its position is held: leave that component out, "
-                "or leave the position free there."
-            )
+            what = f"A force acts on the {where} in a direction in which its position is held"
+            raise SceneError(f"{what}: leave that component out, or leave the position free there.")
 
 
 def _size(what: str, values: Any, size: int) -> float:
@@ -281,10 +276,8 @@ class JoinedEnd(End):
             raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
         first, last = scene.start(np.array(scene.interval))
         if self.sign * (first @ last) <= 0:
-            raise SceneError(
-                f"The start of the ring does not end as it begins: make q(l) = {self.sign:+g} q(0), or choose "
-                f"Ring(odd={self.sign > 0})."
-            )
+            what = f"make q(l) = {self.sign:+g} q(0), or choose Ring(odd={self.sign > 0})"
+            raise SceneError(f"The start of the ring does not end as it begins: {what}.")
 
 
 def _dot(multipliers: Any, values: Any, components: Any) -> Any:
@@ -337,9 +330,7 @@ class SlidingHinge(End):
     def check(self, side: str, scene: Scene) -> None:
         """Check the direction and the point, and what is checked of every end; raises :class:`SceneError`."""
         if scene.normal is not None and self.guide[scene.normal]:
-            raise SceneError(
-                f"The guide of the {side} end leaves the plane across {scene.planar}: choose a direction in the plane."
-            )
+            raise SceneError(f"The guide of the {side} end leaves the plane across {scene.planar}: turn it into that.")
         super().check(side, scene)
         if None in super().held(scene.constants()):
             raise SceneError(f"The guide of the {side} end has no place: give three components of a point on it.")

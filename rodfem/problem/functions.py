@@ -229,9 +229,7 @@ class Constants(SimpleNamespace):
         if name.startswith("__"):
             raise AttributeError(name)
         known = [*(f"c.{x}" for x in sorted(vars(self)) if x != "s"), "c.s (the arclength)"]
-        raise UnnamedError(
-            f"asks for a constant {name!r}: add it to the parameters, or choose one of {', '.join(known)}."
-        )
+        raise UnnamedError(f"asks for a constant {name!r}: add it, or choose one of {', '.join(known)}.")
 
 
 OfConstants = Callable[[Constants], Vector]
@@ -273,10 +271,8 @@ class Known(SimpleNamespace):
             raise AttributeError(name)
         if name in ("r", "dr") and "r" not in vars(self):
             raise NoCentreline("The reduced formulation has no centreline here", POINTWISE)
-        raise UnnamedError(
-            f"asks for {name!r} of a place: it has r, q, R, d1, d2, d3, s and length, and where it is the "
-            "whole rod dr, v and k."
-        )
+        has = "r, q, R, d1, d2, d3, s and length, and where it is the whole rod dr, v and k"
+        raise UnnamedError(f"asks for {name!r} of a place: it has {has}.")
 
 
 def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:

@@ -328,15 +328,11 @@ class Scene(Contribution, metaclass=Stated):
         """Raise :class:`SceneError` for a rod without a length, an unknown kind or load, or a constant out of range."""
         a, b = self.interval
         if not (isfinite(a) and isfinite(b) and a < b):
-            raise SceneError(
-                f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first."
-            )
+            raise SceneError(f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends, the left one first.")
         shortest = 1e-15  # of which dolfinx makes a mesh
         if not max(shortest, 1e-9 * max(abs(a), abs(b))) < b - a < LARGEST:  # else their round-off is seen
-            raise SceneError(
-                f"A rod from {a:g} to {b:g} is shorter than {shortest:g}, beyond the range of floats, or short for its "
-                "arclengths' round-off: choose other units, or let the arclength begin at zero."
-            )
+            what = f"A rod from {a:g} to {b:g} is beyond the range of floats, or short for its arclengths' round-off"
+            raise SceneError(f"{what}: choose other units, or let the arclength begin at zero.")
         if not isinstance(self.rod, str) or self.rod not in RODS:
             raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")
         if not isinstance(self.load, str) or self.load not in self.parameters:
@@ -353,15 +349,11 @@ class Scene(Contribution, metaclass=Stated):
         for value in span:
             self.parameters[self.load].check(self.load, value)
         if span[0] == span[1]:
-            raise SceneError(
-                f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads."
-            )
+            raise SceneError(f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two loads.")
         width = abs(span[1] - span[0])
         if not max(TINIEST, NEGLIGIBLE * max(map(abs, span))) < width < LARGEST:
-            raise SceneError(
-                f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g} is as narrow as round-off, or beyond "
-                "the range of floats: give loads that differ by more, or choose other units."
-            )
+            what = f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g}"
+            raise SceneError(f"{what} is as narrow as round-off, or beyond the range of floats: choose others.")
         if tuple(span) != self.span:
             replace(self, span=span)
 

@@ -36,16 +36,12 @@ class Table:
         self.what = what
         self.knots, rows = _floats(f"first column of the {what}", x), _floats(f"values of the {what}", values)
         if self.knots.ndim != 1 or len(self.knots) < 2 or rows.shape[:1] != self.knots.shape or rows.ndim > 2:
-            raise SceneError(
-                f"The {what} has the shapes {self.knots.shape} and {rows.shape}: give n numbers, two or more, and as "
-                "many rows, (n,) or (n, m)."
-            )
+            shapes = f"{self.knots.shape} and {rows.shape}"
+            raise SceneError(f"The {what} has the shapes {shapes}: give n numbers, two or more, and n rows.")
         steps = np.diff(self.knots)
         if not steps.min() > 0:
-            raise SceneError(
-                f"The first column of the {what} does not increase from row {int(np.argmin(steps > 0))} (from 0) to "
-                "the next: sort the rows, each place once."
-            )
+            row = int(np.argmin(steps > 0))
+            raise SceneError(f"The {what} does not increase from row {row} (from 0) to the next: sort the rows.")
         self.scalar, self.rows = rows.ndim == 1, self.adjusted(rows.reshape(len(rows), -1))
         slopes = np.diff(self.rows, axis=0) / steps[:, None]
         self.pieces = np.stack([self.rows[:-1], slopes, 0 * slopes, 0 * slopes], axis=1)
@@ -78,9 +74,7 @@ class Table:
             # in the equations an arclength or a constant is one of these: base + direction * load
             constant = isinstance(x, (Variable, Indexed, Sum)) and not any(isinstance(p, Symbol) for p in parts(x))
             if not constant and not isinstance(x, Symbol):
-                raise UnnamedError(
-                    f"calls the {self.what} with an expression: call it with c.s, or with one constant alone."
-                )
+                raise UnnamedError(f"calls the {self.what} with an expression: call it with c.s, or a constant alone.")
             values = tuple(Entry(x, self, i) for i in range(len(self._labels)))
         else:
             values = tuple(self.at(np.array([float(x)]))[0].tolist())
@@ -118,10 +112,8 @@ def tables_of(scene: Scene) -> list[tuple[Table, str]]:
         needed = scene.interval if name == "s" else scene.span if name == scene.load else (value, value)
         low, high, margin = *sorted(needed), NEGLIGIBLE * np.ptp(table.knots)
         if low < table.knots[0] - margin or high > table.knots[-1] + margin:
-            raise SceneError(
-                f"The {table.what} has rows from {name} = {table.knots[0]:g} to {table.knots[-1]:g}, but is needed "
-                f"from {low:g} to {high:g}: give rows for all of that."
-            )
+            has = f"has rows from {name} = {table.knots[0]:g} to {table.knots[-1]:g}"
+            raise SceneError(f"The {table.what} {has}, but is needed from {low:g} to {high:g}: give rows for that.")
     return list(calls)
 
 

@@ -290,16 +290,12 @@ def check_plane(scene: Scene) -> None:
 def _check_ends(scene: Scene, normal: int, c: Constants) -> None:
     left, right = (end.held(c)[normal] for end in scene.sides)
     if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
-        raise SceneError(
-            f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod is "
-            "planar: hold both at the same, or leave planar out."
-        )
+        held = f"at {float(left):g} and {float(right):g} along {scene.planar}"
+        raise SceneError(f"The ends are held {held}, across which the rod is planar: hold both at the same.")
     for side, end in zip(SIDES, scene.sides, strict=True):
         frame = np.array([float(x) for x in end.frame(c) or ()])
         if frame.size and abs(np.delete(frame[1:], normal)).max() > NEGLIGIBLE * np.linalg.norm(frame):
-            raise SceneError(
-                f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
-            )
+            raise SceneError(f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about it.")
 
 
 def _check_load(scene: Scene, what: str, function: Callable[..., Any], out: list[int]) -> None:
@@ -310,10 +306,8 @@ def _check_load(scene: Scene, what: str, function: Callable[..., Any], out: list
         for s in scene.samples() if "s" in asked else [None]:
             values = [float(x) for x in function(scene.constants(load, s))]
             if any(values[i] for i in out):
-                raise SceneError(
-                    f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
-                    "leave that component out, or planar out of the scene."
-                )
+                where = f"its plane across {scene.planar}, with {values}"
+                raise SceneError(f"The {what} pushes the rod out of {where}: leave that component out, or planar.")
 
 
 def _check_functions_of_states(scene: Scene, normal: int) -> None:
@@ -323,10 +317,8 @@ def _check_functions_of_states(scene: Scene, normal: int) -> None:
         for what, function, role in functions:
             one, other = (_defined(function, role, places, c) for places in sides)
             if abs(one - other) > NEGLIGIBLE * max(abs(one), abs(other)):
-                raise SceneError(
-                    f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
-                    "are not alike to it; leave that out, or planar out of the scene."
-                )
+                where = f"its plane across {scene.planar}, as its two sides are not alike to it"
+                raise SceneError(f"The {what} pushes the rod out of {where}: leave that out, or planar.")
 
 
 def _tried(scene: Scene) -> Iterator[tuple[int, Constants]]:

@@ -54,10 +54,8 @@ def check_scene(scene: Scene) -> None:
 def check_load(scene: Scene) -> None:
     """Raise :class:`SceneError` where nothing in the scene depends on its load: there is nothing to trace."""
     if scene.load not in asked_for(scene):
-        raise SceneError(
-            f"Nothing in the scene depends on its load {scene.load!r}: use c.{scene.load} in an end, a load or the "
-            "energy, or choose another load."
-        )
+        use = f"use c.{scene.load} in an end, a load or the energy, or choose another load"
+        raise SceneError(f"Nothing in the scene depends on its load {scene.load!r}: {use}.")
 
 
 def check_places(scene: Scene) -> None:
@@ -100,9 +98,7 @@ def check_start(scene: Scene) -> None:
     s = np.linspace(*scene.interval, PLACES)
     q = scene.start(s)
     if q.shape != (PLACES, 4):
-        raise SceneError(
-            f"The start has the shape {q.shape} at {PLACES} arclengths: return a quaternion for each, ({PLACES}, 4)."
-        )
+        raise SceneError(f"The start has the shape {q.shape}: return a quaternion for each arclength, ({PLACES}, 4).")
     if not (np.isfinite(q).all() and (np.linalg.norm(q, axis=1) > 0).all()):
         raise SceneError("The start is no rotation everywhere: return quaternions of unit norm.")
     if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > NEGLIGIBLE:
@@ -118,9 +114,7 @@ def _check_jump(start: Callable[[np.ndarray], np.ndarray], low: float, high: flo
         low, high = (low, middle) if first > second else (middle, high)
     left = float(_angles(start(np.array([low, high])))[0])
     if left > TURNED / 2:
-        raise SceneError(
-            f"The start jumps by {left:.3g} radian at s = {low:.6g}: let it be continuous, as rotations are."
-        )
+        raise SceneError(f"The start jumps by {left:.3g} radian at s = {low:.6g}: let it be continuous.")
 
 
 def _angles(q: np.ndarray) -> np.ndarray:
@@ -177,36 +171,23 @@ def check_convexity(scene: Scene) -> None:
 def _trouble_with_stiffness(scene: Scene, stiffness: np.ndarray) -> str:
     """Sentence on a second derivative of the energy that no rod has, with ``{}`` for the place; else empty."""
     if not np.isfinite(stiffness).all():
-        return (
-            "The second derivative of the stored energy at the undeformed state is not finite{}: choose constants for "
-            "which it is."
-        )
+        return "The second derivative of the stored energy is not finite at the undeformed state{}: change constants."
     largest = abs(stiffness).max()
     if not largest:
-        return (
-            "The stored energy is flat at the undeformed state{}: write it as a function of the strains v and k whose "
-            "second derivative there is not zero, with UFL (ufl.cosh), without math and numpy."
-        )
+        return "The stored energy is flat at the undeformed state{}: write it with UFL (ufl.cosh), in v and k."
     if not TINIEST / scene.length**2 < largest < LARGEST / scene.length**2:
-        return (
-            f"The stiffness of {largest:.3g}{{}} is so far from one that its powers are no floats: choose other units."
-        )
+        return f"The stiffness of {largest:.3g}{{}} is so far from one that its powers are no floats: use other units."
     balanced = in_lengths(stiffness, scene)
     if not is_definite(balanced):
-        return (
-            "The stored energy is not convex{}: its second derivative at the undeformed state has the eigenvalue "
-            f"{np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
-        )
+        least = np.linalg.eigvalsh(stiffness)[0]
+        return f"The stored energy is not convex{{}}: its eigenvalue {least:.3g} is not positive; change constants."
     strains, coupling = balanced[:-3, :-3], balanced[:-3, -3:]
     # stiff strains hide no bending, but bending and twist, with the strains that go with them, must be comparable
     relaxed: np.ndarray = balanced[-3:, -3:] - coupling.T @ np.linalg.solve(strains, coupling)
     for values, least in ((np.linalg.eigvalsh(relaxed), SOFTEST), (np.linalg.eigvalsh(balanced), STIFFEST)):
         if values[0] <= least * values[-1]:
-            return (
-                "The stored energy is convex, but for round-off{}: with the rod's length as unit its second derivative "
-                f"at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; {FLEXIBLE}, or "
-                "constants that are nearer to each other."
-            )
+            ratio = f"eigenvalues from {values[0]:.3g} to {values[-1]:.3g} of its second derivative, the length as unit"
+            return f"The stored energy is convex, but for round-off{{}}: {ratio}; {FLEXIBLE}, or change constants."
     return ""
 
 
@@ -250,10 +231,7 @@ def check_drift(scene: Scene) -> None:
     held = np.vstack([np.zeros(3), *(end.fixed(c) for end in scene.sides)])
     for i, direction in enumerate(np.eye(3) if held.any() else ()):
         if np.linalg.matrix_rank(np.vstack([held, direction])) > np.linalg.matrix_rank(held):
-            raise SceneError(
-                f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
-                "or attach a spring."
-            )
+            raise SceneError(f"The rod can drift away along e{i + 1}: hold that component, or attach a spring.")
 
 
 def check_balance(scene: Scene) -> None:
@@ -264,10 +242,8 @@ def check_balance(scene: Scene) -> None:
         forces = np.array([_force_on(end, scene.constants(load)) for end in scene.sides])
         total = forces.sum(axis=0)
         if abs(total).max() > NEGLIGIBLE * abs(forces).max():
-            raise SceneError(
-                f"At {scene.load} = {load:g} the forces on the ends add up to {(total + 0.0).tolist()}, and nothing "
-                "holds the rod against that: hold an end, attach a spring, or let the forces balance."
-            )
+            what = f"At {scene.load} = {load:g} the forces on the ends add up to {(total + 0.0).tolist()}"
+            raise SceneError(f"{what}, and nothing holds the rod against that: hold an end, or let the forces balance.")
 
 
 def _force_on(end: End, c: Constants) -> list[float]:
@@ -283,7 +259,5 @@ def check_reach(scene: Scene) -> None:
         if None not in left and None not in right:
             distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5
             if distance > scene.length * (1 + NEGLIGIBLE):
-                raise SceneError(
-                    f"At {scene.load} = {load:g} the ends are {distance:.6g} apart, but the rod is inextensible "
-                    f"and only {scene.length:.6g} long: let it stretch, or move the ends together."
-                )
+                what = f"At {scene.load} = {load:g} the ends are {distance:.6g} apart, but the rod is inextensible"
+                raise SceneError(f"{what} and only {scene.length:.6g} long: let it stretch, or move the ends together.")
