@@ -380,9 +380,8 @@ class BranchSolver:
         tangent: PETSc.Vec | None,
         outcome: NewtonResult | None = None,
         index: Index | None = None,
-        energies: Energies | None = None,
     ) -> Point:
-        """Evaluate all records of the equilibrium ``x``; its index and its energies unless they are given."""
+        """Evaluate all records of the equilibrium ``x``; its index unless that is given."""
         system = self.system
         if index is None:
             index = decide(self.inertia.at(x)).index
@@ -392,7 +391,7 @@ class BranchSolver:
             arclength=arclength,
             load=system.scalar(x),
             ordinate=self.shape.ordinate(x),
-            **(energies or self.energies(x))._asdict(),
+            **self.energies(x)._asdict(),
             stretch=self.shape.stretch(x),
             negative=index.negative,
             zero=index.zero,

@@ -177,9 +177,9 @@ class _Walk:
         tangent = solver.load_tangent(before, beyond > last.load)
         if not solver.row(direction).dot(tangent) > ALIGNED:
             return None
-        energies = solver.energies(x)._replace(conjugate=solver.energies(before).conjugate)
-        place = last.arclength + system.distance(last.x, x)
-        return solver.point(x, place, tangent, outcome, energies=energies)
+        point = solver.point(x, last.arclength + system.distance(last.x, x), tangent, outcome)
+        point.conjugate = solver.energies(before).conjugate
+        return point
 
     def _halve(self, last: Point, most: float) -> None:
         """Halve the step, or end the branch, where the last point was ``most`` far from the next one at most."""

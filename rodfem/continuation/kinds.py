@@ -6,6 +6,7 @@ A kind is added here.  What finds its points makes :class:`~rodfem.continuation.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 EIGENVALUE, UNFOLDING, FREQUENCY, NUMBER, LOAD = "eigenvalue", "unfolding", "frequency", "number", "load"
@@ -18,24 +19,16 @@ Line = tuple[int, Any]
 class Kind(str):
     """Name of a kind of special point, with what is to be known of it."""
 
-    code: str  # two letters for the terminal, AUTO's where it has some
-    test: str  # test function; empty for none
-    branches: bool  # whether other branches leave there
-    marker: Mapping[str, Any]  # style of its mark in a picture, in matplotlib's words; empty for none
-    line: Line | None  # place in the palette and dashes of its locus in the plane of two parameters
+    code: str = ""  # two letters for the terminal, AUTO's where it has some
+    test: str = ""  # test function
+    branches: bool = False  # whether other branches leave there
+    marker: Mapping[str, Any] = MappingProxyType({})  # style of its mark in a picture, in matplotlib's words
+    line: Line | None = None  # place in the palette and dashes of its locus in the plane of two parameters
 
-    def __new__(
-        cls,
-        name: str,
-        code: str = "",
-        test: str = "",
-        branches: bool = False,
-        marker: Mapping[str, Any] | None = None,
-        line: Line | None = None,
-    ) -> Kind:
+    def __new__(cls, name: str, **known: Any) -> Kind:
         """Make a string that knows more than its letters."""
         kind = super().__new__(cls, name)
-        kind.code, kind.test, kind.branches, kind.marker, kind.line = code, test, branches, marker or {}, line
+        vars(kind).update(known)
         return kind
 
     @property
@@ -66,38 +59,34 @@ class Kind(str):
 
 YELLOW = "#F0E442"
 BRANCH_POINT = Kind(
-    *("branch point", "BP", EIGENVALUE, True),
+    "branch point", code="BP", test=EIGENVALUE, branches=True, line=(1, "-"),
     marker={"marker": "o", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.5},
-    line=(1, "-"),
-)
+)  # fmt: skip
 FOLD = Kind(
-    *("fold", "LP", EIGENVALUE),
+    "fold", code="LP", test=EIGENVALUE, line=(2, (0, (5.0, 1.5))),
     marker={"marker": "D", "ms": 6.0, "mfc": "black", "mec": "black"},
-    line=(2, (0, (5.0, 1.5))),
-)
+)  # fmt: skip
 IMPERFECT = Kind(
-    *("imperfect bifurcation", "IB", UNFOLDING),
+    "imperfect bifurcation", code="IB", test=UNFOLDING,
     marker={"marker": "P", "ms": 9.5, "mfc": "white", "mec": "black", "mew": 1.3},
-)
+)  # fmt: skip
 """A branch point that an imperfection has taken apart, where steps of continuation do not resolve its pieces."""
 FLUTTER = Kind(
-    *("flutter", "HB", FREQUENCY),
+    "flutter", code="HB", test=FREQUENCY, line=(3, (0, (5.0, 1.2, 1.0, 1.2))),
     marker={"marker": "*", "ms": 13.0, "mfc": YELLOW, "mec": "black", "mew": 1.1},
-    line=(3, (0, (5.0, 1.2, 1.0, 1.2))),
-)
+)  # fmt: skip
 """Under loads without a potential: a pair of frequencies becomes complex."""
 DIVERGENCE = Kind(
-    *("divergence", "BP", FREQUENCY),
+    "divergence", code="BP", test=FREQUENCY, line=(4, (0, (2.0, 1.0))),
     marker={"marker": "v", "ms": 10.0, "mfc": YELLOW, "mec": "black", "mew": 1.1},
-    line=(4, (0, (2.0, 1.0))),
-)
+)  # fmt: skip
 """Under loads without a potential: a frequency becomes imaginary."""
-EVENT = Kind("event", "UZ", NUMBER, marker={"marker": "+", "ms": 8.5, "mec": "black", "mew": 1.6})
+EVENT = Kind("event", code="UZ", test=NUMBER, marker={"marker": "+", "ms": 8.5, "mec": "black", "mew": 1.6})
 USER = Kind(
-    *("user", "UZ", LOAD),
+    "user", code="UZ", test=LOAD,
     marker={"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
-)
-END = Kind("end", "EP")
+)  # fmt: skip
+END = Kind("end", code="EP")
 KINDS = {str(kind): kind for kind in (BRANCH_POINT, FOLD, IMPERFECT, FLUTTER, DIVERGENCE, EVENT, USER, END)}
 """By name, in the order of legends."""
 
