@@ -39,8 +39,8 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL, ROUGH, Factored
 from rodfem.stability.motion_names import MotionNames
-from rodfem.stability.near_zero import SPARE, NearZero, decide, judge, near_zero, quotients, soft_limit
-from rodfem.stability.soft_mode import Judgement, SoftMode, index_range
+from rodfem.stability.near_zero import SPARE, NearZero, decide, near_zero, quotients, soft_limit
+from rodfem.stability.soft_mode import SoftMode, index_range
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
 BARS = "richer meshes may decide that, ask for error bars"
@@ -76,7 +76,7 @@ class SoftStates:
         vectors.  Raises :class:`ConvergenceError` if constraints that depend on each other leave less than no negative
         eigenvalue.
         """
-        inertia, metric = self.solver.inertia, self.solver.system.metric
+        metric = self.solver.system.metric
         clear, self.uncompared = self._is_clear(point), ""
         # eigenvalues nearest zero to be judged, soft ones apart: those of another sign on the richer mesh
         least = self._differing(point, fixed_load) if compare and self._richer else 0
@@ -91,7 +91,7 @@ class SoftStates:
                 refined = self._refined(point, [modes[i] for i in others], fixed_load, [*vanishing, *branch])
             for i, mode in zip(others, refined, strict=True):
                 modes[i] = mode
-        self._record(point, judge(near, modes, inertia.tolerance))
+        self._record(point, near, modes)
         return bool(point.soft)
 
     def _near(self, point: Point, least: int, family: bool) -> tuple[NearZero, list[PETSc.Vec]]:
@@ -109,18 +109,19 @@ class SoftStates:
         names = self.names(point.x, near.vectors)
         return [SoftMode(*m) for m in zip(names, near.values.tolist(), bars.tolist(), strict=True)]
 
-    def _record(self, point: Point, found: Judgement) -> None:
-        """Give a ``point`` what was ``found``; raises :class:`ConvergenceError` for a negative index."""
-        if found.negative < 0:
+    def _record(self, point: Point, near: NearZero, modes: list[SoftMode]) -> None:
+        """Give a ``point`` its ``modes``, ``near`` zero; raises :class:`ConvergenceError` for a negative index."""
+        negative, zero, undecided = near.counts(modes, self.solver.inertia.tolerance)
+        if negative < 0:
             raise ConvergenceError(
-                f"The count of negative eigenvalues at load {point.load:.8g} gave {found.negative}: the constraints "
-                "depend on each other, or nearly; remove those that follow from the others."
+                f"The count of negative eigenvalues at load {point.load:.8g} gave {negative}: the constraints depend "
+                "on each other, or nearly; remove those that follow from the others."
             )
         if point.negative_in_space is not None:  # that in the plane, and what is out of it
-            point.negative_in_space += found.negative - point.negative
-        point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
+            point.negative_in_space += negative - point.negative
+        point.negative, point.zero, point.undecided = negative, zero, undecided
         limit = soft_limit(self.solver.inertia)
-        point.soft = [m for m in found.soft if not m.decided or abs(m.value) < limit]
+        point.soft = [m for m in modes if not m.decided or abs(m.value) < limit]
 
     def _is_clear(self, point: Point) -> bool:
         """Whether one factorisation told the index of a point, with a distance of the nearest eigenvalue from zero."""

@@ -38,7 +38,7 @@ Every rank has the whole matrices and computes the same.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -55,26 +55,15 @@ from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.spectrum import FINITE, krylov
 
 INVERSES = ("saddle", "elimination")
-SINGULAR = 1e-6
-"""Relative residual of a solve above which its matrix counts as singular."""
-RANK = 1e-10
-"""Square of a part, relative to the vector's, below which it depends on others."""
-
 Solve = Callable[[np.ndarray], np.ndarray]
-APART = 1e-3
-"""Eigenvalues closer than this, relative to the greatest, are one for the parameters of the transform."""
 
 
-@dataclass(frozen=True)
-class Reduced:
-    """Eigenvalues ``values`` (k,) by their real parts, ``vectors`` ``Q2 z`` (m, k) in the pencil's coordinates.
+class Reduced(NamedTuple):
+    """Eigenvalues by their real parts and vectors of a pencil; real for a symmetric one."""
 
-    ``errors`` are backward errors ``|Q2^t (K - mu M) x| / ((|K| + |mu| |M|) |x|)``; real arrays for a symmetric pencil.
-    """
-
-    values: np.ndarray
-    vectors: np.ndarray
-    errors: np.ndarray
+    values: np.ndarray  # (k,)
+    vectors: np.ndarray  # Q2 z, (m, k), in the pencil's coordinates
+    errors: np.ndarray  # |Q2^t (K - mu M) x| / ((|K| + |mu| |M|) |x|), (k,)
 
 
 class ReducedPencil:
@@ -123,7 +112,7 @@ class ReducedPencil:
         """Eigenvalues of ``T`` and vectors, orthonormal in M, of a symmetric pencil in the span of vectors (m, k)."""
         masses = self.M @ vectors
         squares, turn = np.linalg.eigh((vectors.T @ masses + masses.T @ vectors) / 2)
-        kept = squares > RANK * squares.max(initial=0.0)
+        kept = squares > 1e-10 * squares.max(initial=0.0)  # others depend on these
         turn = turn[:, kept] / np.sqrt(squares[kept])
         compliance = turn.T @ (masses.T @ solve(masses)) @ turn
         nu, inner = np.linalg.eigh((compliance + compliance.T) / 2)
@@ -160,11 +149,9 @@ class ReducedPencil:
             lu = splu(shifted.tocsc())
         except RuntimeError:
             raise singular from None
-        if not self.C.shape[1]:
-            return lambda b: lu.solve(b)
         columns = self.C.toarray()
         border = lu.solve(columns)
-        if not abs(shifted @ border - columns).max() < SINGULAR * abs(columns).max():
+        if not abs(shifted @ border - columns).max() < 1e-6 * abs(columns).max():  # the residual of a solve
             raise singular
         capacitance = scipy.linalg.lu_factor(columns.T @ border)
 
@@ -197,13 +184,10 @@ class Reduction(Method):
         """The reduced pencil at ``x``, symmetry modes left out."""
         return ReducedPencil(self.coordinates.without_modes(x))
 
-    def lifted(self, found: Reduced, certified: bool, factorisations: int, note: str = "") -> Found:
-        """What was ``found``, as vectors of the system in its units; ``certified``: a count finds no more.
-
-        It cost so many ``factorisations``, and a ``note`` goes after the reason.
-        """
+    def lifted(self, found: Reduced, certified: bool, made: int, note: str = "") -> Found:
+        """What was ``found``, as vectors of the system in its units, with so many factorisations ``made``."""
         vectors = self.coordinates.lift(found.vectors)
-        return Found(self.work.one * found.values, vectors, found.errors, certified, factorisations, note)
+        return Found(self.work.one * found.values, vectors, found.errors, certified, made, note)
 
 
 class Cayley(Reduction, SymmetricMethod):
@@ -216,24 +200,22 @@ class Cayley(Reduction, SymmetricMethod):
     def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """With the shift of the last state; with a new one where a count finds some missing."""
         below, reduced = self.work.below(x), self.reduced(x)
-        made, note = 0, ""
+        most, made = min(number + 2, reduced.kernel.dimension), 0
         for fresh in (False, True):
             if self._shift is None or fresh:
-                self._shift = cayley_shift(reduced.near(3, below.solver.shift).values)
-                made += 1
+                self._shift, made = cayley_shift(reduced.near(3, below.solver.shift).values), made + 1
             try:
                 # the first two are equally far from the shift: more are asked for than wanted where they are multiple
-                found = reduced.near(min(number + 2, reduced.kernel.dimension), self._shift)
+                found, made = reduced.near(most, self._shift), made + 1
             except ConvergenceError:
                 continue
-            made += 1
             found = Reduced(found.values[:number], found.vectors[:, :number], found.errors[:number])
-            if certified := below.certifies(found.values):
+            if below.certifies(found.values):
+                certified, note = True, ""
                 break
         else:
-            found = reduced.near(number, below.solver.shift)
+            found, made = reduced.near(number, below.solver.shift), made + 1
             certified = below.certifies(found.values)
-            made += 1
             note = ", but a count found some missing (equal eigenvalues): completed by shift-invert"
         if number > 1:
             self._shift = cayley_shift(found.values)
@@ -242,5 +224,5 @@ class Cayley(Reduction, SymmetricMethod):
 
 def cayley_shift(values: np.ndarray) -> float:
     """``a1``, the mean of the first of ascending ``values`` (k,), k > 0, and of the next that is not equal."""
-    others = values[values > values[0] + APART * abs(values).max()]
+    others = values[values > values[0] + 1e-3 * abs(values).max()]  # nearer ones are equal
     return float((values[0] + others[0]) / 2) if len(others) else float(values[0] + abs(values).max() / 4)

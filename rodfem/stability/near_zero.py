@@ -26,7 +26,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.matrices import rounding
 from rodfem.stability.inertia import NULL, ROUGH, ZERO_BAND, Factored, Index, Inertia
-from rodfem.stability.soft_mode import Judgement, SoftMode
+from rodfem.stability.soft_mode import SoftMode
 
 MANY = 100
 """Most eigenvalues near zero that are decided one by one."""
@@ -80,6 +80,15 @@ class NearZero(Quotients):
         """Those at some places, and another number of other zeros."""
         vectors = [self.vectors[i] for i in places]
         return NearZero(self.values[places], vectors, self.uncertainty[places], self.firm, rest)
+
+    def counts(self, modes: Sequence[SoftMode], tolerance: float) -> tuple[int, int, int]:
+        """Numbers of negative, zero and undecided eigenvalues of a state, by its ``modes``, which are these.
+
+        Those that are decided have a sign; others are undecided, and zero, too, within the ``tolerance`` of a count.
+        """
+        undecided = [abs(v) for m, v in zip(modes, self.values.tolist(), strict=True) if not m.decided]
+        negative = self.firm + sum(m.decided and m.value < 0 for m in modes)
+        return negative, self.rest + sum(v <= tolerance for v in undecided), len(undecided)
 
 
 def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
@@ -199,14 +208,3 @@ def _candidates(found: Factored, limit: float, inside: int, least: int) -> list[
             "a higher degree."
         )
     return [vectors[i] for i in chosen]
-
-
-def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judgement:
-    """Count the eigenvalues of a state with its ``modes``, which are ``found`` on the mesh.
-
-    Those that are decided have a sign; others are undecided, and zero, too, within the ``tolerance`` of a count.
-    """
-    decided = [m for m in modes if m.decided]
-    negative = found.firm + sum(m.value < 0 for m in decided)
-    zero = sum(not m.decided and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
-    return Judgement(negative, found.rest + zero, len(modes) - len(decided), tuple(modes))

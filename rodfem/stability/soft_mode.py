@@ -33,19 +33,6 @@ class SoftMode:
         return f"{self.name}, mu = {self.value:.2g} +- {self.uncertainty:.0e}{doubt}"
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """Numbers of ``negative``, ``zero`` and ``undecided`` eigenvalues of a state, with its ``soft`` modes.
-
-    An undecided one within the tolerance of a count is a zero one, too.
-    """
-
-    negative: int
-    zero: int
-    undecided: int
-    soft: tuple[SoftMode, ...]
-
-
 def stability(negative: int, undecided: int, doubt: str = "", in_space: int | None = None) -> str:
     """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`: the one decision that all words follow.
 
