@@ -172,7 +172,7 @@ class Reduction(Method):
     def leftmost(self, x: PETSc.Vec, number: int) -> Found:
         """With a shift below the spectrum."""
         below = self.work.below(x)
-        found = self.reduced(x).near(number, below.solver.shift)
+        found = self.reduced(x).near(number, below.shift)
         return self.lifted(found, below.certifies(found.values), 1)
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
@@ -203,7 +203,7 @@ class Cayley(Reduction, SymmetricMethod):
         most, made = min(number + 2, reduced.kernel.dimension), 0
         for fresh in (False, True):
             if self._shift is None or fresh:
-                self._shift, made = cayley_shift(reduced.near(3, below.solver.shift).values), made + 1
+                self._shift, made = cayley_shift(reduced.near(3, below.shift).values), made + 1
             try:
                 # the first two are equally far from the shift: more are asked for than wanted where they are multiple
                 found, made = reduced.near(most, self._shift), made + 1
@@ -214,7 +214,7 @@ class Cayley(Reduction, SymmetricMethod):
                 certified, note = True, ""
                 break
         else:
-            found, made = reduced.near(number, below.solver.shift), made + 1
+            found, made = reduced.near(number, below.shift), made + 1
             certified = below.certifies(found.values)
             note = ", but a count found some missing (equal eigenvalues): completed by shift-invert"
         if number > 1:

@@ -43,7 +43,7 @@ from rodfem.stability.motion_names import MotionNames
 from rodfem.stability.near_zero import soft_limit
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
-from rodfem.stability.symmetric import CONVERGED, Found, SymmetricPencil
+from rodfem.stability.symmetric import CONVERGED, Found, SymmetricSolver
 from rodfem.tolerances import SAME_EIGENVALUE
 
 SEEN = 1e-3
@@ -335,7 +335,7 @@ def _sum(motions: list[Motion], weights: np.ndarray) -> Motion:
     return Motion(*(np.tensordot(weights, np.array(each), 1) for each in zip(*parts, strict=True)))
 
 
-def _rounded(pencil: SymmetricPencil, vectors: list[PETSc.Vec], values: np.ndarray) -> np.ndarray:
+def _rounded(pencil: SymmetricSolver, vectors: list[PETSc.Vec], values: np.ndarray) -> np.ndarray:
     """Uncertainty of eigenvalues of a ``pencil``: round-off of its matrix, to first order, and of the eigensolver."""
     out = []
     for v, value in zip(vectors, values, strict=True):

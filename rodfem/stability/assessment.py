@@ -31,7 +31,7 @@ from rodfem.stability.near_zero import Decision, decide
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricSolver
 from rodfem.stability.soft_mode import ONE_SIDE, WORDS, SoftMode, is_stable, stability
 from rodfem.stability.spectrum import FINITE, Spectrum
-from rodfem.stability.symmetric import Found, SymmetricPencil, SymmetricSolver, eigensolver
+from rodfem.stability.symmetric import Found, SymmetricSolver, eigensolver
 
 COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
@@ -123,7 +123,7 @@ class Assessor:
         """Eigenvalues of states under loads without a potential."""
         return NonsymmetricSolver(self.system)
 
-    def below(self, x: PETSc.Vec) -> SymmetricPencil:
+    def below(self, x: PETSc.Vec) -> SymmetricSolver:
         """Symmetric pencil at ``x``, its shift below all eigenvalues."""
         pencil = self.symmetric.at(x)
         pencil.go_below()
@@ -294,8 +294,8 @@ class Dense(Method):
         Raises :class:`InputError` if fewer than ``number`` are finite.
         """
         below = self.work.below(x)
-        stiffness, mass = (gathered(A).real for A in below.solver.scaled)
-        pencil = Spectrum(stiffness, mass, below.solver.shift)
+        stiffness, mass = (gathered(A).real for A in below.scaled)
+        pencil = Spectrum(stiffness, mass, below.shift)
         T = pencil.dual.T @ pencil.inverse
         nu, w = np.linalg.eigh((T + T.T) / 2)
         if number > (finite := int((nu > FINITE * nu[-1]).sum())):
@@ -308,7 +308,7 @@ class Dense(Method):
         for column in (pencil.images @ w / nu).T:
             vectors.append(self.work.system.new_vector())
             vectors[-1].array[:] = column[own]
-        values = below.solver.shift + 1.0 / nu
+        values = below.shift + 1.0 / nu
         errors = below.backward_errors(values, vectors)
         return Found(self.work.one * values, below.unscaled(vectors), errors, below.certifies(values))
 
@@ -347,12 +347,12 @@ class Slicing(SymmetricMethod):
         return Found(self.work.one * values, pencil.unscaled(vectors), errors, complete, 3)  # SLEPc's own, at least
 
 
-def sliced(pencil: SymmetricPencil, low: float, high: float) -> SLEPc.EPS | None:
+def sliced(pencil: SymmetricSolver, low: float, high: float) -> SLEPc.EPS | None:
     """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None if they do not match the counts at these ends."""
     rooms = 100, 400, 1600  # where rotations have no mass many pivots of the pencil are delayed
     for room in rooms:
         try:
-            solver = in_interval(*pencil.solver.scaled, low, high, room)
+            solver = in_interval(*pencil.scaled, low, high, room)
             with slepc_errors():
                 solver.solve()
         except PETSc.Error as trouble:

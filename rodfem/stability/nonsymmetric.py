@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -28,9 +29,9 @@ from rodfem.stability import motion_names
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.pencil import (
     PencilMatrices,
-    StatePencil,
     assemble_pencil,
     exclude_modes,
+    in_units,
     symmetry_modes,
     weighed_modes,
 )
@@ -176,7 +177,7 @@ class NonsymmetricSolver(PencilMatrices):
         super().__init__(system)
         self.free = list[PETSc.Vec]()
         self.floating = system.scene.closed or floats(system.scene)
-        self.slow = False
+        self.slow, self.filled = False, 0
 
     def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
         """Assemble the pencil at the state ``x``, without the motions of symmetries, which may make it singular."""
@@ -193,17 +194,38 @@ class NonsymmetricSolver(PencilMatrices):
         return NonsymmetricPencil(self, state.turned)
 
 
-class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
+class NonsymmetricPencil:
     """The pencil of one state, whose rotation field is ``turned``: its eigenvalues, and products in its mass."""
 
     def __init__(self, shared: NonsymmetricSolver, turned: np.ndarray) -> None:
-        super().__init__(shared)
-        self.turned, self._one = turned, shared.system.scene.units.omega2
-        self._own = slice(*shared.matrix.getOwnershipRange())
+        self.system, self.turned, self._shared, self._filled = shared.system, turned, shared, shared.filled
+        self._one, self._own = shared.system.scene.units.omega2, slice(*shared.matrix.getOwnershipRange())
+
+    @property
+    def solver(self) -> NonsymmetricSolver:
+        """What made it; raises :class:`RuntimeError` where the matrices hold another state by now."""
+        if self._shared.filled != self._filled:
+            raise RuntimeError("The matrices hold another state by now: ask for this one again, by the solver's at().")
+        return self._shared
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """Tangent matrix ``S``, and constraints against motions of symmetries."""
+        return self.solver.matrix
+
+    @property
+    def mass(self) -> PETSc.Mat:
+        """Kinetic metric ``M``."""
+        return self.solver.mass
+
+    def _in_units(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """All of matrix and mass, in units of natural sizes."""
+        stiffness, mass = in_units(self.system, self.matrix, self.mass, self.solver.sizes)
+        return gathered(stiffness).real, gathered(mass).real
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
-        matrix = gathered(self.in_units()[0]).real
+        matrix = self._in_units()[0]
         size = abs(matrix).sum(axis=1).max()
         part = (matrix.T - matrix).tocoo()
         counted = abs(part.data) > NEGLIGIBLE * size
@@ -215,8 +237,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def about(self, target: float) -> Spectrum:
         """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""
-        stiffness, mass = (gathered(A).real for A in self.in_units())
-        return Spectrum(stiffness, mass, target / self._one, self._one)
+        return Spectrum(*self._in_units(), target / self._one, self._one)
 
     @cached_property
     def spectrum(self) -> Spectrum:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,10 +23,10 @@ from rodfem.tolerances import NEGLIGIBLE
 
 
 class PencilMatrices:
-    """Matrices of a pencil, allocated once, which the states of one system share; ``filled`` counts those states."""
+    """Matrices of a pencil, allocated once, which the states of one system share."""
 
     def __init__(self, system: System) -> None:
-        self.system, self.filled = system, 0
+        self.system = system
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
 
     @cached_property
@@ -36,37 +35,6 @@ class PencilMatrices:
         units = self.system.scene.units
         drift = float(np.sqrt(units.energy * units.omega2))
         return self.system.vector(self.system.fields.sizes, [drift] * len(self.system.drifts))
-
-
-Matrices = TypeVar("Matrices", bound=PencilMatrices)
-
-
-class StatePencil(Generic[Matrices]):
-    """The pencil of one state."""
-
-    def __init__(self, shared: Matrices) -> None:
-        self.system, self._shared, self._filled = shared.system, shared, shared.filled
-
-    @property
-    def solver(self) -> Matrices:
-        """What made it; raises :class:`RuntimeError` where the matrices hold another state by now."""
-        if self._shared.filled != self._filled:
-            raise RuntimeError("The matrices hold another state by now: ask for this one again, by the solver's at().")
-        return self._shared
-
-    @property
-    def matrix(self) -> PETSc.Mat:
-        """Tangent matrix ``S``, and constraints against motions of symmetries."""
-        return self.solver.matrix
-
-    @property
-    def mass(self) -> PETSc.Mat:
-        """Kinetic metric ``M``."""
-        return self.solver.mass
-
-    def in_units(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """The pencil for unknowns and eigenvalues in units of their natural sizes: see :func:`in_units`."""
-        return in_units(self.system, self.matrix, self.mass, self.solver.sizes)
 
 
 def in_units(system: System, matrix: PETSc.Mat, mass: PETSc.Mat, sizes: PETSc.Vec) -> tuple[PETSc.Mat, PETSc.Mat]:

@@ -28,7 +28,6 @@ from rodfem.linalg.matrices import places_in, shared
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.pencil import (
     PencilMatrices,
-    StatePencil,
     assemble_pencil,
     exclude_modes,
     in_units,
@@ -58,7 +57,7 @@ class Found(NamedTuple):
 
 
 class SymmetricSolver(PencilMatrices):
-    """Matrices and factorisations of the pencil, which the states of one system share: see :meth:`at`.
+    """The pencil of one state at a time, by :meth:`at`: its left-most eigenvalues, and counts below a number.
 
     ``scale`` is the size of the least eigenvalue, ``scaled`` matrix and mass in natural units.  The next computation
     starts at ``shift``: the first one, and one whose count finds any missing, moves it below all eigenvalues.
@@ -74,11 +73,11 @@ class SymmetricSolver(PencilMatrices):
         self.shift, self.factorisations, self.last = -self.scale, 0, np.zeros(0)
         self.deflated: list[PETSc.Vec] = []
         self._places: np.ndarray | None = None
+        self._drifts = 0
 
-    def at(self, x: PETSc.Vec) -> SymmetricPencil:
-        """Assemble the pencil of the state ``x``."""
+    def at(self, x: PETSc.Vec) -> SymmetricSolver:
+        """Assemble the pencil of the state ``x``; returns this solver."""
         system = self.system
-        self.filled += 1
         with system.clock("assembly"):
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
@@ -87,8 +86,8 @@ class SymmetricSolver(PencilMatrices):
             if not system.scene.units.ordinary:
                 for mode in self.deflated:
                     mode.pointwiseDivide(mode, self.sizes)
-        self._factored = np.nan
-        return SymmetricPencil(self)
+        self._factored, self._drifts = np.nan, system.phase.count
+        return self
 
     def factor(self, sigma: float) -> None:
         """Factor ``S - sigma M``, unless that is what was factored last."""
@@ -108,22 +107,13 @@ class SymmetricSolver(PencilMatrices):
         self._factored = sigma
         self.factorisations += 1
 
-
-class SymmetricPencil(StatePencil[SymmetricSolver]):
-    """The pencil of one state: its left-most eigenvalues, and counts below a number."""
-
-    def __init__(self, shared: SymmetricSolver) -> None:
-        super().__init__(shared)
-        self.inertia, self._drifts = shared.inertia, shared.system.phase.count
-
     def leftmost(self, number: int) -> Found:
         """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer.
 
         More are computed where a count finds any missing: a Krylov method finds the second of two equal ones late.
         """
-        own = self.solver
         with self.system.clock("stability"):
-            modes = self._solve(number, 1) if len(own.last) else None
+            modes = self._solve(number, 1) if len(self.last) else None
             if modes is None or not modes.certified:
                 self.go_below()
                 for extra in (1, 4, 14):
@@ -137,7 +127,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
                 "richer discretisation."
             )
         spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()  # equal ones have none
-        own.shift = modes.values[0] - 0.1 * spread
+        self.shift = modes.values[0] - 0.1 * spread
         values, vectors = self.system.scene.units.omega2 * modes.values, self.unscaled(modes.vectors)
         return modes._replace(values=values, vectors=vectors)
 
@@ -145,17 +135,16 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         """The same vectors in the rod's units, in place."""
         if not self.system.scene.units.ordinary:
             for vector in vectors:
-                vector.pointwiseMult(vector, self.solver.sizes)
+                vector.pointwiseMult(vector, self.sizes)
         return vectors
 
     def go_below(self) -> None:
         """Move the shift below the spectrum; raises :class:`ConvergenceError` if it has no lower end."""
-        own = self.solver
-        step = max(abs(own.shift), own.scale)
+        step = max(abs(self.shift), self.scale)
         for _ in range(40):
-            if self.below(own.shift) == 0 and not self._shift_is_an_eigenvalue():
+            if self.below(self.shift) == 0 and not self._shift_is_an_eigenvalue():
                 return
-            own.shift -= step
+            self.shift -= step
             step *= 3
         raise ConvergenceError(
             "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness; give the rod a "
@@ -164,20 +153,20 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def _shift_is_an_eigenvalue(self) -> bool:
         """Whether that is so but for round-off, which a count does not show: a step of inverse iteration does."""
-        own, mode = self.solver, self.inertia.seed(0)
+        mode = self.inertia.seed(0)
         mode.scale(1.0 / self.system.norm(mode))
         grown = mode.duplicate()
-        own.factors.solve(own.scaled[1] * mode, grown)
-        return not self.system.norm(grown) * HIT * abs(own.shift) < 1.0
+        self.factors.solve(self.scaled[1] * mode, grown)
+        return not self.system.norm(grown) * HIT * abs(self.shift) < 1.0
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``; :class:`ConvergenceError` if the count breaks down."""
-        self.solver.factor(sigma)
-        return self.inertia.counted(self.solver.factors, sigma, self._drifts)
+        self.factor(sigma)
+        return self.inertia.counted(self.factors, sigma, self._drifts)
 
     def certifies(self, values: np.ndarray) -> bool:
         """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
-        small = SAME_EIGENVALUE * max(abs(values).max(), self.solver.scale)
+        small = SAME_EIGENVALUE * max(abs(values).max(), self.scale)
         distinct = values < values[-1] - small
         return (
             self.below(values[0] - small) == 0
@@ -187,20 +176,19 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def _solve(self, number: int, extra: int) -> Found:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``."""
-        own = self.solver
-        own.factor(own.shift)
-        if not own.factors.regular:
-            own.shift -= own.scale
+        self.factor(self.shift)
+        if not self.factors.regular:
+            self.shift -= self.scale
             return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
-        reach = max(values[-1] - own.shift, own.scale) if len(values) else np.inf
-        if len(values) and values[0] - own.shift < HIT * reach:
-            own.shift -= reach
+        reach = max(values[-1] - self.shift, self.scale) if len(values) else np.inf
+        if len(values) and values[0] - self.shift < HIT * reach:
+            self.shift -= reach
             return self._solve(number, extra)
         if len(values) < number:
             return Found(values, vectors, errors)
-        own.last = sum(vector.array_r for vector in vectors)
-        cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), own.scale)
+        self.last = sum(vector.array_r for vector in vectors)
+        cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), self.scale)
         known = int((values < cut).sum())
         return Found(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 
@@ -209,10 +197,10 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
         More than there are finite ones break the Krylov space down.
         """
-        own, start = self.solver, self.inertia.seed(1)
-        if len(own.last):
+        start = self.inertia.seed(1)
+        if len(self.last):
             start.scale(1e-6 / self.system.norm(start))  # a space that is invariant already would miss all else
-            start.array[:] += own.last
+            start.array[:] += self.last
         solver = self.eigensolver(number, start)
         with slepc_errors():
             solver.solve()
@@ -225,9 +213,9 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
                 "discretisation."
             )
         # purified: (mu - sigma) (S - sigma M)^-1 M x has no arbitrary massless parts
-        right = np.stack([(own.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
-        for value, vector, column in zip(values, vectors, own.factors.solve_all(right).T, strict=True):
-            vector.array[:] = (value - own.shift) * column
+        right = np.stack([(self.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
+        for value, vector, column in zip(values, vectors, self.factors.solve_all(right).T, strict=True):
+            vector.array[:] = (value - self.shift) * column
         errors = self.backward_errors(values, vectors)
         stiffness, mass = self._norms()
         true = [i for i in range(len(values)) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
@@ -244,35 +232,34 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def eigensolver(self, number: int, start: PETSc.Vec) -> SLEPc.EPS:
         """Set up shift-invert for the ``number`` eigenvalues nearest to the shift that was factored."""
-        own = self.solver
-        solver = eigensolver(*own.scaled, "rodfem_")
+        solver = eigensolver(*self.scaled, "rodfem_")
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        solver.setTarget(own.shift)
+        solver.setTarget(self.shift)
         # in a Krylov space with fewer vectors restarts cost more
         solver.setDimensions(number, number + max(number, 6))
         solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of the eigenvalues is the square
         solver.setPurify(False)
         solver.setInitialSpace([start])
-        if own.deflated:
-            solver.setDeflationSpace(own.deflated)
+        if self.deflated:
+            solver.setDeflationSpace(self.deflated)
         transform = solver.getST()
         transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
         ksp = transform.getKSP()
         ksp.setType("preonly")
         ksp.getPC().setType("python")
-        ksp.getPC().setPythonContext(_Inverse(own.factors))
+        ksp.getPC().setPythonContext(_Inverse(self.factors))
         with slepc_errors():
             solver.setFromOptions()
         return solver
 
     def _norms(self) -> list[float]:
         """Sizes of stiffness and mass."""
-        return [matrix.norm(PETSc.NormType.INFINITY) for matrix in self.solver.scaled]
+        return [matrix.norm(PETSc.NormType.INFINITY) for matrix in self.scaled]
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
         stiffness, mass = self._norms()
-        errors, (S, M) = [], self.solver.scaled
+        errors, (S, M) = [], self.scaled
         for value, vector in zip(values, vectors, strict=True):
             residual = S * vector - M * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
