@@ -54,22 +54,16 @@ SLOW, SOLVED = 1e-3, 1e-9
 
 @dataclass(frozen=True)
 class Frequencies:
-    """Eigenvalues ``values`` (k,) with ``errors`` (k,), those of ``1 / (mu - shift)`` over the greatest.
+    """Eigenvalues of a state with their vectors."""
 
-    ``kinds`` names the motions (:mod:`rodfem.stability.motion_names`).  ``vectors`` (n, k), n unknowns of this rank,
-    are complex, or real if all eigenvalues are; ``weighed`` (n, k) are their products with the mass.  ``one`` is the
-    natural size of the eigenvalues.  A ``floating`` rod, which nothing holds, has zero ones.  Of a rod that is held and
-    has slow motions ``floor`` is what round-off makes of zero; it is infinite otherwise.
-    """
-
-    values: np.ndarray
-    errors: np.ndarray
-    kinds: tuple[str, ...] = ()
-    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    one: float = 1.0
-    floating: bool = False
-    floor: float = np.inf
+    values: np.ndarray  # (k,)
+    errors: np.ndarray  # of 1 / (mu - shift) over the greatest (k,)
+    kinds: tuple[str, ...] = ()  # names of the motions
+    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of this rank, real if all values are
+    weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # their products with the mass
+    one: float = 1.0  # natural size of the eigenvalues
+    floating: bool = False  # whether nothing holds the rod: some are zero
+    floor: float = np.inf  # what round-off makes of zero, of a rod that is held and has slow motions
 
     @property
     def far(self) -> float:

@@ -18,9 +18,8 @@ Round-off ``dT`` moves a simple eigenvalue by up to ``|dT| |z|`` for its right a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -68,28 +67,20 @@ def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix, sp.
     return heavy, lower, lower
 
 
-@dataclass(frozen=True)
-class Eigenpairs:
-    """Eigenvalues ``nu`` (k,) of ``T``, the greatest first, and their ``right`` vectors (r, k), or those of ``T^t``.
+class Eigenpairs(NamedTuple):
+    """Eigenvalues of ``T``, the greatest first."""
 
-    ``noise`` (k,) is what round-off may make of ``nu``; ``error`` (k,) the residual over the size of ``T``.  Of all
-    eigenvalues there are ``left`` vectors (k, r), biorthonormal to the right ones.  ``vectors`` (n, k) of the pencil
-    are known of a large one.
-    """
-
-    nu: np.ndarray
-    right: np.ndarray
-    noise: np.ndarray
-    error: np.ndarray
-    left: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    vectors: np.ndarray | None = None
+    nu: np.ndarray  # (k,)
+    right: np.ndarray  # vectors (r, k), or those of T^t
+    noise: np.ndarray  # what round-off may make of nu
+    error: np.ndarray  # residual over the size of T
+    left: np.ndarray = np.zeros((0, 0))  # vectors (k, r) of all eigenvalues, biorthonormal to the right ones
+    vectors: np.ndarray | None = None  # those of a large pencil (n, k)
 
     def at(self, places: slice | np.ndarray) -> Eigenpairs:
         """Those at some places, without left vectors."""
         vectors = None if self.vectors is None else self.vectors[:, places]
-        return Eigenpairs(
-            self.nu[places], self.right[:, places], self.noise[places], self.error[places], vectors=vectors
-        )
+        return Eigenpairs(*(each[..., places] for each in self[:4]), vectors=vectors)
 
 
 class Spectrum:
@@ -126,7 +117,7 @@ class Spectrum:
         """``(S - a M)^-1 L`` (n, r)."""
         return self.solve(self.spread(np.eye(self.rank)))
 
-    @cached_property
+    @property
     def inverse(self) -> np.ndarray:
         """The same in the rows with mass (h, r)."""
         return self.images[self.heavy]
@@ -141,7 +132,7 @@ class Spectrum:
         """All finite eigenpairs, or 40 where the mass has a rank above :data:`ALL`."""
         if not self.complete:  # left vectors within the span of the right ones
             found = self.greatest(40)
-            return replace(found, left=np.linalg.pinv(found.right), vectors=self.vectors(found))
+            return found._replace(left=np.linalg.pinv(found.right), vectors=self.vectors(found))
         matrix, size = self.dual.T @ self.inverse, np.linalg.norm(self.lower.data)
         nu, right = np.linalg.eig(matrix)
         try:
@@ -166,7 +157,7 @@ class Spectrum:
             except ConvergenceError:
                 if self.rank > ALL:
                     raise
-        return (replace(self.pairs, right=self.pairs.left.T) if left else self.pairs).at(slice(number))
+        return (self.pairs._replace(right=self.pairs.left.T) if left else self.pairs).at(slice(number))
 
     def _nearest(self, number: int, *, left: bool) -> Eigenpairs:
         """The same by SLEPc; raises :class:`ConvergenceError` where it gives up."""
