@@ -40,22 +40,16 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from rodfem.errors import POINTWISE, InputError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix
 from rodfem.problem.ends import CLOSING_MOMENT
 from rodfem.stability.pencil import Blocks, Pencil, symmetry_modes, weighed_modes
 
-COORDINATES = ("full", "tangent", "compatible")
-
 
 @dataclass(frozen=True)
 class MappedPencil(Pencil):
-    """A pencil in coordinates that ``T`` (full m, m) maps to the full ones; ``symmetric`` but under a follower load.
-
-    The rows of spins are ``where["theta"]``.
-    """
+    """A pencil in coordinates that ``T`` maps to the full ones; rows of spins are ``where["theta"]``."""
 
     T: sp.csr_matrix
     symmetric: bool
@@ -70,11 +64,7 @@ class Coordinates:
     """Makes the :class:`MappedPencil` of states of one system in one set of coordinates, and vectors of the system."""
 
     def __init__(self, system: System, coordinates: str = "tangent") -> None:
-        """Number rows and columns; raises :class:`InputError` for coordinates that the formulation does not have."""
-        if coordinates not in COORDINATES:
-            raise InputError(f"Unknown coordinates {coordinates!r}: choose one of {', '.join(COORDINATES)}.")
-        if coordinates == "compatible" and not system.fields.formulation.centreline:
-            raise InputError("Compatible coordinates need the centreline", POINTWISE)
+        """Number rows and columns; ``coordinates`` are ``full``, ``tangent`` or, with a centreline, ``compatible``."""
         self.system, self.coordinates = system, coordinates
         self.blocks = Blocks(system, norms=coordinates == "full")
         f = system.fields

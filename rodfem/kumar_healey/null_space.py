@@ -35,18 +35,13 @@ Step = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Kernel:
-    """Basis ``Q2`` (m, m - p) of the kernel of ``C^t``; ``size`` is ``m``, ``padded`` that with rows added.
+    """Basis ``Q2`` (m, m - p) of the kernel of ``C^t``."""
 
-    ``steps`` are the factors of ``Q``, first to last.  The kernel of the sparse columns lives on the ``free`` rows
-    (k,); ``reflections`` are the factorisation of the dense columns there, as LAPACK's ``dgeqrf`` leaves it, and its
-    scalars.
-    """
-
-    size: int
-    padded: int
-    steps: list[Step]
-    free: np.ndarray
-    reflections: tuple[np.ndarray, np.ndarray]
+    size: int  # m
+    padded: int  # with rows added
+    steps: list[Step]  # the factors of Q, first to last
+    free: np.ndarray  # rows (k,) on which the kernel of the sparse columns lives
+    reflections: tuple[np.ndarray, np.ndarray]  # dgeqrf's factorisation of the dense columns there, and scalars
 
     @property
     def dimension(self) -> int:
@@ -88,13 +83,11 @@ class Kernel:
 def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
     """Kernel of ``C^t``, for ``C`` (m, p) and arclengths ``place`` (p,) of groups of columns, nan for a dense one.
 
-    Raises :class:`InputError` if a constraint depends on the others, if there are more than unknowns, or if a row
-    couples more than two neighbouring groups.
+    Raises :class:`InputError` if a constraint depends on the others, or if a row couples more than two neighbouring
+    groups.
     """
     C = sp.csr_matrix(C, copy=True)
-    m, p = C.shape
-    if p > m:
-        raise InputError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
+    m = C.shape[0]
     scale = float(abs(C.data).max()) if C.nnz else 1.0
     C.data[abs(C.data) < NEGLIGIBLE * scale] = 0.0
     C.eliminate_zeros()
@@ -111,10 +104,7 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
 
 
 def _eliminated(C: sp.csr_matrix, group: np.ndarray, scale: float) -> Kernel:
-    """Kernel of sparse columns ``C`` (m, p), each of a ``group`` (p,), the largest entry of which is ``scale``.
-
-    ``left`` and ``right`` (links, rows, width) are what the rows of each link couple to the groups on its two sides.
-    """
+    """Kernel of sparse columns ``C`` (m, p), each of a ``group`` (p,), the largest entry of which is ``scale``."""
     rows, left, right, empty = _links(C, group, scale)
     width, steps, free = left.shape[2], list[Step](), [np.setdiff1d(np.arange(C.shape[0]), rows)]
     padded = int(rows.max()) + 1

@@ -46,7 +46,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 from scipy.sparse.linalg import splu
 
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import ConvergenceError
 from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
 from rodfem.kumar_healey.null_space import kernel
 from rodfem.linalg.orthogonal import generic
@@ -54,7 +54,6 @@ from rodfem.stability.assessment import Assessor, Found, Method, SymmetricMethod
 from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.spectrum import FINITE, krylov
 
-INVERSES = ("saddle", "elimination")
 Solve = Callable[[np.ndarray], np.ndarray]
 
 
@@ -71,22 +70,13 @@ class ReducedPencil:
 
     def __init__(self, pencil: MappedPencil, inverse: str = "saddle") -> None:
         """Factor ``C``; raises :class:`InputError` for dependent constraints."""
-        if inverse not in INVERSES:
-            raise InputError(f"Unknown inverse {inverse!r}: choose one of {', '.join(INVERSES)}.")
         self.inverse, self.symmetric = inverse, pencil.symmetric
         self.K, self.C, self.M = pencil.K, pencil.C, pencil.M
         self.kernel = kernel(self.C, pencil.place)
 
     def near(self, number: int, target: float) -> Reduced:
-        """Return the ``number`` eigenvalues nearest to ``target``, of equally near ones the left.
-
-        Raises :class:`InputError` for more eigenvalues than there are rows, :class:`ConvergenceError` if fewer are
-        found, or the shifted matrix is singular.
-        """
-        n = self.kernel.dimension
-        if number > n:
-            raise InputError(f"{number} eigenvalues of a reduced pencil of size {n}: ask for at most {n}.")
-        solve = self.solver(target)
+        """Return the ``number`` eigenvalues nearest to ``target``; :class:`ConvergenceError` if fewer are found."""
+        n, solve = self.kernel.dimension, self.solver(target)
 
         def T(z: np.ndarray) -> np.ndarray:
             return self.kernel.project(solve(self.M @ self.kernel.expand(z)))
@@ -125,10 +115,7 @@ class ReducedPencil:
         return np.asarray(residuals / ((stiffness + abs(values) * mass) * np.linalg.norm(vectors, axis=0)))
 
     def solver(self, sigma: float) -> Solve:
-        """What makes of b (m, ...) the ``x`` in the kernel with ``Q2^t (K - sigma M) x = Q2^t b``.
-
-        Raises :class:`ConvergenceError` where the shifted matrix, or for elimination ``K - sigma M``, is singular.
-        """
+        """What makes of b (m, ...) the ``x`` in the kernel with ``Q2^t (K - sigma M) x = Q2^t b``."""
         m, p = self.C.shape
         shifted = self.K - sigma * self.M
         if self.inverse == "elimination":

@@ -198,7 +198,7 @@ class ModeFinder:
         weights = self._weights(found.values, self._responses(x, motions))
         vectors = [combine([vectors[i] for i in group], b) for group, b in weights]
         motions = [_sum([motions[i] for i in group], b) for group, b in weights]
-        names = [self._name(x, v, value) for v, value in zip(vectors, found.values, strict=True)]
+        names = map(self._name, [x] * len(vectors), vectors, found.values)
         symmetries = list(weighed_modes(self.system, symmetry_modes(self.system, x), mass).values())
         duals = [*(mass * v for v in vectors), *(dual for _, dual in symmetries)]
         moved = _stacked([*motions, *(self.motions.at(x, vector) for vector, _ in symmetries)])
@@ -300,10 +300,7 @@ class ModeFinder:
 
 
 def _moving(found: Frequencies, number: int) -> list[int]:
-    """Places of the ``number`` eigenvalues ``found`` nearest zero, nearest first: one of each pair, no rigid motion.
-
-    Raises :class:`ConvergenceError` where there are fewer.
-    """
+    """Places of the ``number`` eigenvalues ``found`` nearest zero, nearest first: one of each pair, no rigid motion."""
     places = [i for i in _upper(found.values) if found.kinds[i] != motion_names.RIGID]
     if len(places) < number:
         raise ConvergenceError(

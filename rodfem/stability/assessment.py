@@ -217,10 +217,7 @@ class Assessor:
 
 
 def assess(source: Any, x: PETSc.Vec, method: str = AUTO, number: int = 4) -> Verdict:
-    """Assess one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch.
-
-    ``source``, ``x``, ``method`` and ``number`` are as there.
-    """
+    """Assess one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch."""
     return Assessor(source)(x, method, number)
 
 
@@ -366,11 +363,7 @@ def sliced(pencil: SymmetricSolver, low: float, high: float) -> SLEPc.EPS | None
 
 
 def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
-    """Set up spectrum slicing for all eigenvalues of a pencil ``matrix - mu mass`` between ``low`` and ``high``.
-
-    ``room`` is what MUMPS has beyond its estimate, a percentage.  Options: ``-rodfem_slicing_eps_...``,
-    ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is an eigenvalue.
-    """
+    """Spectrum slicing for all eigenvalues between two; MUMPS has ``room`` beyond its estimate, a percentage."""
     solver = eigensolver(matrix, mass, "rodfem_slicing_")
     solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
     solver.setInterval(low, high)

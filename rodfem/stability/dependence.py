@@ -106,10 +106,7 @@ def weak_combinations(pencil: Pencil, length: float) -> Iterator[tuple[float, np
 
 
 def _distance(blocks: Blocks, x: PETSc.Vec, pencil: Pencil, w: np.ndarray) -> float:
-    """Distance of the state ``x`` from one where the gradients cancel along multipliers ``w`` (p,), to first order.
-
-    It is the root mean square over the unknowns, positions over the rod's length.
-    """
+    """Distance of the state ``x``, to first order, from one where the gradients cancel along multipliers ``w`` (p,)."""
     change, unit = pencil.C @ w, _units(pencil, blocks.system.scene.length)
     sigma = float(np.linalg.norm(unit * change))
     change *= unit**2 / (sigma or 1.0)

@@ -101,10 +101,7 @@ class MotionNames:
 
 
 def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
-    """Share of a vector of metric norm 1 in the span of others, and their weights in its projection.
-
-    ``gram`` and ``b`` are the products of those in the metric, with each other and with it.
-    """
+    """Share of a vector in the span of others, and weights in its projection, by products in the metric."""
     weights = np.linalg.pinv(gram, rcond=DEPENDENT, hermitian=True) @ b
     return float(weights @ b), weights
 

@@ -152,10 +152,7 @@ def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
-    """Basis of the span of complex ``vectors`` (n, k), orthonormal in the mass; zero for what has no mass.
-
-    ``weighed`` are their products with the mass; the ranks of ``comm`` share the rows.
-    """
+    """Basis of the span of ``vectors`` (n, k), orthonormal in the mass, by products with it; zero without mass."""
     parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
     sizes = np.maximum(parts, EPS * parts[-1])
     return np.asarray(vectors @ (turn / np.sqrt(np.where(sizes > 0.0, sizes, np.inf))))

@@ -80,7 +80,8 @@ class Eigenpairs(NamedTuple):
     def at(self, places: slice | np.ndarray) -> Eigenpairs:
         """Those at some places, without left vectors."""
         vectors = None if self.vectors is None else self.vectors[:, places]
-        return Eigenpairs(*(each[..., places] for each in self[:4]), vectors=vectors)
+        nu, right, noise, error = (each[..., places] for each in self[:4])
+        return Eigenpairs(nu, right, noise, error, vectors=vectors)
 
 
 class Spectrum:

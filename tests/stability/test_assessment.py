@@ -431,23 +431,6 @@ def test_elimination_by_the_paper_s_formula(coordinates: str) -> None:
         np.testing.assert_allclose(reduction.near(3, shift).values, REFERENCE, rtol=1e-9)
 
 
-def test_impossible_requests() -> None:
-    system, _ = plain("cord", "reduced", *SMALL, 20.0)
-    for coordinates, sentence in (("polar", "choose one of full, tangent, compatible"), ("compatible", "pointwise")):
-        with pytest.raises(InputError, match=sentence):
-            Coordinates(system, coordinates)
-    p = pencil("cord", "reduced", 20.0, False)
-    with pytest.raises(InputError, match="choose one of saddle, elimination"):
-        ReducedPencil(p, "magic")
-    with pytest.raises(InputError, match="ask for at most 49"):
-        ReducedPencil(p).near(50, -1.0)
-    for place in (np.full(5, np.nan), np.zeros(5)):
-        with pytest.raises(InputError, match="5 constraints on 4 unknowns"):
-            kernel(sp.csr_matrix(np.ones((4, 5))), place)
-    with pytest.raises(InputError, match="more than two neighbouring groups"):
-        kernel(sp.csr_matrix(np.ones((6, 3))), np.arange(3.0))
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("method", ["auto", "dense", "shift-invert", "slicing", "cayley"])
 def test_there_are_no_more_than_the_nodes_that_turn(method: str) -> None:
