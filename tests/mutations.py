@@ -377,7 +377,7 @@ TABLE = {
         "no-index-before-zero-stretch": (
             "if near.negative != a.negative:", "if False:", "adaptivity/test_zero_stretch.py"),
         "no-convexity-before-zero-stretch": (
-            "if reason := self._lost_convexity(branch, a, near):", "if reason := '':",
+            "self._require_convexity(branch, a, near)", "pass",
             "continuation/test_convexity.py"),
         "rows-beyond-a-meeting-are-kept": (
             "                branch.cut(special.point.arclength)\n",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import chain
 from math import inf
 
@@ -60,7 +61,7 @@ class SpecialSearch:
         self._before: Point | None = None
         self._nearest = -inf
         self._short: list[tuple[float, float, float]] = []  # from one arclength to another steps of at most this length
-        self._condensations: dict[int, Condensation] = {}
+        self._condensation = cache(lambda mesh: Condensation(meshes.solvers[mesh].inertia))
         self._phi: np.ndarray | None = None
         self._mesh = -1
         self._known: dict[int, tuple[Point, ReducedStiffness]] = {}
@@ -116,10 +117,9 @@ class SpecialSearch:
         """Special points among the last rows of a branch that only its end shows: those of singular rows."""
         return self._shown(ended=True) if len(self._open) > 1 else []
 
-    def _on(self, point: Point) -> Condensation:
-        if point.mesh not in self._condensations:
-            self._condensations[point.mesh] = Condensation(self.meshes.solvers[point.mesh].inertia)
-        return self._condensations[point.mesh]
+    def beyond(self, a: Point, b: Point) -> list[SpecialPoint]:
+        """Special points between a row and a point past the end of its branch."""
+        return self._between(a, b, ended=True)
 
     def _regular(self, point: Point) -> bool:
         """Whether no more eigenvalues are zero than all along, to working accuracy."""
@@ -137,7 +137,7 @@ class SpecialSearch:
     def _reduced(self, row: Point) -> ReducedStiffness:
         if id(row) not in self._known:
             assert self._phi is not None and row.tangent is not None
-            self._known[id(row)] = row, self._on(row).at(row.x, row.tangent, self._phi)
+            self._known[id(row)] = row, self._condensation(row.mesh).at(row.x, row.tangent, self._phi)
             if len(self._known) > PATIENCE + 2:
                 del self._known[next(iter(self._known))]
         return self._known[id(row)][1]
@@ -152,12 +152,14 @@ class SpecialSearch:
         piece, p, q = self._ends(a, b, self._prepare(a))
         worst = max((p.kept.reduced, q.kept.reduced), key=lambda found: found.rotated)
         if p.far == q.far and worst.rotated >= ROTATED:
-            piece, p, q = self._ends(a, b, self._border(self._on(b).improved(worst)))
+            piece, p, q = self._ends(a, b, self._border(self._condensation(b.mesh).improved(worst)))
         for halvings in HALVINGS:
             if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
                 break
             self._nearest = -inf
-            piece, p, q = self._ends(a, b, self._border(self._on(b).border(self._changing(piece, p, q, halvings))))
+            piece, p, q = self._ends(
+                a, b, self._border(self._condensation(b.mesh).border(self._changing(piece, p, q, halvings)))
+            )
         first, zeros = p.kept.reduced, min(n.kept.reduced.zero for n in (p, q))
         if zeros:
             values, vectors = np.linalg.eigh(first.H)
@@ -169,7 +171,7 @@ class SpecialSearch:
         """The border, on the mesh of a row, made there unless there is one."""
         if self._mesh != row.mesh or self._phi is None:
             self._mesh, self._nearest = row.mesh, -inf
-            self._border(self._on(row).border(row.x))
+            self._border(self._condensation(row.mesh).border(row.x))
         assert self._phi is not None
         return self._phi
 
@@ -180,7 +182,7 @@ class SpecialSearch:
         return phi
 
     def _ends(self, a: Point, b: Point, phi: np.ndarray) -> tuple[Piece, Node, Node]:
-        piece = Piece(self.meshes.solvers[b.mesh], self._on(b), a, b, phi)
+        piece = Piece(self.meshes.solvers[b.mesh], self._condensation(b.mesh), a, b, phi)
         assert a.tangent is not None and b.tangent is not None
         return piece, piece.node(a.x, a.tangent, self._reduced(a)), piece.node(b.x, b.tangent, self._reduced(b))
 

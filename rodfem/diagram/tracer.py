@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from math import isnan
+from typing import NoReturn
 
 from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible
 from rodfem.adaptivity.mesh_sequence import AccuracyControl, Gap, Gaps, Meshes, TooCoarse
@@ -35,6 +36,10 @@ REMEDIES = {
 """What to try where a branch ends for a reason, by its words."""
 NEAR_START = 8
 """Steps of a branch that begins near another special point are as short as its first for so many times their length."""
+
+
+class Ended(Exception):
+    """A branch ends where it is, for the reason that the exception names."""
 
 
 class Tracer:
@@ -152,20 +157,19 @@ class Tracer:
     def _advance(self, branch: Branch, history: list[Point]) -> bool:
         """Append points until the branch ends; False where both are as before a step that was too long."""
         self.specials.resume(history)
-        for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
-            if isinstance(item, str):
-                branch.ended = self._rest(branch) or item
-                self._say_early(branch)
-                return True
-            try:
-                reason = self._take(branch, history, item)
-            except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
-                branch.cut(self.specials.settled)
-                history[:] = [p for p in history if p.arclength <= self.specials.settled]
-                return False
-            if reason:
-                branch.ended = reason
-                return True
+        try:
+            for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
+                if isinstance(item, str):
+                    self._rest(branch)
+                    raise Ended(item)
+                self._take(branch, history, item)
+        except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
+            branch.cut(self.specials.settled)
+            history[:] = [p for p in history if p.arclength <= self.specials.settled]
+            return False
+        except Ended as end:
+            branch.ended = str(end)
+            self._say_early(branch)
         return True
 
     def _say_early(self, branch: Branch) -> None:
@@ -175,8 +179,8 @@ class Tracer:
                 words = f"{branch.name} ends: {branch.ended}; {remedy}."
                 self.observer.warn(Remark(words, branch.points[-1].load))
 
-    def _take(self, branch: Branch, history: list[Point], row: Point) -> str:
-        """Append a row to a branch, with the special points before it; why the branch ends there, or before."""
+    def _take(self, branch: Branch, history: list[Point], row: Point) -> None:
+        """Append a row to a branch, with the special points before it."""
         previous = history[-1]
         last = loop_end(branch, Step(self.solver, previous, row), self.high - self.low, self.here, self.alike)
         row = last or row
@@ -185,68 +189,65 @@ class Tracer:
         self.control.row(row, self.solver)
         self.zeros.check(self.solver, history, row, self.specials.undecided)
         if row.stretch <= 0:
-            return self._end_at_zero_stretch(branch, previous, row)
-        reason = self._lost_convexity(branch, previous, row)
-        if reason := reason or self._between(branch, previous, row, closed=bool(last)):
-            return reason
+            self._end_at_zero_stretch(branch, previous, row)
+        self._require_convexity(branch, previous, row)
+        self._between(branch, previous, row, closed=bool(last))
         history.append(row)
+        self._append(branch, row)
+        if last:
+            self._rest(branch)
+            raise Ended("closed loop")
+
+    def _append(self, branch: Branch, row: Point) -> None:
         branch.append(row)
         self.observer.progress(branch, row)
-        return self._rest(branch) or "closed loop" if last else ""
 
-    def _between(self, branch: Branch, a: Point, b: Point, *, closed: bool = False) -> str:
-        """Insert special points between two points, the second maybe where the branch began; a reason if it ends."""
+    def _between(self, branch: Branch, a: Point, b: Point, *, closed: bool = False) -> None:
+        """Insert special points between two points, the second maybe where the branch began."""
         with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.after(b)
-            if last := self._leaving(branch, specials, b):
-                return last
+            self._leave(branch, specials, b)
             step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
-            return self._insert(branch, specials + self._asked(step))
+            self._insert(branch, specials + self._requests(step))
 
-    def _leaving(self, branch: Branch, specials: list[SpecialPoint], b: Point) -> str:
-        """End a branch where it leaves the range before one of its ``specials``, found up to ``b``; the reason, if so.
+    def _leave(self, branch: Branch, specials: list[SpecialPoint], b: Point) -> None:
+        """End a branch where it leaves the range before one of its ``specials``, found up to ``b``.
 
         A branch that goes out of the range and comes back turns at a fold beyond it.
         """
         margin = ON_BOUND * (self.high - self.low)
         out = next((s for s in specials if not self.low - margin <= s.point.load <= self.high + margin), None)
         if out is None:
-            return ""
+            return
         a = self.here(max((p for p in branch.points if p.arclength < out.point.arclength), key=lambda p: p.arclength))
         begins = len(branch.points) == 1  # else what is at its first point has been found
         step = Step(self.solver, a, b, specials, begins=begins).up_to((self.low, self.high))
         branch.cut(a.arclength)
         known = [s for s in specials if s.point.arclength < a.arclength]
-        if reason := self._insert(branch, [*known, *step.singular, *self._asked(step)]):
-            return reason
+        self._insert(branch, [*known, *step.singular, *self._requests(step)])
         require_equilibrium(self.solvers[step.b.mesh], step.b)
-        branch.append(step.b)
-        self.observer.progress(branch, step.b)
-        return END_OF_RANGE
+        self._append(branch, step.b)
+        raise Ended(END_OF_RANGE)
 
-    def _asked(self, step: Step) -> list[SpecialPoint]:
+    def _requests(self, step: Step) -> list[SpecialPoint]:
         """What the plan asks for in a step."""
         return at_loads(step, self.plan.at) + self.events.between(step)
 
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
-        if len(branch.points) != 2 or branch.parent is None:
-            return
-        a, b = map(self.here, branch.points)
-        step = Step(self.solver, a, b, begins=a is branch.points[0])
-        for special in self._asked(step):
-            self.control.special(special)
-            branch.insert(special)
-            self.observer.special(branch, special)
+        if len(branch.points) == 2 and branch.parent is not None:
+            a, b = map(self.here, branch.points)
+            self._insert(branch, self._requests(Step(self.solver, a, b, begins=a is branch.points[0])))
 
-    def _rest(self, branch: Branch) -> str:
-        """Insert the special points that only the end of a branch shows; a reason if the branch ends at one."""
+    def _rest(self, branch: Branch) -> None:
+        """Insert the special points that only the end of a branch shows."""
         with self.solver.system.clock.scope("location"):
             specials = self.specials.rest()
-            return self._leaving(branch, specials, branch.points[-1]) or self._insert(branch, specials)
+            self._leave(branch, specials, branch.points[-1])
+            self._insert(branch, specials)
 
-    def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
-        """Insert special points into a branch, up to one at which it ends: then the reason."""
+    def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> None:
+        """Insert special points into a branch, up to one at which it ends."""
         for special in specials:
             if not special.unfolding > ROUND_OFF:  # else the mesh has an equilibrium next to it only
                 require_equilibrium(self.solvers[special.point.mesh], special.point)
@@ -261,48 +262,61 @@ class Tracer:
             self.observer.special(branch, special)
             if reason:  # it ends before rows, and loads asked for, that were taken for some of it
                 branch.cut(special.point.arclength)
-                return reason
-        return ""
+                raise Ended(reason)
 
-    def _lost_convexity(self, branch: Branch, a: Point, b: Point) -> str:
-        """Why the branch ends at the row ``a`` if the stored energy ceases to be convex between it and ``b``."""
-        why = Arc(self.solver, a, b).lost_convexity()
-        return self._rest(branch) or why if why else ""
+    def _require_convexity(self, branch: Branch, a: Point, b: Point) -> None:
+        """End a branch at the row ``a`` if the stored energy ceases to be convex between it and ``b``."""
+        if why := Arc(self.solver, a, b).lost_convexity():
+            self._rest(branch)
+            raise Ended(why)
 
-    def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> str:
-        """Add the last admissible point, where the smallest stretch vanishes; why the branch ends there, or before."""
+    def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> NoReturn:
+        """End a branch at the last admissible point, where the smallest stretch vanishes, or before."""
         last = last_admissible(self.solver, a, b)
         near = before_the_end(self.solver, a, last)
         if near is not None:
-            if reason := self._lost_convexity(branch, a, near):
-                return reason
+            self._require_convexity(branch, a, near)
             if near.negative != a.negative:  # what passes zero before is zero at the end once more
                 require_equilibrium(self.solvers[near.mesh], near)
-                if reason := self._between(branch, a, near):
-                    return reason
+                self._between(branch, a, near)
                 branch.append(near)
                 a = near
-        if reason := self._between(branch, a, last):
-            return reason
+        self._between(branch, a, last)
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
         if not isnan(end.error_estimate):
             self.control.check(end)
         branch.append(end.point)
         branch.special.append(end)
-        return "stretch reaches zero"
+        raise Ended("stretch reaches zero")
 
-    def _singular_ends(self, branch: Branch) -> None:
-        """Say that a range begins or ends at a singular state: no branch point is located there, and none followed."""
-        first, last, zeros = branch.points[0], branch.points[-1], persistent_zeros(branch.points)
-        known, said = {id(s.point) for s in branch.special if s.kind.branches}, list[Remark]()
-        if branch.parent is None and first.zero > zeros and id(first) not in known:
-            branch.singular_start = first.zero - zeros
-            said.append(Remark(branch.start_in_words(self.scene.load), first.load))
-        if branch.ended == END_OF_RANGE and last.zero > zeros and id(last) not in known:
-            where = f"{self.scene.load} = {last.load:.8g}"
-            said.append(Remark(f"{branch.name} ends at a singular state, at {where}: use a wider range.", last.load))
-        for remark in said:
-            self.observer.warn(remark)
+    def _singular_start(self, branch: Branch) -> None:
+        """Record that a range begins at a singular state: a branch point there is not located, and not followed."""
+        first = branch.points[0]
+        extra = first.zero - persistent_zeros(branch.points)
+        located = any(s.point is first and s.kind.branches for s in branch.special)
+        if branch.parent is None and extra > 0 and not located:
+            branch.singular_start = extra
+            self.observer.warn(Remark(branch.start_in_words(self.scene.load), first.load))
+
+    def _singular_end(self, branch: Branch, last: Point) -> None:
+        """Insert a branch point on the very end of the range, located on a piece of the branch that goes past it."""
+        previous, load = self.here(branch.points[-2]), last.load + 0.02 * (last.load - sum(self.span) / 2)
+        low, high = self.scene.parameters[self.scene.load].admissible
+        if previous.x is last.x or not low < load < high:
+            return
+        with self.solver.system.clock.scope("location"):
+            x, outcome = self.solver.at_load(last.x, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(f"there is no equilibrium at {self.scene.load} = {load:g}")
+            s = last.arclength + self.solver.system.distance(last.x, x)
+            further = self.solver.point(x, s, self.solver.load_tangent(x, load > last.load), outcome)
+            found = self.specials.beyond(previous, further)
+        width = 1e-6 * (self.high - self.low)
+        for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
+            if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
+                branch.replace({id(last): special.point})
+            branch.insert(special)
+            self.observer.special(branch, special)
 
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
@@ -324,8 +338,14 @@ class Tracer:
         self.events.finish(self.observer)
         branch.renumber()
         branch.explain()
-        self._singular_ends(branch)
+        self._singular_start(branch)
         last = branch.points[-1]
+        if branch.ended == END_OF_RANGE and last.zero > self.solver.system.active_drifts(last.x):
+            with self.without(
+                f"The last state, at {self.scene.load} = {last.load:g}, is singular, and was not resolved"
+            ):
+                self._singular_end(branch, last)
+            last = branch.points[-1]
         if not any(s.point is last for s in branch.special if s.kind != USER):
             branch.special.append(self.solver.given(END, last))
             branch.renumber()
