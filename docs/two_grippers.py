@@ -1,0 +1,87 @@
+"""The picture of docs/trades/two-grippers.md: 150 experiments, and the curve on which the pitchfork changes its kind.
+
+    git clone https://github.com/StructuresComp/Helix_Bifurcation_Types theirs
+    python docs/two_grippers.py theirs
+
+reads the measured curvatures at loss of stability from ``theirs/DataProcessing/PlotFunc/ExpDataSub.mat`` and
+``ExpDataSuper.mat``, computes each rod, prints the comparison, and draws ``docs/trades/two-grippers.png``.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.io import loadmat
+from scipy.optimize import brentq
+
+import rodfem
+from rodfem import Plan
+
+PAGE = Path(__file__).parent / "trades" / "two-grippers.md"
+CURVE = np.linspace(-0.55, 0.55, 12)
+"""Ratios C22 at which the C11 is sought at which the coefficient vanishes."""
+
+
+def program() -> SimpleNamespace:
+    """Names that the first block of the page defines."""
+    names: dict[str, Any] = {}
+    exec(re.findall(r"```python\n(.*?)```", PAGE.read_text(), flags=re.DOTALL)[0], names)
+    return SimpleNamespace(**names)
+
+
+def first_loss(page: SimpleNamespace, C11: float, C22: float) -> tuple[float, float]:
+    """Curvature at which the helix is lost, and the coefficient of the pitchfork there, negative if the rod jumps."""
+    rod = page.grippers(C11, C22)
+    (first, *_) = rodfem.trace(rod, plan=Plan(depth=1, error_bars=False)).special("branch point")
+    return first.point.load, first.law.coefficient
+
+
+def measured(folder: Path) -> dict[str, np.ndarray]:
+    """Rows C11, C22, kappa of the experiments by what the rod did."""
+    folder = folder / "DataProcessing" / "PlotFunc"
+    both = [loadmat(folder / f"ExpData{name}.mat") for name in ("Sub", "Super")]
+    rows = np.vstack([np.hstack([data[name] for name in ("C11", "C22", "Kappa", "Type")]) for data in both])
+    return {kind: rows[rows[:, 3] == number, :3] for number, kind in ((1, "jumped"), (0, "left gently"))}
+
+
+def change_of_kind(page: SimpleNamespace, C22: float) -> float:
+    """Ratio C11 at which the coefficient vanishes, to the right of a path on which the rod leaves gently."""
+
+    def coefficient(C11: float) -> float:
+        value = first_loss(page, C11, C22)[1]
+        return float(np.sign(value) * np.log1p(abs(value)))
+
+    gentle = 0.38 + 0.3 * C22
+    return float(brentq(coefficient, gentle, gentle + 0.35, xtol=1e-3))
+
+
+def main(folder: Path) -> None:
+    """Compute, print and draw."""
+    page, data = program(), measured(folder)
+    errors, right, count = [], 0, 0
+    figure = Figure(figsize=(7.0, 4.2), dpi=150, layout="constrained")
+    axes = figure.subplots()
+    for (kind, rows), mark in zip(data.items(), ("s", "o"), strict=True):
+        found = np.array([first_loss(page, C11, C22) for C11, C22, _ in rows])
+        errors.extend(found[:, 0] / rows[:, 2] - 1)
+        right += int(((found[:, 1] < 0) == (kind == "jumped")).sum())
+        count += len(rows)
+        axes.plot(rows[:, 0], rows[:, 1], mark, ms=4, label=f"experiment: {kind}")
+    curve = [change_of_kind(page, C22) for C22 in CURVE]
+    axes.plot(curve, CURVE, color="black", label="computed: the pitchfork's coefficient vanishes")
+    axes.set(xlabel=r"$C_{11} = \tau/\kappa$", ylabel=r"$C_{22} = \omega/\kappa$")
+    axes.legend(frameon=False)
+    figure.savefig(PAGE.with_suffix(".png"))
+    rms, mean = 100 * np.sqrt(np.mean(np.square(errors))), 100 * np.mean(errors)
+    print(f"rms {rms:.1f} %, mean {mean:+.1f} %; {right} of {count}")
+    print(*zip(np.round(curve, 4), CURVE.round(3), strict=True))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
