@@ -53,10 +53,7 @@ def writing(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def draft_of(path: Path) -> Iterator[Path]:
-    """Yield the path of a draft, which takes the place of ``path`` at the end, and goes where the block fails.
-
-    Folders on the way are made.  Raises :class:`InputError` where it cannot be written.
-    """
+    """Yield the path of a draft, which takes the place of ``path`` at the end, and goes where the block fails."""
     draft = path.with_name(f".{path.stem}.rodfem-part{path.suffix}")
     with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,11 +67,7 @@ def draft_of(path: Path) -> Iterator[Path]:
 
 
 def write_whole(contents: Mapping[Path, bytes]) -> None:
-    """Write files that belong together: all are written before the first takes its place.
-
-    They take their places one right after the other, the last one first.  Raises :class:`InputError` where one of them
-    cannot be written.
-    """
+    """Write files that belong together: all are written before the last one, then the others, take their places."""
     with ExitStack() as drafts:
         for path, data in contents.items():
             with drafts.enter_context(draft_of(path)).open("wb") as file:
@@ -84,21 +77,13 @@ def write_whole(contents: Mapping[Path, bytes]) -> None:
 
 
 def with_added(path: Path, add: Callable[[h5py.File], None], *, first: bool) -> bytes:
-    """Contents of an HDF5 file to which ``add`` adds, a new one if ``first``; the file itself stays as it is.
-
-    Raises :class:`MemoryError` where there is no room for it.
-    """
+    """Contents of an HDF5 file to which ``add`` adds, a new one if ``first``; the file itself stays as it is."""
     import h5py
 
-    try:
-        with h5py.File(path, "w" if first else "r+", driver="core", backing_store=False) as file:
-            add(file)
-            file.flush()
-            image: bytes = file.id.get_file_image()
-    except OSError as error:
-        if "unable to allocate memory" in str(error):
-            raise MemoryError(str(error)) from error
-        raise
+    with h5py.File(path, "w" if first else "r+", driver="core", backing_store=False) as file:
+        add(file)
+        file.flush()
+        image: bytes = file.id.get_file_image()
     return image
 
 
@@ -109,8 +94,7 @@ def with_added(path: Path, add: Callable[[h5py.File], None], *, first: bool) -> 
 def locked(folder: Path, comm: MPI.Comm) -> Iterator[None]:
     """Make ``folder``, and keep other processes from writing into it; collective over ``comm``.
 
-    The system frees the lock with the end of the process, however it ends.  Drafts of processes that were killed are
-    removed.  Raises :class:`InputError` on every rank where the folder cannot be written, or is in use.
+    The system frees the lock with the end of the process, however it ends.  Raises :class:`InputError` on every rank.
     """
     place = folder.resolve()
     if comm.bcast(place in FOLDERS):
@@ -178,6 +162,3 @@ def picture_at(path: Path, suffixes: Sequence[str]) -> None:
         raise InputError(f"The picture {path} is a folder: give a name in it, as in {path / 'picture.png'}.")
     with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
-        probe = path.parent / f".probe-{os.getpid()}"
-        probe.touch(exist_ok=False)
-        probe.unlink()

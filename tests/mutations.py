@@ -535,7 +535,7 @@ TABLE = {
     },
     "rodfem/problem/scene.py": {
         "a-mass-brings-a-unit-rotary-inertia": (
-            '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "problem/test_mass.py"),
+            '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "problem/test_one_place.py"),
     },
     "rodfem/problem/trials.py": {
         "constants-are-compared": (

@@ -67,10 +67,7 @@ def _summary(command: Callable[..., None]) -> str:
 
 
 def convert(words: Sequence[str]) -> None:
-    """Write a saved diagram for other programs: VTKHDF (ParaView), CSV, netCDF.
-
-    Raises :class:`~rodfem.errors.InputError` for files that are unfit.
-    """
+    """Write a saved diagram for other programs: VTKHDF (ParaView), CSV, netCDF."""
     from rodfem.file_format import refusal
     from rodfem.output.files import load_json
     from rodfem.output.states import FORMATS
@@ -135,10 +132,7 @@ def info(words: Sequence[str]) -> None:
 
 
 def list_diagrams(words: Sequence[str]) -> None:
-    """Saved diagrams below a folder: scene, date, size, what the first branch does.
-
-    Raises :class:`~rodfem.errors.InputError` where there is none.
-    """
+    """Saved diagrams below a folder: scene, date, size, what the first branch does."""
     parser = Parser(prog="rodfem list", description=_summary(list_diagrams))
     parser.add_argument("folder", type=Path, nargs="?", default=Path("results"), help="default: results")
     place = parser.parse_args(words).folder

@@ -104,20 +104,11 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ),
     # names, numbers, pairs
     ({"title": 3}, "title is 3"),
-    *(
-        ({"interval": x}, r"interval(\[\d\])? is")
-        for x in (None, (1.0,), "01", (False, True), {0.0, 1.0}, (0, 1j), (0, 10**400))
-    ),
+    *(({"interval": x}, r"interval(\[\d\])? is") for x in (None, (1.0,), "01", {0.0, 1.0}, (0, 10**400))),
     ({"interval": (0.0, 1e200)}, "A rod from 0 to 1e.200"),
     ({"interval": (1e16, 1e16 + 2), "ordinate": Ordinate("tip", 1e16, lambda r, q: 0.0)}, "short for its arclengths"),
-    *(
-        ({"span": x}, r"span(\[\d\])? is")
-        for x in (None, (1.0,), "03", (True, False), (0, 1j), {0: 1, 1: 2}, (0, 10**400))
-    ),
-    *(
-        ({"span": x}, "range of P from .* round-off")
-        for x in ((0, TINY), (1.0, 1.0 + 3e-16), (0, 1e300), (-HUGE, HUGE))
-    ),
+    *(({"span": x}, r"span(\[\d\])? is") for x in ((True, False), (0, 1j))),
+    *(({"span": x}, "range of P from .* round-off") for x in ((0, TINY), (1.0, 1.0 + 3e-16), (-HUGE, HUGE))),
     ({"rod": ["unshearable"]}, "kind of rod"),
     ({"load": ["P"]}, "is not a parameter"),
     *((numbers(**{name: 1.0}), "cannot have the name") for name in ("lambda", "__class__", "a/b")),
@@ -129,10 +120,7 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ({"breaks": ("0.5",)}, "One of the breaks is"),
     (lambda: {"attachments": (Attachment(True, mass=lambda c: 1.0),)}, "s is True"),
     # what functions of the constants return
-    *(
-        ({"ends": left((x, 0, 0))}, "component 1 of the position")
-        for x in (NAN, INF, "a", 1j, False, (0,), np.zeros(1))
-    ),
+    *(({"ends": left((x, 0, 0))}, "component 1 of the position") for x in (NAN, "a", 1j, False, np.zeros(1))),
     *(({"ends": left(x)}, "position of the left end") for x in ("abc", {0: 0, 1: 0, 2: 0}, {1, 2, 3}, 3)),
     *(({"ends": left(rotation=x)}, "rotation of the left end") for x in ("1000", (1j, 0, 0, 0), (INF, 0, 0, 0))),
     ({"ends": left(rotation=lambda c: (1j, 0, 0, 0))}, "component 1 of the rotation"),
@@ -147,11 +135,8 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ),
     ({"ends": (free(), TIP)}, "add up to .0.0, 0.0, -3.0., and nothing holds the rod against that"),
     *(
-        (
-            {"ends": (clamped(), hinged(x, lambda c: (0, 0, None), force=lambda c: (0, 0, -c.P)))},
-            "hinge of the right end",
-        )
-        for x in ("abc", (INF, 0, 0), (1j, 0, 0))
+        ({"ends": (clamped(), hinged(x, lambda c: (0, 0, None)))}, "hinge of the right end")
+        for x in ("abc", (1j, 0, 0))
     ),
     ({"inertia": Inertia(rho_A=lambda c: c.s - 0.2)}, "is negative"),
     ({"inertia": Inertia(rho_A=lambda c: TINY)}, "no floats"),
@@ -175,7 +160,6 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     (lambda: {"ends": (clamped(), elastic(None, lambda c: 1.0, directors=(0, 0, 0, 0)))}, "zero quaternion"),
     ({"ends": (clamped(), elastic(lambda c: (1.0, -2.0, 0.0), force=lambda c: (0, 0, -c.P)))}, "of -2 pushes away"),
     ({"energy": lambda v, k, c: 1.0}, "stored energy is flat"),
-    # a value, a cross-section or a text where a function or a number belongs
     ({"ends": (clamped((0, 1)), TIP)}, "position of the left end has 2 components: give 3"),
     ({"ends": (clamped(3.0), TIP)}, "position of the left end is 3.0: give a function"),
     ({"energy": section.circle(1.0, E=1.0, nu=0.3)}, r"is Section.*: give a function W.*, as section.energy\(rod\) is"),
@@ -204,7 +188,7 @@ PLANS: list[tuple[Callable[[], Any], str]] = [
     (lambda: Plan((0, TINY)), "as narrow as round-off"),
     (lambda: Plan(error_bars="no"), "error_bars is 'no'"),  # type: ignore[arg-type]
     (lambda: Plan(spectrum=10**10), "no more than 147 eigenvalues"),
-    *((lambda x=x: Plan(events=x), "events is") for x in (None, Event("a", lambda s: 1.0), {1})),
+    *((lambda x=x: Plan(events=x), r"events(\[0\])? is") for x in (None, Event("a", lambda s: 1.0), {1})),
     (lambda: event(lambda s: 1.0, 3), "name is 3"),
     (lambda: event(lambda s: 1.0, ""), "event has no name"),
     *((lambda x=x: event(x), "of is .*: give a function of 1") for x in (3, lambda: 1.0, lambda s, c: 1.0)),

@@ -1,14 +1,28 @@
-"""What acts at an end does not vary along the rod: ``c.s`` in it is refused, and still known elsewhere."""
+"""What acts at an end does not vary along the rod, what acts at one place is one; a mass alone is a slender rod's."""
 
 from __future__ import annotations
 
+from math import pi, sqrt
 from typing import Any
 
 import pytest
 import ufl
 from classics import SUPPORTS, column
 
-from rodfem import Attachment, Discretization, End, Plan, clamped, free, integral, pinned, sliding, trace
+from rodfem import (
+    Attachment,
+    Discretization,
+    End,
+    Inertia,
+    Plan,
+    Solver,
+    clamped,
+    free,
+    integral,
+    pinned,
+    sliding,
+    trace,
+)
 from rodfem.errors import SceneError
 
 
@@ -77,3 +91,15 @@ def test_what_is_one_place_but_for_round_off(places: tuple[float, float], breaks
     assert len(scene.joints) == 1
     found = trace(scene, Discretization(elements=4, degree=6), Plan(depth=0)).special("branch point")[0]
     assert abs(found.point.load - 2.4674011002723395 / places[0] ** 2) < found.error_estimate
+
+
+@pytest.mark.long
+@pytest.mark.short
+def test_a_mass_alone_is_that_of_a_slender_rod() -> None:
+    """Its frequency is that of the textbook; of torsion, with a rotary inertia about d3 alone, pi/2 over its root."""
+    slender = Inertia(rho_A=lambda c: 1.0), 3.516015268
+    for inertia, lowest in (slender, (Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)), pi / 2)):
+        stiff = {"B2": 4.0, "C": 1.0}
+        scene = column("mass", SUPPORTS["clamped-free"], (0.0, 1.0), inertia=inertia, constants=stiff)
+        solver = Solver(scene, Discretization(elements=4))
+        assert sqrt(solver.modes(solver.equilibrium(0.0), 1).value[0].real) == pytest.approx(lowest, rel=1e-6)

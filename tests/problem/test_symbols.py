@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import ufl
+from classics import column
 
 from rodfem import Attachment, Inertia, Ordinate, Scene, clamped, free
 from rodfem.errors import SceneError
@@ -21,21 +22,8 @@ SOFT, STIFF = (1.0, 1.0, 1.0), (9.0, 9.0, 9.0)
 
 def scene(factor: Callable[[Any], Any] = lambda c: 1.0, on: float = 1.0, end: Any = None, **changes: Any) -> Scene:
     """Column under a thrust with a ``factor`` that depends on a constant ``on``."""
-    given: dict[str, Any] = {
-        "energy": lambda v, k, c: bending_and_twist(k, SOFT),
-        "ordinate": Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        **changes,
-    }
-    return Scene(
-        name="flag",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        parameters={"P": 0.0, "on": on},
-        load="P",
-        ends=(clamped(), free(lambda c: (0.0, 0.0, -c.P * factor(c)), energy=end)),
-        span=(0.0, 6.0),
-        **given,
-    )
+    ends = clamped(), free(lambda c: (0.0, 0.0, -c.P * factor(c)), energy=end)
+    return column("flag", ends, (0.0, 6.0), constants={"on": on}, **changes)
 
 
 @pytest.mark.parametrize(
