@@ -61,7 +61,7 @@ _HOMES = {
         "problem.table": "tabulated path",
         "fem.fields": "Discretization",
         "diagram.plan": "Plan",
-        "continuation.step_control": "StepControl IndexStepControl",
+        "continuation.follow": "StepControl IndexStepControl",
         "problem.events": "Event",
         "app.run": "run",
         "diagram.diagram": "trace Diagram",

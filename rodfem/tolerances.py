@@ -7,7 +7,7 @@ matrices to the largest one.  Distances of states and lengths along a branch are
 square of the rotation, in radian.  What is absolute says so.
 
 All other constants stand at the top of the module that uses them.  A user changes ``Plan.accuracy``, ``Plan.steps``
-(:class:`~rodfem.continuation.step_control.StepControl`) and the mesh; the others belong to the methods, and a change of
+(:class:`~rodfem.continuation.follow.StepControl`) and the mesh; the others belong to the methods, and a change of
 one is a change of results (``tests/golden``).  ``tests/house/test_literals.py`` finds those without a name.
 """
 

@@ -14,8 +14,8 @@ from rows import verify
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.follow import StepControl
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver

@@ -204,7 +204,7 @@ def discretization_of(options: argparse.Namespace, own: Discretization | None) -
 
 def plan_of(options: argparse.Namespace) -> Plan:
     """Plan that the options ask for; raises :class:`InputError` for what is none."""
-    from rodfem.continuation.step_control import StepControl
+    from rodfem.continuation.follow import StepControl
     from rodfem.diagram.plan import Plan
 
     locus = options.locus

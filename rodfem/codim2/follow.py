@@ -36,8 +36,8 @@ from rodfem.codim2.locus import Locus, Mark, Row
 from rodfem.codim2.points import Codim2Points, place
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver
+from rodfem.continuation.follow import StepControl
 from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, DIVERGENCE, FLUTTER, FOLD, GAP, KINDS
-from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.checks import Convexity, QuadratureCheck
 from rodfem.fem.shape import halved

@@ -19,9 +19,9 @@ from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch import LAWS, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.follow import StepControl
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.observer import Observer, Recorder, Remark
-from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.search import Coexisting, equilibria_at, with_copies
 from rodfem.diagram.equilibria import check_start
 from rodfem.diagram.explorer import Explorer

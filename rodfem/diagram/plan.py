@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any
 
-from rodfem.continuation.step_control import StepControl
+from rodfem.continuation.follow import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.arguments import a, convert, each, interval, optional, real, reals, whole, yes_or_no

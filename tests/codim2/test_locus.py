@@ -29,7 +29,7 @@ from rodfem.codim2.follow import STEPS, locus
 from rodfem.codim2.locus import Locus
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.step_control import StepControl
+from rodfem.continuation.follow import StepControl
 from rodfem.diagram.diagram import trace
 from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError

@@ -19,7 +19,7 @@ from numpy.polynomial.legendre import leggauss
 import rodfem
 from rodfem import Branch, Discretization, Plan, Point, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.continuation.step_control import IndexStepControl, StepControl
+from rodfem.continuation.follow import IndexStepControl, StepControl
 from rodfem.errors import InputError, SceneError
 from rodfem.output.files import load_state, save_states
 
