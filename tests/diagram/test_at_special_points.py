@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from classics import pressed_ring
 
 from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, pinned, trace
 from rodfem.forms.energy import bending_and_twist
@@ -93,3 +94,32 @@ def test_equilibria_at_the_load_of_a_special_point() -> None:
         if special.kind == "fold":
             below, above = (len(diagram.at(lam + d)) for d in (-1e-3, 1e-3))
             assert abs(below - above) == 2 and len(found) == (below + above) / 2
+
+
+@pytest.mark.long
+def test_a_ring_at_its_critical_pressure() -> None:
+    """At P = 3 it is neutral in two directions.  At this mesh's load, 2e-5 less, a richer mesh's ring is stable."""
+    diagram = trace(pressed_ring(), Discretization("auto", 8, 4), Plan(depth=0))
+    point = diagram.special("branch point")[0]
+    assert 0 < abs(point.point.load - 3) < point.error_estimate
+    (here,) = diagram.at(point.point.load)
+    for found in (diagram.assess(point), here, diagram.solver(point).assess(point.point.x)):
+        assert (found.negative, found.undecided, found.stable) == (0, 2, None)
+        assert all(abs(m.value) <= m.uncertainty for m in found.soft)
+    assert all(m.uncertainty < ROUND_OFF for m in here.soft)
+
+
+@pytest.mark.long
+def test_a_second_soft_mode_at_a_fold() -> None:
+    """Ends that let the sections turn: by an angle a that costs ``(B1 - B2)/2 sin(a)^2`` times the curvature squared.
+
+    That is twice the energy of bending times ``B1 - B2``, with ``B2 = 1``.  On richer meshes the eigenvalue that
+    vanishes is farther from zero.
+    """
+    diagram = trace(bedded(1.0 + 1e-6), MESH, Plan(depth=1, most_branches=3))
+    folds = [s for s in diagram.special("fold") if s.multiplicity == 1]
+    assert len(folds) == 1 and folds[0].negative_before == 1
+    verdict = diagram.assess(folds[0])
+    assert (verdict.negative, verdict.undecided) == (0, 1)
+    (turning,) = [m for m in verdict.soft if m.name == "turning of the cross-sections about d3"]
+    assert abs(turning.value - 2e-6 * folds[0].point.energy) < turning.uncertainty < ROUND_OFF

@@ -36,13 +36,8 @@ def heavy(share: float) -> Scene:
         (lambda: heavy(0.0), "straight"),
         (lambda: heavy(1e-3), "first branch"),  # straight only as long as it has no weight
         (lambda: demo_cases.scene("cord"), "straight"),  # of curvatures that vanish, and strains that do not
-        (lambda: demo_cases.scene("ruler"), "plane"),  # as the scene says
         (lambda: replace(demo_cases.scene("ruler"), states=None), "first branch"),
-        (lambda: replace(demo_cases.scene("ring"), states=None), "ring"),
-        (lambda: classics.arch(0.5, dead=False), "first branch"),
         (lambda: classics.spring(3.0, 2.0), "first branch"),
-        (lambda: classics.timoshenko(50.0), "straight"),
-        (classics.beck, "straight"),
         (lambda: replace(classics.beck(), distributed=lambda c: (1e-3, 0.0, 0.0)), "first branch"),
     ],
 )

@@ -54,15 +54,6 @@ def test_a_load_that_is_asked_for_at_a_flutter_load(
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("width", [0.03, -0.1])
-def test_a_row_of_the_grid_at_a_flutter_load(width: float) -> None:
-    load = 1.5 * BECK
-    diagram = swept(1.0, 1.5, (load * (1 - width), load * (1 + width)))
-    (flutter,) = critical(diagram)
-    assert flutter[1] == pytest.approx(load, rel=1e-11) and sorted(flutter[2:]) == [2, 4]
-
-
-@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("share", "strong", "which", "to"), [(1.0, 1.5, 0, 25.0), (1.0, 1.5, 1, 25.0), (0.4, 10.0, 3, 4.0)]
 )

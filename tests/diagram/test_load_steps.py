@@ -48,14 +48,6 @@ def following(scene: Scene) -> Scene:
     )
 
 
-@pytest.mark.long
-def test_no_divergence_load_is_said() -> None:
-    """Where eigenvalues touch zero a secant method found none, and its exception left the program."""
-    scene = following(two_freedoms(lambda u, f2, c: u**3 / 3 - 0.5 * c.P * u**2 + 0.5 * f2, (-0.3, 0.4)))
-    diagram = trace(scene, Discretization("auto", 4, 3), Plan())
-    assert any("could not be located" in said for said in diagram.warnings)
-
-
 def test_a_load_that_takes_several_steps() -> None:
     """A cantilever with a lateral force of up to 50 at its tip."""
     solver = Solver(classics.lateral(), Discretization("reduced", 6, 6)).equilibria

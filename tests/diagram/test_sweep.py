@@ -8,20 +8,22 @@ from io import StringIO
 import classics
 import numpy as np
 import pytest
-from closed_forms import column, flutter
+from closed_forms import column, double, flutter
 from hemitropic_cases import specials
 from scipy.optimize import brentq
 
-from rodfem import Inertia, Ordinate, Plan, free
+from rodfem import Inertia, Ordinate, Plan, compat, free
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.diagram import trace
+from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_frequencies import curves, ranges_of
 from rodfem.problem.ends import End
 from rodfem.problem.scene import Scene
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 PILE = 64
 """States after which what PETSc keeps of matrices that are not used any more is destroyed."""
@@ -142,3 +144,41 @@ def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytes
     (point,) = specials(diagram[0], "flutter")
     assert np.isnan([point.error_estimate, point.ordinate_error]).all()
     assert any("No error of the flutter" in sentence for sentence in diagram.warnings)
+
+
+@pytest.mark.long
+@pytest.mark.alone
+@pytest.mark.parametrize("twisting", [1e-3, 1e-4])
+@pytest.mark.usefixtures("few_loads")
+def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
+    """A rod that is so soft in torsion that dozens of motions are slower than those that flutter, at Beck's load.
+
+    Of the softer one they are 5e5 times slower.
+    """
+    beck = classics.beck(span=(19.0, 22.0))
+    scene = replace(
+        beck,
+        parameters={**beck.parameters, "C": twisting},
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 10.0, c.C)),
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)),
+    )
+    mesh = Discretization("pointwise", 4, 6)
+    found = trace(scene, mesh, Plan())
+    (flutter,) = specials(found[0], "flutter")
+    assert abs(flutter.point.load - double(20.0, 120.0)[0]) <= flutter.error_estimate < 1e-9
+    assert not found.warnings
+    for method in ("auto", "dense", "shift-invert"):
+        assert [found.assess(found[0].points[row], method).negative for row in (0, -1)] == [0, 2]
+    (state,) = found.at(22.0)
+    assert (state.negative, state.stable) == (2, False)
+
+
+@pytest.mark.alone
+def test_what_petsc_keeps_of_matrices_is_destroyed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PETSc keeps what is destroyed until all ranks clean up: 39 kB a state here, unless they do."""
+    solver, cleaned = Solver(classics.beck(), Discretization("pointwise", 4, 6)).equilibria, list[int]()
+    x, eigensolver = solver.start(10.0), NonsymmetricSolver(solver.system)
+    monkeypatch.setattr(compat, "destroy_garbage", lambda comm: cleaned.append(eigensolver.filled))
+    for _ in range(128):
+        eigensolver.at(x)
+    assert cleaned == [64, 128]
