@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from hard import classical, heavy, published, snapping, springy_rings, stiffness, writhing
-from hard.case import ASKED, Change, Measured, compare, run, said, singular
+from hard.case import ASKED, Measured, compare, run, said, singular
 from literature.test_classics import CRITICAL
 
 Problem = Callable[[], Measured]
@@ -14,10 +14,8 @@ Problem = Callable[[], Measured]
 
 def critical(name: str) -> Measured:
     """Critical loads of a classical problem."""
-    scene, _, modes, loads = CRITICAL[name]
-    diagram = run(scene())
-    expected = [Change(load, i * modes, (i + 1) * modes) for i, load in enumerate(loads)]
-    return compare(singular(diagram[0]), expected, said(diagram))
+    diagram = run(CRITICAL[name][0]())
+    return compare(singular(diagram[0]), classical.changes(name), said(diagram))
 
 
 PROBLEMS: dict[str, Problem] = {

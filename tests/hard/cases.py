@@ -21,7 +21,6 @@ from hard import (
     stiffness,
     thrusts,
     uneven,
-    units,
     writhing,
 )
 from hard.case import Case
@@ -81,7 +80,7 @@ STIFFNESS = (
         LOAD,
         "metres and newtons of a molecule, and of a pipeline", "entries of the matrix from 1e-30 to 1e9", f"{EXACT}; "
         "the loads are those in the problem's own units to 1e-9", "Euler, Haringx, Timoshenko, Greenhill, Michell, ...",
-        "problem", units.critical, ("heavy", "greenhill"), classical.PROBLEMS,
+        "problem", classical.in_units, ("heavy", "greenhill"), classical.PROBLEMS,
     ),
     Case(
         INDEX, "an end nearly free to turn", "eigenvalues as small as the error of a state", "eigenvalues within "

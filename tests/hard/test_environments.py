@@ -100,19 +100,6 @@ def as_user(number: int) -> tuple[str, ...]:
     return before
 
 
-@pytest.mark.long
-def test_another_user() -> None:
-    """One whose home folder does not exist, and without a right to write into that of the output."""
-    nobody = as_user(65534)
-    with open_to_all() as place:
-        words = ("run", str(place / "rod.py"), *SMALL)
-        out = ("--output", str(place / "open" / "rod"))
-        said = one_sentence(run(*words, *out, before=nobody, HOME="/nonexistent", XDG_CACHE_HOME=None))
-        assert "The folder /nonexistent/.cache/fenics, which keeps compiled code, cannot be written" in said
-        said = one_sentence(run(*words, "--output", str(place / "none"), before=nobody))
-        assert "cannot be written (Permission denied)" in said
-
-
 def test_a_user_without_a_home() -> None:
     unknown = as_user(12345)
     with open_to_all() as place:
