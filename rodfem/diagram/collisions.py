@@ -95,7 +95,7 @@ def _shares(mine: Spectrum, others: Spectrum) -> np.ndarray:
 def same_negative(a: Spectrum, b: Spectrum) -> bool:
     """Whether the negative eigenvalues of two states, as many, are the same ones, by values or by vectors."""
     before, after = (np.sort(found.values[found.negative].real) for found in (a, b))
-    if np.allclose(after, before, rtol=1e-3, atol=0.0):
+    if np.allclose(after, before, rtol=1e-3, atol=0.0):  # near rigid motions vectors are round-off
         return True
     basis = b.pairs.right[:, b.negative].real
     return bool(inside(basis, b.coordinates(a)[:, a.negative].real).min() >= 1.0 - OUTSIDE)

@@ -131,7 +131,7 @@ def at_load(solver: BranchSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
 def require_balance(solver: BranchSolver, x: PETSc.Vec) -> None:
     """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
     system = solver.system
-    if system.drift(x) > 1e-7 * system.stiffness_scale:
+    if system.drift(x) > 1e-7 * system.stiffness_scale:  # of the lowest bending eigenvalue
         raise SceneError(
             f"There is no equilibrium at {system.scene.load} = {system.scalar(x):g}: nothing holds the rod against the "
             f"{' or the '.join(system.free_motions(x))}, and the loads drive it; hold that motion at one end, or "

@@ -86,7 +86,7 @@ def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
     (first, noise), (second, _) = (_nearest(at(point.x), indices[0].zero) for point in (a, b))
     # of a zero the mesh makes a value as it lies to the elements: two of one sign are alike
     alike = (noise > 0) & (first * second > 0)
-    return bool((alike | (abs(first - second) <= 1e-3 * abs(first) + noise)).all())
+    return bool((alike | (abs(first - second) <= 1e-3 * abs(first) + noise)).all())  # meshes are not symmetric
 
 
 def _nearest(found: Factored, zero: int) -> tuple[np.ndarray, np.ndarray]:

@@ -125,7 +125,7 @@ class Explorer(Tracer):
     def _primary(self) -> Branch:
         """First branch: its first state."""
         point, start = self._first(), self.span[0]
-        if point.stretch < 1e-6:
+        if point.stretch < 1e-6:  # no rod any more
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
                 f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."

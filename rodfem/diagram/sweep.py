@@ -105,7 +105,7 @@ class Sweep:
 
     def _known(self, load: float, others: Sequence[float] = ()) -> float:
         """An end of the range, or one of ``others``, from which a load differs by round-off; else that load."""
-        least = 1e-12 * max(map(abs, self.span))
+        least = 1e-12 * max(map(abs, self.span))  # a step that is less is round-off
         return next((other for other in (*self.span, *others) if abs(load - other) <= least), load)
 
     def _loads(self) -> tuple[list[float], list[float]]:
@@ -399,7 +399,7 @@ def mesh_of_frequencies(
         richer = _frequencies(System(scene, finer, comm, symmetries=symmetries), loads, number)
         change = max(_change(v[:number], w, scene.units.omega2) for v, w in zip(values, richer, strict=True))
         best, least, worse = (mesh, change, 0) if change < least else (best, least, worse + 1)
-        if worse >= (3 if least > 1e-6 else 1) or least < accuracy / 10:
+        if worse >= (3 if least > 1e-6 else 1) or least < accuracy / 10:  # less is round-off: one is enough
             break
         mesh, values = finer, richer
     return best, least

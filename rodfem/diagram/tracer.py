@@ -311,7 +311,7 @@ class Tracer:
             s = last.arclength + self.solver.system.distance(last.x, x)
             further = self.solver.point(x, s, self.solver.load_tangent(x, load > last.load), outcome)
             found = self.specials.beyond(previous, further)
-        width = 1e-6 * (self.high - self.low)
+        width = 1e-6 * (self.high - self.low)  # nearer is the last state
         for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
             if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
                 branch.replace({id(last): special.point})
