@@ -70,11 +70,9 @@ class SoftStates:
     ) -> bool:
         """Record the soft modes of a ``point``, and its index as far as they are decided; whether there are any.
 
-        On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
-        ``compare`` the index there is asked for; eigenvalues of another sign are soft, too.  Along a ``family`` of
-        equilibria at one load that of the branch itself is zero, at a special point those of its ``vanishing`` null
-        vectors.  Raises :class:`ConvergenceError` if constraints that depend on each other leave less than no negative
-        eigenvalue.
+        On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch; ``compare``
+        asks for the index there.  Along a ``family`` at one load the eigenvalue of the branch itself is zero, at a
+        special point those of its ``vanishing`` null vectors.  Raises :class:`ConvergenceError` for a negative index.
         """
         metric = self.solver.system.metric
         clear, self.uncompared = self._is_clear(point), ""
@@ -129,10 +127,7 @@ class SoftStates:
         return bool(point.nearest or (regular and regular.index and regular.index.nearest))
 
     def _differing(self, point: Point, fixed_load: bool) -> int:
-        """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one.
-
-        A row of a branch in doubt that the richer mesh does not have is in doubt, too.
-        """
+        """Number of eigenvalues of another sign on the richer mesh, or zero there alone; 1 for a row it has not."""
         with self.solver.system.clock.scope("error bars"):
             richer = self._companion(0)
             try:
@@ -163,11 +158,7 @@ class SoftStates:
     def _refined(
         self, point: Point, modes: list[SoftMode], fixed_load: bool, zeros: Sequence[PETSc.Vec]
     ) -> list[SoftMode]:
-        """The ``modes`` with values of richer meshes; of infinite uncertainty if those have no such state.
-
-        Null vectors, and the tangent of a family, the ``zeros``, are left out by their vectors: on a richer mesh
-        others may be nearer to zero.
-        """
+        """The ``modes`` but for ``zeros`` with values of richer meshes; of infinite uncertainty without them."""
         coarse = values = np.array([m.value for m in modes])
         out, soft = modes, bool((abs(values) < soft_limit(self.solver.inertia)).any())
         for level in range(2):  # meshes beyond that of the state
@@ -205,11 +196,9 @@ def _across(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], others: Sequence[PE
 
 
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
-    """Point on a richer mesh, and what was found when it was computed there.
+    """Point on a richer mesh, and what was found when it was computed there; or ConvergenceError.
 
-    Next to a ``soft`` mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere if it
-    fails. Raises :class:`ConvergenceError` if the mesh has no such point, with a soft mode also if it has another
-    state.
+    Next to a ``soft`` mode Newton's method slides away, or ends by chance: it is damped, and elsewhere if it fails.
     """
     system = richer.system
     given = system.damping
@@ -232,10 +221,9 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
 def _nearest(
     solver: BranchSolver, point: Point, number: int, zeros: Sequence[PETSc.Vec]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
+    """The ``number`` eigenvalues nearest zero but for those of ``zeros``, ascending, and their uncertainty.
 
-    Those of the vectors ``zeros`` at the ``point`` are no part of that number.  What arithmetic leaves open of the
-    state, one more step of Newton's method tells.
+    What arithmetic leaves open of the state, one more step of Newton's method tells.
     """
     found = solver.inertia.at(point.x)
     found.count()

@@ -111,10 +111,7 @@ class LocusPoint:
 
 
 class Plane:
-    """Lines in the plane of two parameters of the scene of a system, the first of which is the scene's load.
-
-    The ``width`` (2,) of their ``intervals`` scales them; ``sizes`` (2,) are their natural sizes.
-    """
+    """Lines in the plane of two parameters, the first of which is the scene's load, scaled by their intervals."""
 
     def __init__(self, system: System, parameter: str, intervals: tuple[Interval, Interval]) -> None:
         """Check parameter and bounds; raises :class:`SceneError`."""
@@ -214,9 +211,8 @@ class Criterion(ABC):
     def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
         """Point of the locus on the plane through a ``guess`` across its direction; raises :class:`ConvergenceError`.
 
-        Across a direction of the parameters alone that is a line of theirs.  ``near`` is a point of the locus whose
-        null vectors, or invariant subspace, are close by; ``reach`` bounds how far the state may move, in the metric.
-        Raises :class:`Destroyed` where the special point changes its kind.
+        The null vectors, or the invariant subspace, of a point ``near`` are close by; ``reach`` bounds how far the
+        state may move, in the metric.  Raises :class:`Destroyed` where the special point changes its kind.
         """
 
     @abstractmethod
@@ -381,11 +377,7 @@ class Collision(Criterion):
         return node, here
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
-        """Zero of ``D`` on the system's line of parameters, by secants.
-
-        These take ``D`` from the eigenvalues, and end near the zero, or where they no longer shrink.  The last digits
-        are by ``D`` of both subspaces, right and left.
-        """
+        """Zero of ``D`` on the system's line of parameters: by secants, the last digits by both subspaces."""
         t, other, before = 0.0, FIRST, np.inf
         now, x = self._measured(t, x, cluster)
         at_other = self._measured(other, x, cluster)[0].discriminant
@@ -429,10 +421,7 @@ class Collision(Criterion):
 
 
 def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None = None) -> int:
-    """Unstable eigenvalues but for ``size`` ones: those nearest to zero, or of an invariant subspace.
-
-    Its ``basis`` (n, size) is orthonormal in the mass.
-    """
+    """Unstable eigenvalues but for ``size`` ones: those nearest zero, or of the subspace of a ``basis`` (n, size)."""
     spectrum = pencil.spectrum
     own = -abs(spectrum.values) if basis is None else pencil.shares(basis)
     chosen = np.argsort(own, kind="stable")[: len(own) - size]

@@ -130,8 +130,7 @@ class Half:
         """Whether the curve through ``a`` leads to ``b``, on another side of its tangent, across a second curve.
 
         Two curves that nearly cross are the two sides of a gap: each turns, and a step may lead from one to the other.
-        In smaller and smaller steps towards the crossing it is seen which; next to a gap that may be taken for a
-        crossing they are one point.
+        Smaller and smaller steps towards the crossing tell.
         """
         here, step = a, (b.s - a.s) / 2
         while step > 0.1 * GAP:
@@ -208,10 +207,9 @@ class RicherMesh:
         self.criterion = criterion_of(self.richer.solver, plane, kind, self._transferred(near))
 
     def compare(self, node: LocusPoint) -> tuple[list[float], bool]:
-        """Bounds of the errors of both parameters, and whether the mesh resolves the state and its null vectors.
+        """Bounds of the errors of both parameters, and whether the mesh resolves the state; or ConvergenceError.
 
-        Distances are across the curve, but for turning points and ends to those of the other curve.  Raises
-        :class:`ConvergenceError`.
+        Distances are across the curve, but for turning points and ends to those of the other curve.
         """
         near, resolved = self._transferred(node), True
         if node.sought is None:
@@ -320,10 +318,7 @@ class _Curve:
         self.marks |= {self.start + i: kind for i, kind in onwards.marks.items()}
 
     def errors(self, number: int) -> tuple[np.ndarray, list[int]]:
-        """Bounds (n, 2) of the errors of marked rows and a ``number`` of others, and which rows are not resolved.
-
-        They are nan at rows that were not compared, and inf where the richer mesh finds no point.
-        """
+        """Bounds (n, 2) of the errors of marked rows and a ``number`` of others, nan elsewhere; rows not resolved."""
         error = np.full((len(self.nodes), 2), np.nan)
         unresolved = set(range(len(error))) if self.doubtful else set[int]()
         if not number:

@@ -99,8 +99,8 @@ class Place:
 def place(criterion: Criterion, node: LocusPoint, sought: Sought, windows: tuple[float, ...] = WINDOWS) -> Place:
     """Where ``sought`` is on the curve of a ``criterion`` through ``node``, close to it: the best of ``windows``.
 
-    These are half widths, as arclengths, from wide to narrow.  Windows that cannot be filled, or that leave the bounds,
-    are passed over.  Raises :class:`ConvergenceError` where fewer than two can.
+    Windows that cannot be filled, or that leave the bounds, are passed over.  Raises :class:`ConvergenceError` where
+    fewer than two can.
     """
     best: Place | None = None
     other: Place | None = None
@@ -155,10 +155,7 @@ class Codim2Points:
         self.criterion, self.plane = criterion, criterion.plane
 
     def between(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> tuple[list[Row], str]:
-        """Rows between two nodes, in their order, and why the curve ends there; empty where it does not.
-
-        ``a`` and ``b`` are one after the other, and ``before`` is the node before them, None if there is none.
-        """
+        """Rows between two nodes, with the one ``before`` them, and why the curve ends there, or nothing."""
         if _reverses(a, b, NONE * self.plane.width):
             coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
             if coupling is None or _coupling_vanishes(coupling, a, b, 0.05):
@@ -286,10 +283,7 @@ class Codim2Points:
         return replace(end, rest=end.rest + len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0)))
 
     def _end(self, a: LocusPoint, b: LocusPoint, share: float, end: LocusPoint | None) -> tuple[LocusPoint, str]:
-        """The last row and words for its place: ``end``, or if that is not between the nodes, on their cubic.
-
-        There the line through both values of what vanishes is zero, at a ``share`` of the step.
-        """
+        """The last row and words for its place: ``end``, or if that is not in the step, at a ``share`` of it."""
         if end is None or self.criterion.length(end.p - a.p, end.x - a.x) > b.s - a.s:
             end = _within(self._on_cubic(a, b, a.s + share * (b.s - a.s)), a, b)
         each = zip(self.plane.names, end.p, end.located_to, strict=True)

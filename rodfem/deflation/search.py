@@ -124,10 +124,7 @@ class Deflation:
                 return
 
     def approach(self, x: PETSc.Vec) -> NewtonResult:
-        """Deflated Newton steps from ``x``, in place, until a plain step is small.
-
-        A step is never longer than ``LARGEST``, and is halved while it leads to where the stored energy has no value.
-        """
+        """Deflated Newton steps from ``x``, in place, none longer than ``LARGEST``, until a plain step is small."""
         system = self.system
 
         def iteration(fresh: bool) -> Correction | None:
@@ -287,11 +284,10 @@ def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
 def equilibria_at(
     solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
 ) -> list[Point]:
-    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
+    """Equilibria of traced branches at exactly ``load``, each once, which a search for further ones deflates.
 
-    A row at that load is one; none counts twice, as where branches begin and end at one state, or what the symmetries
-    carry into each other.  Raises :class:`ConvergenceError` where there is none between two points on either side of
-    the load.  ``here`` brings points of ``branches`` to the mesh of ``solver``, where they are on others.
+    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.  ``here`` brings
+    points of ``branches`` to the mesh of ``solver``.
     """
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
