@@ -289,11 +289,7 @@ class Factored:
                 own.move(sigma)
                 own.factors(own.matrix)
                 own.factored = self._filled
-        return self.counted()
-
-    def counted(self) -> int:
-        """The same below the shift that was factored; raises :class:`ConvergenceError` if the count breaks down."""
-        return self._own().counted(self.factors, self.shift, self.drifts)
+        return own.counted(own.factors, own.shift, self.drifts)
 
     def count(self) -> Index:
         """Index; two factorisations, the last of which serves :meth:`nearest`."""

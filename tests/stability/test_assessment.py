@@ -28,8 +28,6 @@ from rodfem.problem.scene import Inertia
 from rodfem.stability import METHODS, find
 from rodfem.stability.assessment import Assessor, Method, assess
 from rodfem.stability.dependence import named, smallest_singular, weak_combinations
-from rodfem.stability.inertia import Inertia as Count
-from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import Blocks, Pencil
 
 pytestmark = pytest.mark.alone
@@ -221,24 +219,6 @@ def test_no_mass_at_all(method: str) -> None:
     with pytest.raises(SceneError, match="give it a mass or a rotary inertia"):
         Assessor(solver.system)(x, method, 2)
     assert Assessor(solver.system)(x, "count").stable
-
-
-@SERIAL
-def test_quotients_decide_within_a_wide_band() -> None:
-    """Where round-off of the count is said to be large, signs of eigenvalues inside are those of their quotients."""
-    solver = Solver(scene("cord"), Discretization("reduced", 8, 6)).equilibria
-    solver.system.set_phase(None)
-    count = Count(solver.system)
-    for load, negative in ((49.3475, 1), (49.3485, 0), (40.0, 1), (55.0, 0)):
-        x, _ = solver.at_load(solver.start(load), load)
-        there = count.at(x)
-        exact = decide(there).index
-        assert (exact.negative, exact.zero) == (negative, 0)
-        value = abs(float(there.nearest(1, accuracy=1e-8)[0][0]))
-        given, count.tolerance, count.resolution = (count.tolerance, count.resolution), 3 * value, 3 * value
-        found = decide(count.at(x))
-        count.tolerance, count.resolution = given
-        assert len(found.inside) == 1 and found.index == exact
 
 
 # --- rank of the constraints -------------------------------------------------------------------------------------
