@@ -62,11 +62,7 @@ def corrected(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.V
 
 
 class Arc:
-    """The branch of a ``solver`` from a point ``a`` to another one, ``b``, both on its mesh.
-
-    Places are arclengths; states are on planes across the polynomial of least degree through both points and what
-    tangents they have.
-    """
+    """The branch of a ``solver`` from a point ``a`` to another one, ``b``, both on its mesh; places are arclengths."""
 
     def __init__(self, solver: BranchSolver, a: Point, b: Point) -> None:
         self.solver, self.a, self.b = solver, a, b
@@ -141,9 +137,8 @@ def lost_between(
 ) -> float | None:
     """First ``t`` between 0 and 1 at which ``W`` is not convex along ``state(t)``, as it is along ``state(0)``.
 
-    The least eigenvalue of the second derivative of ``W`` (:mod:`rodfem.fem.checks`) is a cubic, by its values and
-    difference quotients at both ends.  Where that turns, and at the end, it may not be positive: ``holds(t)`` decides
-    by an equilibrium.  None where ``W`` stays convex.
+    The least eigenvalue of the second derivative of ``W`` is a cubic, by its values and difference quotients at both
+    ends.  Where that turns, and at the end, ``holds(t)`` decides by an equilibrium.  None where ``W`` stays convex.
     """
     if not convexity.alters:
         return None

@@ -413,9 +413,8 @@ def _interval(point: Point, at: dict[int, SpecialPoint], persistent: int, after:
 
 
 def merge_doubles(branch: Branch) -> None:
-    """Merge neighbouring branch points that are closer than the error of the discretisation.
+    """Merge neighbouring branch points that a mesh which lacks a symmetry of the rod has apart, by less than its error.
 
-    A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
     The rod itself may have them apart, so that the bars of the one point are to hold for each of them.
     """
     bars = {id(s): s.error_estimate for s in branch.special}
@@ -439,8 +438,7 @@ def merge_doubles(branch: Branch) -> None:
 def _double(branch: Branch, p: SpecialPoint, q: SpecialPoint, bar: float) -> bool:
     """Whether two neighbouring branch points are one within their ``bar``, as all rows between them are.
 
-    The bar of a point that the mesh does not resolve says nothing of its neighbour, and a branch that comes back to the
-    load at which it was passes two points there.
+    The bar of a point that the mesh does not resolve says nothing of its neighbour.
     """
     points = all(s.kind == BRANCH_POINT and s.test_function == "mu" and s.resolved is not False for s in (p, q))
     between = [x for x in branch.points if p.point.arclength <= x.arclength < q.point.arclength]

@@ -4,15 +4,13 @@
 with symmetries the rows are states of some orbits.  Where they are on these is arbitrary: a prediction stays where the
 last row is.
 
-*Tangent and index of a regular point* are those of one symmetric factorisation at that state.  At fixed load the saddle
-matrix ``S`` of a conservative rod is symmetric.  With ``F_lam``, the derivative of the equations in the load,
-``z = (-S^-1 F_lam, 1)`` is a tangent of the branch, and the inertia of the factors is the index
-(:mod:`rodfem.stability.inertia`).  ``S`` is singular at a fold, and a count says nothing about eigenvalues within its
-tolerance: both show in the same solves.  A block of vectors ``v`` is carried along the branch and iterated inversely,
-once a point; the least ``|v| / |S^-1 M v|`` is an upper bound of the distance of the nearest eigenvalue from zero, and
-an estimate as good as the block is rich in its vector: 1e-3 of a generic vector is added every time, and a vector whose
-eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  If that is too near zero, the tangent is by LU
-factors of the bordered matrix, and two shifts count.
+*Tangent and index of a regular point* are those of one symmetric factorisation at that state.  With ``F_lam``, the
+derivative of the equations in the load, ``z = (-S^-1 F_lam, 1)`` is a tangent, and the inertia of the factors of the
+saddle matrix ``S`` is the index (:mod:`rodfem.stability.inertia`).  ``S`` is singular at a fold, and a count says
+nothing about eigenvalues within its tolerance: both show in the same solves.  A block of vectors ``v`` is carried along
+the branch and iterated inversely, once a point; the least ``|v| / |S^-1 M v|`` is an upper bound of the distance of the
+nearest eigenvalue from zero, and an estimate as good as the block is rich in its vector, as 1e-3 of a generic vector is
+added every time.  If that is too near zero, the tangent is by LU factors of the bordered matrix, and two shifts count.
 """
 
 from __future__ import annotations
@@ -138,9 +136,8 @@ def between(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
 def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc.Vec) -> None:
     """Take from a prediction ``x`` and its ``direction``, in place, what moves the ``last`` state along its symmetries.
 
-    The phase conditions of a row are those of its prediction, and leave such a part as it is; an extrapolation of rows
-    that have one hands it on, from row to row a little more, until it is most of a step.  The motions ``g`` of the
-    ``system`` are orthonormal in the metric: ``direction - g (Mg . direction)`` is what remains of the direction.
+    The phase conditions of a row are those of its prediction, and leave such a part as it is; extrapolations would hand
+    it on until it is most of a step.  The motions of the ``system`` are orthonormal in the metric.
     """
     system.set_phase(last)
     phase, generators = system.phase, system.at(last).generators
@@ -237,10 +234,7 @@ class Step:
 
 
 class BranchSolver:
-    """Computes equilibria of one :class:`~rodfem.fem.system.System`, at given loads and along branches.
-
-    It owns what such a computation needs once: Newton's factors (in the system), the stability matrix, the shape.
-    """
+    """Computes equilibria of one :class:`~rodfem.fem.system.System`, at given loads and along branches."""
 
     def __init__(self, system: System, spectrum: int = 0) -> None:
         """Tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""

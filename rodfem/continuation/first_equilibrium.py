@@ -24,11 +24,9 @@ STRAYED = 0.3
 def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
     """First equilibrium at ``load``: the rod at rest if that is near one, else from the scene's start.
 
-    From there by Newton's method, or else by going downhill.  Newton's method begins without forces.  Where it strays
-    from a start that has an equilibrium next to it, found from the forces that balance the start best, that is the
-    first one, stable or not.  The way down is also taken where Newton's method ends at an unstable equilibrium that is
-    nowhere near the start.  Of a family of equilibria it is the one next to the start, whatever round-off would make of
-    it.
+    From there by Newton's method without forces at first, else with those that balance the start best: an equilibrium
+    next to the start is the first one, stable or not, and of a family of equilibria, too.  The way down is taken where
+    Newton's method fails, or ends at an unstable equilibrium that is nowhere near the start.
     """
     system = solver.system
     if (rest := _at_rest(solver, load)) is not None:

@@ -2,19 +2,13 @@
 
 The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector is
 Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The step is
-chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large where it does
-not.
+chosen such that the corrector moves a prediction by a set distance.
 
 A branch is the integral of its unit tangent in arclength, ``x_b - x_a = int_a^b t ds``.  With the tangents at the last
 rows interpolated (Adams-Moulton weights) what is left of that equation, the *defect*, is of a higher order in the step
 than the correction of a prediction.  Between rows of two branches it is at least their distance (Allgower & Georg,
 Introduction to Numerical Continuation Methods, 2003, 6.1, on path jumping): a step that has ended on another branch is
-halved.
-
-Newton's method ends with a small correction.  At the state of a row the equations themselves are evaluated: balance of
-forces and moments, tested with every shape function, the constraints, and the phase conditions.  What is left must be
-round-off: below :data:`VIOLATED` in units of the rod's own energy, or below the round-off of the product of the second
-variation with the state.  Quaternions have unit norm.
+halved.  At the state of a row the equations themselves are evaluated, tested with every shape function.
 """
 
 from __future__ import annotations
@@ -119,10 +113,9 @@ def follow(
 ) -> Iterator[Point | str]:
     """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
 
-    ``bounds`` are the least and the greatest load; the branch ends exactly on them, and has a point exactly at each
-    stop of the scene, where the tangent of the point becomes that of the other side.  The caller appends (and may
-    insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
-    point.
+    It ends exactly on the ``bounds`` of the load, and has a point exactly at each stop of the scene, where the tangent
+    of the point becomes that of the other side.  The caller appends (and may insert) points in ``points``.  ``reach``
+    bounds the step from a point.
     """
     solver.regular.restart()
     walk = _Walk(solver, points, steps, bounds)
@@ -222,11 +215,9 @@ class _Walk:
         return point
 
     def _to_load(self, known: list[Point], beyond: float, load: float) -> Point | None:
-        """Point exactly at ``load``; None where it is not accepted as any other point of the branch is.
+        """Point exactly at ``load``, a part of the step to the load ``beyond``; None where it is not accepted.
 
-        ``beyond`` is the load that a whole step leads to.  The step to ``load`` is a part of it, not the smallest
-        one, and Newton's method may go half as far from the prediction.  Tangent and work of the load at a stop are
-        those on the side from which the branch comes.
+        Tangent and work of the load at a stop are those on the side from which the branch comes.
         """
         last, solver, system = known[-1], self.solver, self.solver.system
         fraction = (load - last.load) / (beyond - last.load)

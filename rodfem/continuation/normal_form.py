@@ -159,10 +159,9 @@ def ordinate_along(solver: BranchSolver, x: PETSc.Vec, direction: PETSc.Vec) -> 
 def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -> NormalForm | None:
     """Normal form of the branch that leaves ``origin`` along ``direction``; None if nearby points do not determine it.
 
-    At a pitchfork the load is an even function of the amplitude, at a transcritical point it has a slope in it.
-    Polynomials through four amplitudes give leading coefficients.  Uncertain is what those through three miss, what a
-    slope of the load adds at a pitchfork, and what the location of the branch point leaves open of loads and ordinates
-    that are measured from it.  Of several scales the first at which the series is resolved is taken, else the best.
+    Uncertain is what polynomials through three of four amplitudes miss, what a slope of the load adds at a pitchfork,
+    and what the location of the branch point leaves open of loads and ordinates that are measured from it.  Of several
+    scales the first at which the series is resolved is taken, else the best.
     """
     row, best, seen = solver.row(direction), None, SEEN * origin.load_left
     for scale in (1.0, 1 / 4, 1 / 16, 1 / 64):
@@ -192,10 +191,7 @@ def alike(a: NormalForm, b: NormalForm) -> bool:
 def _at_scale(
     solver: BranchSolver, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, scale: float
 ) -> tuple[NormalForm, float, float] | None:
-    """Normal form by amplitudes of a scale, the part of the load that is odd, and its change at the least amplitude.
-
-    None where an equilibrium was not found at one of them.
-    """
+    """Normal form by amplitudes of a scale, the part of the load that is odd, and its change at the least amplitude."""
     amplitudes, points = AMPLITUDES * scale, list[tuple[float, float]]()
     for a in (*amplitudes, *-amplitudes):
         x = origin.x + direction * float(a)

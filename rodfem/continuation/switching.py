@@ -110,10 +110,9 @@ def start_branch(
     """First two points, and first index, of the branch that leaves ``special`` along ``direction``, one of ``ways``.
 
     The first one is the special point, and the index that right after it, None where it is not known: eigenvalues that
-    stay zero on the trunk without a symmetry need not on the branch.  The second one is nearer where its load is out of
-    the ``bounds`` or has turned back before it, or its index is not that with which the branch begins: the fold, or the
-    branch point, that says why is on the branch.  Nor is it farther away than the branch that it leaves began, from a
-    ``depth`` of 2 on: next to a nearly double point branches are short.  None where no point is found.
+    stay zero on the trunk without a symmetry need not on the branch.  The second one is before what happens early on
+    the branch, and from a ``depth`` of 2 on no farther away than the branch that it leaves began: next to a nearly
+    double point branches are short.  None where no point is found.
     """
     amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
     first, load = leave(solver, special, direction, amplitude), special.point.load
@@ -178,8 +177,7 @@ def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]
 
     Of two null vectors they are the zeros of the force that holds the rod in a direction.  Of more, Newton's method is
     started in random directions.  Each is taken once more as that in which what Newton's method finds is seen from the
-    branch point.  The null vectors are ``ways``, orthonormal, which are returned where nothing is found.  Of motions
-    that a continuous symmetry turns, each in its own circle, only the relative phase that the ways have is tried.
+    branch point.  The orthonormal null vectors, ``ways``, are returned where nothing is found.
     """
     n, found = len(ways), list[np.ndarray]()
     if n == 2:

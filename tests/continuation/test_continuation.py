@@ -14,7 +14,6 @@ import reference_values
 from hard.published import pressed
 from hard.writhing import clamped_rod
 from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
-from numpy.polynomial.legendre import leggauss
 
 import rodfem
 from rodfem import Branch, Discretization, Plan, Point, trace
@@ -23,11 +22,7 @@ from rodfem.continuation.follow import IndexStepControl, StepControl
 from rodfem.errors import InputError, SceneError
 from rodfem.output.files import load_state, save_states
 
-HALF = DEFAULT[3]
-points, weights = leggauss(12)
-GAUSS = tuple(float(load) for load in 0.6 + 0.1 * points)
-WEIGHTS = 0.1 * weights
-AT = (0.05, 0.5, *GAUSS, 0.9)
+AT = (0.05, 0.5, 0.9)
 
 
 @pytest.mark.long
