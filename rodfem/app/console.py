@@ -11,7 +11,6 @@ import signal
 import sys
 import webbrowser
 from collections.abc import Callable, Sequence
-from datetime import UTC, datetime
 from difflib import get_close_matches
 from pathlib import Path
 from shutil import get_terminal_size
@@ -151,12 +150,9 @@ def _diagram(file: Path) -> str:
     try:
         data = read_json(file, DIAGRAM, ("scene", "parameter", "branches"))
         with refusal(UNFIT.format(file)):
-            written = datetime.fromtimestamp(file.stat().st_mtime, UTC).isoformat()
-            date = str((data.get("origin") or {}).get("date") or written)[: HEADS["date"]]
-            branches = data["branches"]
-            special, words = sum(len(branch["special"]) for branch in branches), "no branches"
-            if branches:
-                words = in_sentences(data)[0].partition("\n")[0]
+            date, branches = str((data.get("origin") or {}).get("date", ""))[: HEADS["date"]], data["branches"]
+            special = sum(len(branch["special"]) for branch in branches)
+            words = in_sentences(data)[0].partition("\n")[0] if branches else "no branches"
             return _row(name, data["scene"], date, str(len(branches)), str(special), words)
     except InputError as trouble:
         return f"{name:<{HEADS['folder']}} {trouble}"
