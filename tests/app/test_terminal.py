@@ -77,9 +77,7 @@ def test_energy_is_that_of_the_rod_alone(folder: Path, printed: Any) -> None:
 @pytest.mark.parametrize(
     ("rod", "ignored", "better"),
     [
-        ("unshearable and inextensible", ["v1", "v2", "v3"], "flexible"),
         ("unshearable", ["v1", "v2"], "flexible"),
-        ("inextensible", ["v3"], "flexible"),
         ("flexible", [], ""),
     ],
 )
@@ -177,12 +175,3 @@ def test_an_equilibrium_that_there_is_not() -> None:
         hemitropic.equilibrium(1.5)
     with pytest.raises(rodfem.ConvergenceError, match=r"No equilibrium was found at lam = 0.5: go there in steps"):
         hemitropic.equilibrium(0.5, guess=hemitropic.equilibria.system.new_vector())
-
-
-@pytest.mark.long
-def test_a_saved_state_of_another_scene(folder: Path) -> None:
-    """An unshearable rod has a stretch, the one whose state was saved none."""
-    run(compressed("unshearable and inextensible"), MESH, Plan(error_bars=False), folder, figures=False, quiet=True)
-    stretched = rodfem.Solver(compressed("unshearable"), MESH)
-    with pytest.raises(rodfem.InputError, match="has no v, needed for the scene 'column': it was written for"):
-        stretched.restore(folder / "states.h5", "straight", 0)
