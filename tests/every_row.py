@@ -12,7 +12,7 @@ from typing import Any
 
 from golden_cases import cases, trace
 
-from rodfem.stability.assessment import assess
+from rodfem.stability.assessment import Assessor
 
 WITNESSES = ("count", "shift-invert", "reduction")
 """Methods that decide the index anew at each row."""
@@ -33,8 +33,8 @@ def disagreements(name: str, witnesses: tuple[str, ...] = WITNESSES) -> tuple[in
 def _index(solver: Any, point: Any, witness: str) -> int:
     """Index by a method: two shifts, or the number of negative eigenvalues that it finds."""
     if witness == "count":
-        return assess(solver, point.x, witness).negative
-    found = assess(solver, point.x, witness, point.negative + 2)
+        return Assessor(solver)(point.x, witness).negative
+    found = Assessor(solver)(point.x, witness, point.negative + 2)
     assert found.certified, witness
     return int((found.values < -solver.inertia.tolerance / solver.system.scene.length).sum())
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.stability.assessment import assess
+from rodfem.stability.assessment import Assessor
 
 
 def verify(follower: BranchSolver, branches: Sequence[Branch], explained: bool = True) -> None:
@@ -21,7 +21,7 @@ def verify(follower: BranchSolver, branches: Sequence[Branch], explained: bool =
         for row, point in enumerate(branch.points):
             if point.mesh != follower.mesh:
                 continue
-            verdict = assess(follower, point.x, "count")
+            verdict = Assessor(follower)(point.x, "count")
             recorded, counted = (point.negative, point.zero), (verdict.negative, verdict.zero)
             assert recorded == counted, f"{branch.name}, row {row}, load {point.load}: {recorded}, not {counted}"
             if point.tangent is not None and verdict.zero == follower.system.active_drifts(point.x):  # else singular

@@ -31,7 +31,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
 from rodfem.problem.arguments import Check, a, checked, count, each, number, path, text
 from rodfem.problem.scene import Scene
-from rodfem.stability.assessment import Verdict, assess
+from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.timing import Clock
 
@@ -222,7 +222,7 @@ class Solver:
         """
         x = self._state(point)
         check_number(self.scene, self.equilibria.system.fields.discretization, number)
-        verdict = assess(self.equilibria, x, method, number)
+        verdict = Assessor(self.equilibria)(x, method, number)
         if not self.equilibria.conservative:
             return replace(verdict, kink=self._quadrature.kink(x))
         special = point if isinstance(point, SpecialPoint) and point.kind.singular else None

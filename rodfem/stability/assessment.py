@@ -216,11 +216,6 @@ class Assessor:
             raise
 
 
-def assess(source: Any, x: PETSc.Vec, method: str = AUTO, number: int = 4) -> Verdict:
-    """Assess one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch."""
-    return Assessor(source)(x, method, number)
-
-
 class Method:
     """A way to the eigenvalues that decide the stability of states of one system."""
 

@@ -19,7 +19,7 @@ from rodfem.fem.newton import relax
 from rodfem.fem.symmetries import Symmetry, elementary_generators
 from rodfem.fem.system import System
 from rodfem.forms.energy import bending_and_twist
-from rodfem.stability.assessment import assess
+from rodfem.stability.assessment import Assessor
 
 
 def radial(c: Any) -> tuple[Any, ...]:
@@ -87,7 +87,7 @@ def circle_at(found: BranchSolver, p: float) -> Any:
 @pytest.mark.parametrize(("planar", "B2", "C"), [("e2", 1.0, 1.0), (None, 1.0, 1.0), (None, 1.3, 0.7)])
 def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) -> None:
     found = solver(planar, B2, C)
-    verdict = assess(found, circle_at(found, p), number=6)
+    verdict = Assessor(found)(circle_at(found, p), number=6)
     mu = ritz(p, (1.0, B2, C), planar is not None)
     translations = 2 if planar else 3
     assert verdict.negative == (mu < -1e-9).sum()

@@ -13,7 +13,7 @@ import pytest
 from rodfem import Discretization, End, Scene, SceneError, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.stability.assessment import assess
+from rodfem.stability.assessment import Assessor
 
 
 def scene(kind: str, balanced: bool = True) -> Scene:
@@ -54,7 +54,7 @@ def test_symmetries_without_a_potential(kind: str) -> None:
 def test_frequencies_beside_the_free_motion(kind: str, method: str) -> None:
     """Without a moment those of a pinned beam, each twice: (n pi)^4; the turning about the axis is left out."""
     found = solver(kind)
-    verdict = assess(found, straight(found, 0.0), method, 4)
+    verdict = Assessor(found)(straight(found, 0.0), method, 4)
     assert (verdict.negative, verdict.zero) == (0, 1)
     values = np.sort(verdict.values.real)[:4]
     np.testing.assert_allclose(values, [pi**4, pi**4, (2 * pi) ** 4, (2 * pi) ** 4], rtol=1e-5)
