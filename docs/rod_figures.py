@@ -21,9 +21,9 @@ from matplotlib.lines import Line2D
 from panels import COUNT, IN_SPACE, draw, legend_of
 
 from rodfem import Branch, Diagram, Discretization, Plan, Ring, Scene, trace
-from rodfem.output.glyphs import Look, glyphs_of
+from rodfem.output.glyphs import Look, glyphs_of, sign_of
+from rodfem.output.render import view_of
 from rodfem.output.style import STYLE, symbol_of, tex
-from rodfem.output.view import sign_of, view_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.problem.supports import distributed_on, foundation_of, supports_of, ties_of
@@ -127,7 +127,7 @@ def shown(diagram: Diagram) -> tuple[Branch, int] | None:
 
 
 def shape(axes: Axes, diagram: Diagram, branch: Branch, row: int) -> None:
-    """Draw a state with its supports and loads, and the first one in grey, as :mod:`rodfem.output.view` looks at it.
+    """Draw a state with its supports and loads, and the first one in grey, in the directions of ``view_of``.
 
     Gravity is along -e3.
     """

@@ -51,12 +51,9 @@ UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those
 
 
 def as_data(
-    branches: Sequence[Branch],
-    systems: Sequence[System],
-    clock: Clock,
-    span: tuple[float, float],
-    accuracy: float | None = None,
-) -> dict[str, Any]:
+    branches: Sequence[Branch], systems: Sequence[System], clock: Clock,
+    span: tuple[float, float], accuracy: float | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
 
     ``systems`` are those of the meshes that the points of ``branches`` name by their number; ``discretization`` is the
@@ -93,9 +90,8 @@ def as_data(
 
 def mesh_of(system: System) -> dict[str, Any]:
     """Discretisation, as files record it."""
-    d = system.fields.discretization
-    sizes = {"elements": d.elements, "degree": d.degree, "unknowns": system.fields.unknowns}
-    return {"formulation": d.formulation, **sizes}
+    d, unknowns = system.fields.discretization, system.fields.unknowns
+    return {"formulation": d.formulation, "elements": d.elements, "degree": d.degree, "unknowns": unknowns}
 
 
 def _timing(clock: Clock, points: int) -> dict[str, Any]:
@@ -105,18 +101,15 @@ def _timing(clock: Clock, points: int) -> dict[str, Any]:
 
 
 def _mesh_data(system: System) -> dict[str, Any]:
+    _, *sizes = mesh_of(system).items()
     vertices = system.fields.discretization.vertices
-    sizes = {name: size for name, size in mesh_of(system).items() if name != "formulation"}
-    return sizes | {"vertices": None if vertices is None else list(vertices)}
+    return dict(sizes) | {"vertices": None if vertices is None else list(vertices)}
 
 
 def origin() -> dict[str, Any]:
     """Entry ``origin`` of ``diagram.json``: what reproduces the run."""
-    return {
-        "command": shlex.join(sys.orig_argv),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": versions(),
-    }
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    return {"command": shlex.join(sys.orig_argv), "date": date, "versions": versions()}
 
 
 def versions() -> dict[str, str]:
@@ -162,14 +155,9 @@ def load_json(path: Path | str) -> dict[str, Any]:
 
 
 def save_run(
-    data: dict[str, Any],
-    branches: Sequence[Branch],
-    solvers: Sequence[BranchSolver],
-    folder: Path,
-    *,
-    first: bool,
-    modes: Sequence[Sequence[Typical]],
-) -> None:
+    data: dict[str, Any], branches: Sequence[Branch], solvers: Sequence[BranchSolver], folder: Path,
+    *, first: bool, modes: Sequence[Sequence[Typical]],
+) -> None:  # fmt: skip
     """Add ``branches`` to ``states.h5`` of a folder, and replace ``diagram.json``; collective, written on rank 0.
 
     ``data`` are the contents of ``diagram.json``, ``solvers`` those of the meshes that points name, ``modes`` those of
@@ -183,23 +171,15 @@ def save_run(
 
 
 def save_states(branch: Branch, solvers: Sequence[BranchSolver], path: Path, first: bool) -> None:
-    """Add one ``branch`` to an HDF5 file, or write the ``first`` one; collective, written on rank 0.
-
-    ``solvers`` and ``path`` are as in :func:`states_of`.
-    """
+    """Add one ``branch`` to an HDF5 file, or write the ``first`` one; collective, written on rank 0."""
     image = states_of([branch], solvers, path, first=first)
     on_first(solvers[0].system.comm, lambda: write_whole({path: image}))
 
 
 def states_of(
-    branches: Sequence[Branch],
-    solvers: Sequence[BranchSolver],
-    path: Path,
-    *,
-    first: bool,
-    run: str = "",
-    modes: Sequence[Sequence[Typical]] | None = None,
-) -> bytes:
+    branches: Sequence[Branch], solvers: Sequence[BranchSolver], path: Path,
+    *, first: bool, run: str = "", modes: Sequence[Sequence[Typical]] | None = None,
+) -> bytes:  # fmt: skip
     """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
 
     ``docs/files.md`` has the groups.  Null vectors of special points are motions; the groups of

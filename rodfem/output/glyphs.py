@@ -17,13 +17,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
-from rodfem.output.view import POINT, sign_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
 from rodfem.tolerances import NEGLIGIBLE, TINY
@@ -38,6 +37,8 @@ SIDES = 24
 """Corners of a round cross-section."""
 COILS = {"coil": (6, 1.5, 11.0), "small coil": (4, 0.9, 7.0)}
 """Turns of a spring, their radius, and its length at rest, in radii of the rod."""
+POINT = 1e-9
+"""A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
 BLOCK, ARROW = 2.4, 13.0
 """Half the size of a block, and the length of an arrow, in radii of the rod."""
 
@@ -179,6 +180,11 @@ def across(direction: Floats, wanted: Floats | None = None) -> Floats:
     return np.asarray(out / np.linalg.norm(out))
 
 
+def sign_of(value: Any) -> float:
+    """Sign of a number, one for zero."""
+    return -1.0 if value < 0 else 1.0
+
+
 # --- the rod
 
 
@@ -230,7 +236,7 @@ def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats)
 
 
 class Look(NamedTuple):
-    """How a picture shows a rod: its mean ``radius``, and the ``axes`` of :func:`rodfem.output.view.view_of`."""
+    """How a picture shows a rod: its mean ``radius``, and the ``axes`` of :func:`rodfem.output.render.view_of`."""
 
     radius: float
     axes: Floats

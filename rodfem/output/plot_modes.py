@@ -23,10 +23,10 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
-from rodfem.output.glyphs import Glyph, Look, Solid, between, glyphs_of, striped
+from rodfem.output.glyphs import POINT, Glyph, Look, Solid, between, glyphs_of, striped
+from rodfem.output.render import axes_of, axis_of
 from rodfem.output.states import curve_of
 from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS, status_of
-from rodfem.output.view import POINT, axes_of, axis_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY

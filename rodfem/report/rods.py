@@ -19,9 +19,9 @@ from rodfem.output.glyphs import Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
 from rodfem.output.plot_modes import GROWTH, drawn_size
+from rodfem.output.render import axes_of, thickness
 from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
-from rodfem.output.view import axes_of, thickness
 from rodfem.output.words import eigenvalue_in_words
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting

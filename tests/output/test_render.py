@@ -19,9 +19,8 @@ from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import SIDES, Look, glyphs_of, profile_of, turn
 from rodfem.output.pieces import typical_state
-from rodfem.output.render import _read, draw_shape_safely
+from rodfem.output.render import _read, draw_shape_safely, view_of
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
-from rodfem.output.view import view_of
 from rodfem.problem.contribution import Attachment, at, everywhere, integral
 from rodfem.problem.ends import End, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene

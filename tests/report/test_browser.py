@@ -27,7 +27,7 @@ from scipy.ndimage import uniform_filter
 
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
-from rodfem.output.view import POINT
+from rodfem.output.glyphs import POINT
 from rodfem.report.page import page_of, payload_of
 
 REQUIRED = os.environ.get("RODFEM_BROWSER") == "required"
