@@ -335,10 +335,11 @@ class BranchSolver:
         found = None if system.scene.start is not None else natural_shape(system.scene, load)
         if found is None:
             return None
+        s, q, strains = found
         x, v = (f.coordinates(degree) for degree in (f.discretization.degree, f.discretization.degree - 1))
-        turned = f.turning.start(lambda s: sampled(found.s, found.q, s), x.ravel(), system.scene.interval)
-        strains = sampled(found.s, found.v[:, list(system.scene.free_strains)], v.ravel())
-        return self._shaped(turned, strains.reshape(*v.shape, -1), load)
+        turned = f.turning.start(lambda places: sampled(s, q, places), x.ravel(), system.scene.interval)
+        free = sampled(s, strains[:, list(system.scene.free_strains)], v.ravel())
+        return self._shaped(turned, free.reshape(*v.shape, -1), load)
 
     def _shaped(self, turned: np.ndarray, v: np.ndarray, load: float) -> PETSc.Vec:
         """State of these rotations and strains at the nodes, and the centreline that they integrate to."""

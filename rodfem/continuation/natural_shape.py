@@ -11,7 +11,7 @@ A straight rod is turned as its ends are: from the rotation of the left one to t
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,16 +29,11 @@ SETTLED, STEP = 1e-8, 1e-5
 """Change of the natural strains, in natural units, at which Newton's method ends; step of its difference quotients."""
 
 
-class NaturalShape(NamedTuple):
-    """Arclengths ``s`` (m,), quaternions ``q`` (m, 4) and strains ``v`` (m, 3) of a rod at rest."""
+def natural_shape(scene: Scene, load: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Arclengths (m,), quaternions (m, 4) and strains (m, 3) of the unstressed rod between the ends of a scene.
 
-    s: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-
-
-def natural_shape(scene: Scene, load: float) -> NaturalShape | None:
-    """The unstressed shape between the ends of a scene at a ``load``; None if it is straight, or does not fit there."""
+    None if it is straight, or does not fit there at this ``load``.
+    """
     if scene.closed or (strains := _natural_strains(scene, load)) is None:
         return None
     s = np.linspace(*scene.interval, STEPS + 1)
@@ -51,7 +46,7 @@ def natural_shape(scene: Scene, load: float) -> NaturalShape | None:
     slopes = np.einsum("sij,sj->si", halfway, middle[:, :3])
     r = np.vstack([np.zeros(3), np.cumsum(slopes * np.diff(s)[:, None], axis=0)])
     turned = _placed(scene, load, q, r)
-    return None if turned is None else NaturalShape(s, turned, strains(s)[:, :3])
+    return None if turned is None else (s, turned, strains(s)[:, :3])
 
 
 def _natural_strains(scene: Scene, load: float) -> Callable[[np.ndarray], np.ndarray] | None:

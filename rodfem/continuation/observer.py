@@ -7,7 +7,8 @@ ranks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partialmethod
 from typing import TYPE_CHECKING, Any
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
@@ -113,16 +114,10 @@ class Recorder(Observer):
         self._keep(self.warnings, sentence)
         self.listener.warn(sentence)
 
-
-def _handed_on(event: str) -> Callable[..., None]:
-    """Return the method of a recorder that hands an event on."""
-
-    def hand_on(self: Recorder, *what: object) -> None:
+    def _hand_on(self, event: str, *what: object) -> None:
         getattr(self.listener, event)(*what)
-
-    return hand_on
 
 
 for _event in vars(Observer):
     if not _event.startswith("_") and _event not in vars(Recorder):
-        setattr(Recorder, _event, _handed_on(_event))
+        setattr(Recorder, _event, partialmethod(Recorder._hand_on, _event))
