@@ -107,16 +107,6 @@ def test_deflection_inside_of_an_element(mesh: tuple[int, int], place: float) ->
     assert abs(found.point.ordinate - bent(3.0)(place)[2]) <= found.ordinate_error
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("mesh", [(6, 4), *(pytest.param(x, marks=pytest.mark.alone) for x in [(8, 5), (12, 4)])])
-def test_ring(mesh: tuple[int, int]) -> None:
-    """Michell's ring: ``C t = sqrt(n^2 - 1)``; what one degree more still misses counts."""
-    (circle,) = explored(classics.ring(), mesh)
-    found = [s for s in circle.special if s.kind == BRANCH_POINT]
-    for s, n in zip(found[:2], (2, 3), strict=True):
-        check(s.point.load, sqrt(n * n - 1) / 1.5, s.error_estimate)
-
-
 @pytest.mark.few(1)
 @pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])

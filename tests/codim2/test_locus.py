@@ -110,23 +110,6 @@ def test_fold_of_the_cord_by_shooting() -> None:
 
 
 @pytest.mark.long
-def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
-    constants = (-2.0, 1.0, 1.0, 3.0)
-    (fold,) = specials(explored(constants=constants)[2], "fold")
-    found = locus(follower(constants=constants), fold, "A", PLANE, steps=WIDE, error_bars=2)
-    assert all(sentence.startswith("the fold ends on a branch point") for sentence in found.ended)
-    for row in (0, -1):
-        lam, A = found.values[row]
-        assert closed_form_hemitropic.loads(A, 1, 1, 3)[1] == pytest.approx(lam, abs=1e-9)
-        # the fold leaves the straight rod with the square of the ordinate: that of the end is as small as its bar says
-        beside = found.values[row] - found.values[1 if row == 0 else -2]
-        square = (found.ordinate[row] / found.ordinate[1 if row == 0 else -2]) ** 2
-        assert square * abs(beside[1]) <= found.error[row, 1] <= 1e-5
-    assert {tuple(pair) for pair in found.index.tolist()} == {(2, 3)}
-    assert found.values[found.start, 0] == pytest.approx(0.3534002860735, abs=1e-9)
-
-
-@pytest.mark.long
 @pytest.mark.alone
 def test_each_special_point_has_its_locus_where_loads_are_small(tmp_path: Path) -> None:
     """Of a DNA molecule in metres and newtons: Euler's loads about either axis, pi^2/4 B/L^2, as the thickness grows.
