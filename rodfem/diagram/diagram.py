@@ -515,9 +515,10 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
 def _with_bars(plan: Plan, solver: BranchSolver, observer: Observer) -> Plan:
     """The plan, without error bars where round-off of strains, which two meshes have alike, is in none of them."""
     if doubt := round_off_of_strains(solver.system.scene):
-        observer.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
-        return replace(plan, error_bars=False)
-    if plan.error_bars and (doubt := solver.system.equations.known.rough()):
+        doubt, plan = f"{doubt}: no error is estimated; {FLEXIBLE}.", replace(plan, error_bars=False)
+    elif plan.error_bars:
+        doubt = solver.system.equations.known.rough()
+    if doubt:
         observer.warn(doubt)
     return plan
 
