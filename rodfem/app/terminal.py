@@ -84,10 +84,7 @@ def _eigenvalues(found: Verdict, modes: Modes | None) -> Iterator[str]:
 
 
 def is_screen(stream: TextIO) -> bool:
-    """Whether a stream is a terminal on which a line can change.
-
-    What Open MPI gives its ranks is a terminal of its own, even where its output goes into a file: that is none.
-    """
+    """Whether a stream is a terminal on which a line can change: what Open MPI gives its ranks is none."""
     dumb = os.environ.get("TERM") in ("dumb", "unknown")
     return stream.isatty() and not dumb and not any(name in os.environ for name in RANK)
 

@@ -78,9 +78,8 @@ class Block:
 
 @dataclass(frozen=True)
 class Site:
-    """Expressions of the state where a contribution is, of which it makes its terms.
+    """Expressions of the state where a contribution is, of which it makes its terms; ``y`` are its own unknowns.
 
-    Functions ``f(x, c)`` receive the place ``x`` and the constants ``c``; ``y`` are the contribution's own unknowns.
     ``turned`` is the field of the rotation, quaternion (4,) or angle, ``normal`` the component across the plane of a
     planar rod, ``free`` are components of the position that move.  ``first`` and ``second`` are variations with ``r``
     (3,), if there is a centreline, and ``q`` (4,).  ``whole`` is the angle by which a closed planar rod turns in all.

@@ -142,10 +142,7 @@ def in_floats(value: Any) -> Any:
 
 
 def derived(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
-    """Return what ``make()`` derives from an object that does not change, once, by its ``key``: it is kept with it.
-
-    Of a function of a scene it is what does not depend on constants, and serves all scenes that have the function.
-    """
+    """Return what ``make()`` derives from an object that does not change, once, by its ``key``: it is kept with it."""
     known: dict[Hashable, T] = vars(owner).setdefault("derived", {})
     if key not in known:
         known[key] = make()

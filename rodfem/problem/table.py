@@ -1,11 +1,7 @@
-"""Functions that a scene has as tables: piecewise cubics of one of its constants, or of the arclength.
+"""Functions that a scene has as tables: cubics of the arclength (:func:`tabulated`) or the load (:func:`path`).
 
-A stiffness, a natural curvature, a load or a mass per length follows one along the rod (:func:`tabulated`), a position,
-a rotation or a force one as the load grows (:func:`path`).
-
-With a number a table returns numbers.  In the equations it returns an :class:`Entry`, an expression of UFL that stands
-for the value; :mod:`rodfem.fem.known` says what the compiled forms read there.  So a table of ten thousand rows is no
-longer an expression than one of two.
+With a number a table returns numbers, in the equations an :class:`Entry`, an expression of UFL that stands for the
+value; :mod:`rodfem.fem.known` says what the compiled forms read there.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """The functions of a scene, tried before any computation: with numbers, as expressions of UFL, and across a plane.
 
-What a function returns has the declared size, and is finite and real.  In the equations each constant is an expression
-that stands for any number of its range.  A function that branches by the value of a constant (``c.on == 1``, ``in``,
-``if c.on``, a key of a dictionary) takes one branch for numbers and may take another there, where ``==`` compares how
-two expressions are written.  So the function and its expression are compared at the same constants and states.
+In the equations each constant is an expression that stands for any number of its range.  A function that branches by
+the value of a constant (``c.on == 1``, ``in``, ``if c.on``, a key of a dictionary) takes one branch for numbers and may
+take another there.  So the function and its expression are compared at the same constants and states.
 
 Of a planar rod, functions of the constants are zero across the plane; functions of the state, and the stored energy,
 have one value at two states that are each other's image by the plane.

@@ -1,8 +1,7 @@
 """Natural sizes of a rod's numbers in the units in which its scene is stated: what is small is so relative to them.
 
-They are one for a scene whose numbers are not far from order one: results do not depend on where a rod's length is
-between a tenth and ten.  Stated in metres and newtons the load of a DNA molecule is 1e-12: then all sizes are the rod's
-own, as only together they make its equations those of a rod of order one.
+They are one for a scene whose numbers are not far from order one.  In metres and newtons the load of a DNA molecule is
+1e-12: then all sizes are the rod's own, as only together they make its equations those of a rod of order one.
 """
 
 from __future__ import annotations

@@ -89,10 +89,7 @@ def statement(scene: Scene) -> str:
 
 
 def check_start(scene: Scene) -> None:
-    """Check that the start is continuous, of rotations in the plane; raises :class:`SceneError`.
-
-    Of a jump every mesh makes a twist within one element, which Newton's method may take for a state of the rod.
-    """
+    """Check that the start is continuous, of rotations in the plane: a mesh makes a twist of one element of a jump."""
     if scene.start is None:
         return
     s = np.linspace(*scene.interval, PLACES)
@@ -125,10 +122,7 @@ def _angles(q: np.ndarray) -> np.ndarray:
 
 
 def trouble_with_inertia(scene: Scene, load: float | None) -> str:
-    """Sentence on a mass or a rotary inertia at a ``load``, None for the scene's own, that cannot be; empty for none.
-
-    A rod under loads without a potential has an inertia.
-    """
+    """Sentence on a mass or a rotary inertia that cannot be, at a ``load`` or the scene's own; empty for none."""
     masses, rotary = _inertia_at(scene, load)
     least, largest = min(masses + rotary), max(masses + rotary)
     there = "" if load is None else f" at {scene.load} = {load:g}"
@@ -208,10 +202,7 @@ def round_off_of_strains(scene: Scene) -> str:
 
 
 def is_definite(matrix: np.ndarray) -> bool:
-    """Whether a symmetric matrix is positive definite, by its eigenvalues after scaling to a unit diagonal.
-
-    So stiffnesses may differ by any factor: a stretch 1e14 times as stiff as bending hides no eigenvalue of bending.
-    """
+    """Whether a symmetric matrix is positive definite, scaled to a unit diagonal: stiff strains hide no bending."""
     if not (matrix.diagonal() > 0.0).all():
         return False
     roots = np.sqrt(matrix.diagonal())
@@ -219,10 +210,7 @@ def is_definite(matrix: np.ndarray) -> bool:
 
 
 def check_drift(scene: Scene) -> None:
-    """Raise :class:`SceneError` where the rod is held, but not in all directions in which it can be moved.
-
-    One that nothing holds may float if the forces on its ends balance.  Whether loads along it do, the equations tell.
-    """
+    """Raise :class:`SceneError` where the rod is held, but not in all directions; one that nothing holds may float."""
     c = scene.constants()
     if floats(scene):
         check_balance(scene)
