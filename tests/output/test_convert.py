@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Discretization, InputError, Plan
-from rodfem.app import console
+from rodfem import Discretization, Plan
 from rodfem.app.run import run
 from rodfem.output.states import to_csv, to_vtkhdf
 
@@ -75,14 +74,3 @@ def test_tables(saved: Path, tmp_path: Path) -> None:
     assert [float(line["load"]) for line in lines] == branch["columns"]["load"]
     assert [float(line["energy"]) for line in lines] == branch["columns"]["energy"]
     assert [line["kind"] for line in csv.DictReader(special.open())] == [s["kind"] for s in branch["special"]]
-
-
-def test_command(saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    console.main(["convert", str(saved), "--to", "csv", "--output", str(tmp_path / "made")])
-    assert capsys.readouterr().out.split() == [str(tmp_path / "made" / f"{name}.csv") for name in ("rows", "special")]
-    with pytest.raises(SystemExit):
-        console.main(["convert", str(tmp_path)])
-    assert "diagram.json" in capsys.readouterr().err
-    (tmp_path / "diagram.json").write_text((saved / "diagram.json").read_text())
-    with pytest.raises(InputError, match=r"states\.h5"):
-        to_vtkhdf(tmp_path, tmp_path)

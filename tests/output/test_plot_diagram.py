@@ -86,21 +86,6 @@ def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
     assert [p.label for p in pieces_of(planar)] == ["0", "1"]
 
 
-def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) -> None:
-    def point(row: int, **more: Any) -> dict[str, Any]:
-        found = {"kind": "imperfect bifurcation", "row": row, "load": float(row), "ordinate": 0.0}
-        return found | {"negative_before": 0, "negative_after": 1, **more}
-
-    one = branch("a", [0.0] * 5, [0, 0, 0, 1, 1], special=[point(2, unfolding=-3e-9)])
-    assert "imperfect bifurcation, unfolding 3e-09" in legend(one)
-    two = branch("a", [0.0] * 5, [0, 0, 0, 1, 1], special=[point(2, unfolding=3e-9), point(3, unfolding=2e-7)])
-    assert "imperfect bifurcation, unfolding 3e-09 to 2e-07" in legend(two)
-    unknown = branch("a", [0.0] * 5, [0, 0, 0, 1, 1], special=[point(2, unfolding=None)])
-    assert "imperfect bifurcation" in legend(unknown)
-    assert [(p.negative, p.first, p.last) for p in pieces_of(one)] == [(0, 0, 2), (1, 2, 4)]
-    assert draw_diagram(diagram(one), folder / "one.png").exists()
-
-
 def words(*branches: dict[str, Any], **more: Any) -> tuple[set[str], set[str]]:
     """What stands inside the axes, and in the legend."""
     figure = figure_of(diagram(*branches) | more)
@@ -192,9 +177,3 @@ def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
     found = between(branch, "ordinate")
     places = np.concatenate([s[row] + np.arange(1, 8) / 8 * (s[row + 1] - s[row]) for row in found])
     np.testing.assert_allclose(np.concatenate([x[:, 1] for x in found.values()]), places * (0.55 - places), atol=1e-12)
-
-
-def test_branches_of_one_hue_have_other_marks() -> None:
-    axes = Figure().subplots()
-    handles = draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
-    assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20

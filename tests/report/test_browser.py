@@ -180,16 +180,6 @@ def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, si
     assert page.find_element(By.ID, "badge").text.startswith(("STABLE", "UNSTABLE"))
 
 
-@pytest.mark.parametrize("wide", [1400, 800, 390])
-def test_no_page_is_wider_than_its_window(opened: Callable[..., Any], wide: int) -> None:
-    """A narrow one has its cards one below the other."""
-    page = opened("locus", (wide, 844))
-    assert page.execute_script("return document.documentElement.scrollWidth") <= wide
-    assert all(
-        card.rect["width"] > 300 and card.rect["height"] > 150 for card in page.find_elements(By.CSS_SELECTOR, ".card")
-    )
-
-
 def test_an_address_leads_to_what_it_names(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     page.get(page.current_url.partition("#")[0] + "#branch=branch+1&row=2&ordinate=energy")
@@ -386,25 +376,6 @@ def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> No
     ]
     page.find_element(By.ID, "about-button").click()
     assert "dolfinx" in page.find_element(By.ID, "origin").text
-
-
-def test_the_plane_of_loci_shows_states(opened: Callable[..., Any]) -> None:
-    """A click on a locus shows the special point it starts from, one elsewhere a state at that load."""
-    page = opened("locus")
-    page.find_elements(By.CSS_SELECTOR, "#diagram-tabs button")[1].click()
-    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#loci .scatterlayer .trace"))
-    locus = page.execute_script("return import('report/data').then(({ data }) => data.loci[0])")
-    ((branch, row),) = locus["special"]
-    names = page.execute_script("return import('report/data').then(({ data }) => data.branches.map((b) => b.name))")
-    last = len(locus["x"]) - 1
-    click(page, *page.execute_script(IN_PLANE, locus["x"][last // 4], locus["load"][last // 4]))
-    until(page, lambda: shown(page) == (names[branch], row))
-    other, edge, end = (column[len(column) // 2] for column in locus["region"])
-    click(page, *page.execute_script(IN_PLANE, other, 0.3 * edge + 0.7 * end))
-    until(page, lambda: shown(page) != (names[branch], row))
-    load, loads = page.execute_script("return import('report/store').then((s) => [s.state.load, s.branch().load])")
-    assert load == min(loads, key=lambda each: abs(each - 0.3 * edge - 0.7 * end))
-    assert page.find_element(By.ID, "badge").text.startswith("STABLE")
 
 
 def test_frequencies_come_first_for_a_follower_load(opened: Callable[..., Any]) -> None:
