@@ -11,10 +11,12 @@ Each entry, group and column is described in ``docs/files.md``.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from stat import S_ISREG
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,9 +65,13 @@ class Format:
         """Open an HDF5 file; raises :class:`InputError` for what cannot be read inside of the block, too."""
         import h5py
 
-        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."), h5py.File(path, "r") as file:
-            self.check_hdf5(file, needs)
-            yield file
+        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."):
+            require_regular(path)
+            with h5py.File(path, "r") as file:
+                self.check_hdf5(file, needs)
+                if hollow := file.visititems(_hollow):
+                    raise InputError(f"{path} stores a part of the array {hollow} only: run the scene again.")
+                yield file
 
     def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
         if mark is not None and mark["name"] != self.name:
@@ -109,9 +115,22 @@ def refusal(unfit: str) -> Iterator[None]:
         raise InputError(unfit.replace("{}", reason)) from trouble
 
 
+def require_regular(path: Path | str) -> None:
+    """Raise :class:`OSError` for a pipe, a device, and what is larger than this machine's memory."""
+    status = os.stat(path)
+    if not S_ISREG(status.st_mode) or status.st_size > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
+        raise OSError("no regular file, or one larger than the memory")
+
+
+def _hollow(name: str, item: Any) -> str | None:
+    """Name of an array that is larger in memory than what is stored of it: rodfem stores arrays whole."""
+    return name if getattr(item, "nbytes", 0) and item.nbytes > item.id.get_storage_size() else None
+
+
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
     """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
     try:
+        require_regular(path)
         data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as trouble:
         also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""

@@ -162,3 +162,6 @@ def picture_at(path: Path, suffixes: Sequence[str]) -> None:
         raise InputError(f"The picture {path} is a folder: give a name in it, as in {path / 'picture.png'}.")
     with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
+        probe = path.parent / f".probe-{os.getpid()}"
+        probe.touch(exist_ok=False)
+        probe.unlink()

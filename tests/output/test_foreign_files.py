@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -174,7 +175,20 @@ def entries(folder: Path, *path: str | int, to: Any = ...) -> None:
     (folder / "diagram.json").write_text(json.dumps(data))
 
 
+def larger_than_memory(file: h5py.File) -> None:
+    del file[f"{HERE}/r"]
+    file.create_dataset(f"{HERE}/r", shape=(200_000, 20_000, 3), chunks=(1000, 100, 3), compression="gzip")
+
+
+def fifo(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
 PROGRAMS: list[tuple[Callable[[Path], None], str, str]] = [
+    (lambda bad: spoil(bad / "states.h5", larger_than_memory), "view convert load", "a part of the array branches/"),
+    (lambda bad: fifo(bad / "diagram.json"), "info list view convert load", "diagram.json"),
+    (lambda bad: fifo(bad / "states.h5"), "view convert load", "states.h5"),
     (lambda bad: spoil(bad / "states.h5", without(f"{HERE}/r")), "view convert", "'r'"),
     (lambda bad: spoil(bad / "states.h5", put(f"{HERE}/s", np.zeros((50, 49)))), "view", "states.h5"),
     (lambda bad: entries(bad, "scene"), "info list view", "has no scene"),
