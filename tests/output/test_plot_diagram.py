@@ -15,6 +15,8 @@ from scipy.special import ellipe, ellipk
 from rodfem.file_format import LOCUS
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
 from rodfem.output.plot_diagram import (
+    SINGULAR,
+    UNEXPLAINED,
     between,
     dense,
     draw_branches,
@@ -177,3 +179,23 @@ def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
     found = between(branch, "ordinate")
     places = np.concatenate([s[row] + np.arange(1, 8) / 8 * (s[row + 1] - s[row]) for row in found])
     np.testing.assert_allclose(np.concatenate([x[:, 1] for x in found.values()]), places * (0.55 - places), atol=1e-12)
+
+
+def test_rows_close_to_each_other_and_corners_stay_as_they_are() -> None:
+    assert not between(elastica(np.linspace(0.0, 0.7, 200)), "ordinate")
+    assert between(elastica(np.linspace(0.0, 0.7, 5)), "ordinate")
+    zigzag = abs(np.linspace(-0.2, 0.2, 9))
+    corner = elastica(np.linspace(0.0, 0.7, 9))
+    corner["columns"]["ordinate"] = zigzag
+    values = np.concatenate([found[:, 1] for found in between(corner, "ordinate").values()])
+    assert values.min() >= -1e-12 and values.max() <= 0.2 + 1e-12
+
+
+def test_what_a_diagram_does_not_explain_is_marked() -> None:
+    plain = branch("a", [0.0, 1.0, 2.0, 3.0], [0, 0, 2, 2])
+    marks = {UNEXPLAINED: {"unexplained": [{"row": 1, "before": 0, "after": 2}]}, SINGULAR: {"singular_start": 1}}
+    assert not {*marks} & {*legend(plain)}
+    for mark, more in marks.items():
+        assert mark in legend(plain | more)
+    point = {"kind": "imperfect bifurcation", "row": 2, "load": 2.0, "ordinate": 2.0, "unfolding": -3e-9}
+    assert "imperfect bifurcation, unfolding 3e-09" in legend(plain | {"special": [point]})

@@ -193,3 +193,12 @@ def test_readings_are_those_of_the_file() -> None:
     first, second, third, fourth = readings_of(one | {"ended": ""}, {"load": 10.0, "ordinate": 1.0})
     assert first == {"load": "0.00 (1e-02)", "ordinate": "0.500 (1e-03)"}
     assert second == {"load": "1.000000 (1e-06)"} and third == {} and fourth == {"load": "3 (given)"}
+
+
+def test_words_warn() -> None:
+    doubtful = branch([0, 1, 1], special(2, "fold", 1, 0, resolved=False)) | {"unexplained": [{"row": 0}]}
+    words = words_of(doubtful | {"singular_start": 1})
+    assert words[0].sentence.count("Warning") == 2 and "without a special point" in words[1].sentence
+    assert "does not resolve" in words[2].sentence
+    given = words_of(branch([0, 0], special(1, "user", 0, 0, multiplicity=0)))
+    assert given[1].verdict == "stable"
