@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from math import isfinite
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +26,8 @@ LARGEST, TINIEST = 1e60, 1e-60
 FLEXIBLE = "choose a kind of rod without the stiff strains"
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
+NEXT = 1e-6
+"""Least distance of two places, over the length: an element between them loses as many digits."""
 PLACES = 1001
 """Arclengths at which a start is evaluated."""
 TURNED = 0.3
@@ -59,7 +63,7 @@ def check_load(scene: Scene) -> None:
 
 
 def check_places(scene: Scene) -> None:
-    """Raise :class:`SceneError` for an ordinate, an attachment, a constraint or a break that is not on the rod."""
+    """Raise :class:`SceneError` for a place that is not on the rod, or next to another one or an end, but not there."""
     a, b = scene.interval
     places = [("ordinate", s) for s in scene.ordinate.places] + [("break", s) for s in scene.breaks]
     places += [("attachment", x.s) for x in scene.attachments]
@@ -67,6 +71,12 @@ def check_places(scene: Scene) -> None:
     for what, s in places:
         if not a <= s <= b:
             raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
+    for (_, one), (what, s) in pairwise(sorted([("end", a), *places, ("end", b)], key=itemgetter(1))):
+        if NEGLIGIBLE < (s - one) / scene.length < NEXT:
+            raise SceneError(
+                f"The {what} at s = {s:.12g} is {s - one:.1g} beyond {one:.12g}: put both at one place, or at least "
+                f"{NEXT * scene.length:g} apart, as an element is between them."
+            )
 
 
 def ordinates(scene: Scene) -> list[float]:
