@@ -65,17 +65,16 @@ def check_load(scene: Scene) -> None:
 def check_places(scene: Scene) -> None:
     """Raise :class:`SceneError` for a place that is not on the rod, or next to another one or an end, but not there."""
     a, b = scene.interval
-    places = [("ordinate", s) for s in scene.ordinate.places] + [("break", s) for s in scene.breaks]
-    places += [("attachment", x.s) for x in scene.attachments]
+    places = [("break", s) for s in scene.breaks] + [("attachment", x.s) for x in scene.attachments]
     places += [("constraint", x.s) for x in scene.constraints if x.s is not None]
-    for what, s in places:
+    for what, s in [*places, *(("ordinate", s) for s in scene.ordinate.places)]:
         if not a <= s <= b:
             raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
-    for (_, one), (what, s) in pairwise(sorted([("end", a), *places, ("end", b)], key=itemgetter(1))):
-        if NEGLIGIBLE < (s - one) / scene.length < NEXT:
+    for (one, here), (other, there) in pairwise(sorted([("end", a), *places, ("end", b)], key=itemgetter(1))):
+        if NEGLIGIBLE < (there - here) / scene.length < NEXT:
             raise SceneError(
-                f"The {what} at s = {s:.12g} is {s - one:.1g} beyond {one:.12g}: put both at one place, or at least "
-                f"{NEXT * scene.length:g} apart, as an element is between them."
+                f"The {one} at s = {here:.12g} and the {other} at s = {there:.12g} are {there - here:.1g} apart, with an "
+                f"element between them: give one place, or two that are {NEXT * scene.length:g} apart."
             )
 
 

@@ -148,6 +148,7 @@ OFF_PLANE: list[tuple[dict, str]] = [
         ({"ends": Ring(odd=True), "start": lambda s: turns(s, 2)}, r"Ring\(odd=False\)"),
         # places
         ({"attachments": (Attachment(1.5, force=lambda c: ZERO),)}, "attachment at s = 1.5 is not on the rod"),
+        ({"attachments": (Attachment(1 - 3e-9, force=lambda c: ZERO),)}, "the end at s = 1 are 3e-09 apart"),
         ({"planar": "e3"}, "planar across 'e3'"),
         ({"planar": "e2"} | held(right=clamped(lambda c: (0.0, 0.2, 0.9))), "held at 0 and 0.2 along e2"),
         (

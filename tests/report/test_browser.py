@@ -180,6 +180,15 @@ def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, si
     assert page.find_element(By.ID, "badge").text.startswith(("STABLE", "UNSTABLE"))
 
 
+@pytest.mark.parametrize("wide", [1400, 800, 390])
+def test_no_page_is_wider_than_its_window(opened: Callable[..., Any], wide: int) -> None:
+    """A narrow one has its cards one below the other."""
+    page = opened("locus", (wide, 844))
+    assert page.execute_script("return document.documentElement.scrollWidth") <= wide
+    cards = [card.rect for card in page.find_elements(By.CSS_SELECTOR, ".card")]
+    assert all(card["width"] > 300 and card["height"] > 150 for card in cards)
+
+
 def test_an_address_leads_to_what_it_names(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     page.get(page.current_url.partition("#")[0] + "#branch=branch+1&row=2&ordinate=energy")
