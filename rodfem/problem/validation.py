@@ -73,8 +73,8 @@ def check_places(scene: Scene) -> None:
     for (one, here), (other, there) in pairwise(sorted([("end", a), *places, ("end", b)], key=itemgetter(1))):
         if NEGLIGIBLE < (there - here) / scene.length < NEXT:
             raise SceneError(
-                f"The {one} at s = {here:.12g} and the {other} at s = {there:.12g} are {there - here:.1g} apart, with an "
-                f"element between them: give one place, or two that are {NEXT * scene.length:g} apart."
+                f"The {one} at s = {here:.12g} and the {other} at s = {there:.12g} are {there - here:.1g} apart, with "
+                f"an element between them: give one place, or two that are {NEXT * scene.length:g} apart."
             )
 
 
