@@ -208,10 +208,11 @@ class Words:
     sentence: str
 
 
-def words_of(branch: Data, *, planar: bool = False) -> list[Words]:
+def words_of(branch: Data, *, planar: bool = False, leaves: str = "") -> list[Words]:
     """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it.
 
-    Of a ``planar`` rod it is that in its plane, where the index in space is unknown.
+    Of a ``planar`` rod it is that in its plane, where the index in space is unknown.  The first row is a branch point
+    of the branch that this one ``leaves``, if it has a name.
     """
     specials, warnings, out = defaultdict(list), _warnings(branch), list[Words]()
     for special in branch["special"]:
@@ -219,6 +220,10 @@ def words_of(branch: Data, *, planar: bool = False) -> list[Words]:
     for place in range(len(branch["columns"]["load"])):
         row = row_of(branch, place)
         plain = _at_special(row, specials[place]) or _stability(row)
+        if place == 0 and leaves:
+            plain = Words(
+                CRITICAL, plain.index, f"Branch point, where this branch leaves {leaves}; index {plain.index}."
+            )
         sentence = plain.sentence
         if planar and plain.verdict == STABLE and row.get("negative_in_space") is None:
             sentence = sentence.replace("Stable", "Stable in its plane (not examined in space)", 1)

@@ -53,15 +53,10 @@ ESCAPES = str.maketrans({"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028
 Data = Mapping[str, Any]
 
 
-def branch_data(
-    branch: Data, shapes: Shapes, colour: str, natural: Mapping[str, float], *, planar: bool = False
-) -> dict[str, Any]:
-    """A ``branch`` in a ``colour``; ``shapes`` are those of its rows, ``natural`` the sizes of load and ordinate.
-
-    Words of stable rows say whether the rod is ``planar``.
-    """
-    columns = branch["columns"]
-    words = words_of(branch, planar=planar)
+def branch_data(branch: Data, shapes: Shapes, colour: str, data: Data) -> dict[str, Any]:
+    """A ``branch`` of the ``data`` of a diagram in a ``colour``; ``shapes`` are those of its rows."""
+    columns, natural = branch["columns"], data["natural"]
+    words = words_of(branch, planar=bool(data.get("planar")), leaves=_left(branch, data["branches"]))
     different = list(dict.fromkeys(words))
     ordinates = {name: _clear(columns[name], natural.get(name, 0.0)) for name in _listed(columns)} | _derived(shapes)
     return {
@@ -96,6 +91,13 @@ def ordinates_of(data: Data) -> list[str]:
     """Ordinates that all branches have, the scene's first."""
     first, *others = (branch["columns"] for branch in data["branches"])
     return [*(name for name in _listed(first) if all(name in columns for columns in others)), *DERIVED]
+
+
+def _left(branch: Data, branches: Sequence[Data]) -> str:
+    """Name of the branch from whose branch point this one leaves; empty if its first row is elsewhere."""
+    name, number = branch["parent"] or ("", 0)
+    found = [x["special"][number]["load"] for x in branches if x["name"] == name and number < len(x["special"])]
+    return name if found and np.isclose(found[0], branch["columns"]["load"][0], rtol=1e-9, atol=0.0) else ""
 
 
 def _listed(columns: Data) -> list[str]:

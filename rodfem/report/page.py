@@ -24,6 +24,7 @@ import h5py
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.output.states import check_run
 from rodfem.output.style import mesh_in_words, ordinate_in_words
+from rodfem.output.table import ENTRIES, NAMES
 from rodfem.report.branches import DERIVED, html_of, label_of, loci_of, ordinates_of, plain_of, script_json
 from rodfem.report.rods import rods_of
 from rodfem.whole_files import write_whole
@@ -116,7 +117,10 @@ def payload_of(folder: Path) -> dict[str, Any]:
     check_run(data, folder / "states.h5")
     unfit = f"The files in {folder} do not belong together ({{}}): run the scene again."
     with STATES.opened(folder / "states.h5", ("branches",), unfit) as file:
-        return _about(data, folder) | rods_of(data, Loaded(file["branches"]), folder)
+        about, rods = _about(data, folder), rods_of(data, Loaded(file["branches"]), folder)
+        names = [name for name in rods["branches"][0]["ordinates"] if name.startswith("reaction")]
+        about["ordinates"] += [{"key": name, "name": name, "label": name} for name in names]
+        return about | rods
 
 
 def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -145,6 +149,7 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         "origin": _origin(data.get("origin") or {}),
         "folder": str(folder),
         "loci": loci_of(folder, data),
+        "glossary": {name: ENTRIES[key] for name, key in NAMES.items()},
     }
 
 

@@ -31,12 +31,14 @@ from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
 
 Floats = NDArray[np.float64]
 
+ZERO = 1e-7
+"""A reaction below this, relative to the natural force or moment, is the error of Newton's method."""
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
 SMALL = 1e-3
 """Share of the greatest eigenvalue below which differences of eigenvalues are relative to this share."""
-BUDGET = 400_000
-"""Stations of all states together above which each has fewer: about 20 MB of the page."""
+BUDGET = 50_000
+"""Stations of all states together above which each has fewer: about 6 MB of the page."""
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
@@ -48,12 +50,36 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     stage, shelf, branches = stage_of(data, shapes, groups), dict[tuple[str, str], int](), []
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
         here, group = shapes[branch["name"]], groups[branch["name"]]
-        shown = branch_data(branch, here, colour, data["natural"], planar=bool(data.get("planar")))
+        shown = branch_data(branch, here, colour, data)
+        shown["ordinates"] |= end_forces(here, group) if group.get(SUPPORTS) else {}
         shown |= _drawn(here, group, stage, shelf) | profiles_data(group, states)
         shown |= _moving(branch, here, group, folder / "modes.h5", stage)
         traced = is_traced(branch, data["branches"])
         branches.append(shown | {"image": "" if traced else branch.get("image", "")})
+    _clear_reactions(branches, data["natural"])
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
+
+
+def end_forces(shapes: Shapes, group: Any) -> dict[str, list[float | None]]:
+    """Forces and moments on both ends of a rod in all rows, in space: of supports, with the loads that act there."""
+    found = [profiles_of(group, row) for row in range(len(group["load"]))]
+    turns = [directors(shapes.q[:, end]) for end in (0, -1)]
+    out: dict[str, list[float | None]] = {}
+    for symbol, words in (("n", "reaction force"), ("m", "reaction moment")):
+        for end, side, sign in ((0, "left", -1.0), (-1, "right", 1.0)):
+            at_end = np.array([one.fields[symbol].reshape(-1, 3)[end] for one in found])
+            in_space = sign * np.einsum("pij,pj->pi", turns[end], at_end)
+            out |= {f"{words} e{'₁₂₃'[i]}, {side} end": plain(in_space[:, i]) for i in range(3)}
+    return out
+
+
+def _clear_reactions(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
+    """Leave out reactions that vanish in all rows, to round-off."""
+    for name in [name for name in branches[0]["ordinates"] if name.startswith("reaction")]:
+        size = natural.get("force" if name.startswith("reaction force") else "moment", 1.0)
+        if all(abs(x or 0.0) < ZERO * size for branch in branches for x in branch["ordinates"][name]):
+            for branch in branches:
+                del branch["ordinates"][name]
 
 
 def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, stage: Stage) -> dict[str, Any]:

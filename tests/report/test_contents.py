@@ -57,6 +57,13 @@ def test_words_of_a_branch() -> None:
     assert "1 eigenvalue at zero" in words[1].sentence and words[3].sentence == "Unstable: 2 negative eigenvalues."
 
 
+def test_a_branch_begins_at_a_branch_point() -> None:
+    """Where it leaves another one no state is called stable or unstable."""
+    first, *others = words_of(branch([0, 0]), leaves="straight")
+    assert (first.verdict, first.index) == ("critical", "0") and "leaves straight" in first.sentence
+    assert [w.verdict for w in others] == ["stable"]
+
+
 def test_words_of_a_planar_rod_say_both_indices() -> None:
     words = words_of(branch([0, 0, 1], negative_in_space=[0, 1, None]))
     assert [w.verdict for w in words] == ["stable", "planar", "unstable"]

@@ -13,6 +13,12 @@ function swatch(colour) {
   return drawn;
 }
 
+// The glossary's words on an item show where the pointer rests.
+function explained(one, word) {
+  one.title = data.glossary[word] ?? "";
+  return one;
+}
+
 // The swatch of a branch hides it, or shows it again.
 function hides(button, number) {
   const drawn = button.querySelector(".swatch");
@@ -48,9 +54,9 @@ export function start() {
   const names = { user: "requested load" };
   legend.append(
     ...buttons,
-    ...only("of-rows", lines.map((kind) => item(lineIcon("#555", WIDTHS[kind], DASHES[kind]), kind))),
+    ...only("of-rows", lines.map((kind) => explained(item(lineIcon("#555", WIDTHS[kind], DASHES[kind]), kind), kind))),
     ...only("of-frequencies", ofFrequencies()),
-    ...Object.keys(SYMBOLS).filter((kind) => special.has(kind)).flatMap((kind) => only(frequencies.marked().has(kind) ? "of-both" : "of-rows", [item(symbol(SYMBOLS[kind]), names[kind] ?? kind)])),
+    ...Object.keys(SYMBOLS).filter((kind) => special.has(kind)).flatMap((kind) => only(frequencies.marked().has(kind) ? "of-both" : "of-rows", [explained(item(symbol(SYMBOLS[kind]), names[kind] ?? kind), kind)])),
     ...[...new Set(data.branches.map((b) => b.image).filter(Boolean))].map((words) => item(lineIcon("#555", 1.1), `image, not traced: ${words}`)),
     ...[...new Set(data.branches.flatMap((b) => b.endings.map(([, reason]) => reason)))].map((reason) => item(symbol(ENDS), `ends: ${reason}`)),
     ...(data.branches.some((b) => b.unexplained.length) ? [item(symbol(UNEXPLAINED), "index change unexplained")] : []),

@@ -7,11 +7,13 @@ const at = (id) => document.getElementById(id);
 const MOST = 4; // eigenvalues in words
 const SAME = 1e-6, COALESCED = 1e-3; // relative differences of eigenvalues that are one; round-off parts a double one by its root
 const READ = data.ordinates.filter(({ key }, i) => !i || key === "energy");
+const GLOSSARY = { stable: "stable", unstable: "unstable", planar: "stable in the plane, unstable in space", critical: "branch point", undecided: "undecided" };
 const NAMES = { stable: "STABLE", unstable: "UNSTABLE", planar: "STABLE IN PLANE", critical: "CRITICAL", undecided: "UNDECIDED" };
 
 function redraw() {
   const b = branch(), { verdict, index, sentence } = words(b, state.row), special = b.special.find((x) => x.row === state.row);
   at("badge").className = `badge ${verdict}`;
+  at("badge").title = data.glossary[GLOSSARY[verdict]] ?? "";
   at("badge").textContent = [NAMES[verdict], counted(b, index)].filter(Boolean).join(" · ");
   at("state-load").textContent = `${data.symbol} = ${reading(b, state.row, "load")}${unit("load")}`;
   at("state").textContent = `${b.name}, row ${state.row} of ${b.load.length}`;
