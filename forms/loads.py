@@ -1,9 +1,9 @@
 r"""Loads: potential energies of those that have one, virtual work of those that have none.
 
 A dead force ``F`` has the potential ``-F . r``.  A force that turns with the directors has none, nor has a moment about
-an axis fixed in space, for finite rotations: what they contribute to the weak form is their virtual work ``F . dr`` and
-``M . w``, with the spin ``w`` of the variation.  See Ziegler, Principles of Structural Stability (1968), and Argyris &
-Symeonidis, Comput. Methods Appl. Mech. Engrg. 26 (1981) 75-123.
+an axis fixed in space, for finite rotations about others too: they contribute to the weak form their virtual work
+``F . dr`` and ``M . w``, with the spin ``w`` of the variation.  See Ziegler, Principles of Structural Stability (1968),
+and Argyris & Symeonidis, Comput. Methods Appl. Mech. Engrg. 26 (1981) 75-123.
 
 The functions of a place ``x`` are to be used in a scene: ``energy=lambda x, c: loads.spring(x.r, c.k)``.
 """
@@ -84,3 +84,9 @@ def follower_moment_work(q: Expr, moment: Sequence[Any], dq: Expr) -> Expr:
 def misalignment(q: Expr, rotation: Sequence[Any]) -> Expr:
     """``vec(conj(p) q)``, shape (3,): zero where the directors are those of the quaternion ``p = rotation``."""
     return vector_part(product(conjugate(ufl.as_vector(list(rotation))), q))
+
+
+def angle_about(q: Expr, rotation: Expr, axis: Expr) -> Expr:
+    """Angle, between two turns back and two turns on, by which ``q`` is turned from ``rotation`` about a unit axis."""
+    p = product(conjugate(rotation), q)
+    return 2 * ufl.mathfunctions.Atan2(ufl.dot(vector_part(p), axis), p[0])

@@ -13,8 +13,8 @@ They return UFL scalars (see :mod:`rodfem.forms.loads` for a stock of them).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -22,7 +22,7 @@ import ufl
 
 from rodfem.errors import InputError, SceneError
 from rodfem.forms import loads
-from rodfem.forms.rotation import IDENTITY
+from rodfem.forms.rotation import IDENTITY, rotation
 from rodfem.problem.arguments import check_vector, convert, number_of, plain, reals, yes_or_no
 from rodfem.problem.contribution import (
     DEAD_AT_END,
@@ -35,11 +35,13 @@ from rodfem.problem.contribution import (
     Contribution,
     Direction,
     Group,
+    Load,
     Motion,
     Site,
     Unknown,
 )
 from rodfem.problem.functions import LETTERS, SIDES, Constants, Given, OfPlace, Place, Quaternion, Role, role_field
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, TURNS
 from rodfem.tolerances import NEGLIGIBLE
 
@@ -67,9 +69,9 @@ class End(Contribution):
         ``follower(c)``, force on a free end by its components along the directors, with which it turns.  Not
         conservative.
     moment
-        ``moment(c)``, moment about axes fixed in space.  Not conservative, but for a planar rod.
+        ``moment(c)``, moment about axes fixed in space.  Conservative about a hinge, and for a planar rod.
     follower_moment
-        ``follower_moment(c)``, moment by its components along the directors.  Not conservative, but for a planar rod.
+        ``follower_moment(c)``, moment by its components along the directors.  Conservative in the same cases.
     energy
         ``energy(x, c)``, potential energy of what else acts on the end: springs, a semi-tangential moment.
         Conservative.
@@ -80,9 +82,9 @@ class End(Contribution):
     force: Given = role_field(Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END, placed=False))
     follower: Given = role_field(Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER, placed=False))
     hinge: tuple[float, float, float] | None = None
-    moment: Given = role_field(Role("moment on the {} end", "f(c)", 3, load=MOMENT, placed=False))
+    moment: Given = role_field(lambda x: Role("moment on the {} end", "f(c)", 3, load=x.torque(MOMENT), placed=False))
     follower_moment: Given = role_field(
-        Role("follower moment on the {} end", "f(c)", 3, load=FOLLOWER_MOMENT, placed=False)
+        lambda x: Role("follower moment on the {} end", "f(c)", 3, load=x.torque(FOLLOWER_MOMENT), placed=False)
     )
     energy: OfPlace | None = role_field(Role("energy of the {} end", "f(x, c)", 0, load=POTENTIAL))
 
@@ -136,6 +138,23 @@ class End(Contribution):
         """Whether dead forces are all that acts on the position where it is free."""
         return self.energy is None
 
+    def torque(self, kind: Load) -> Load:
+        """Return a ``kind`` of moment as it acts here: about the axis of a hinge it has the potential ``-T angle``."""
+        if self.hinge is None:
+            return kind
+
+        def potential(at: Site, moment: Sequence[Any]) -> Any:
+            axis, frame = ufl.as_vector(self._axis()), ufl.as_vector(list(self.frame(at.c)))
+            fixed = ufl.dot(rotation(frame), axis) if kind is MOMENT else axis
+            return -ufl.dot(ufl.as_vector(list(moment)), fixed) * loads.angle_about(at.x.q, frame, axis)
+
+        return replace(kind, potential=potential)
+
+    def _axis(self) -> list[float]:
+        """Unit vector of the hinge, along the held directors; zero without one."""
+        axis = np.array(self.hinge or (0.0, 0.0, 0.0), dtype=float)
+        return (axis / (np.linalg.norm(axis) or 1.0)).tolist()
+
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """Moments of a moving clamp or a hinge."""
         directions = self._stiff(normal)
@@ -164,12 +183,13 @@ class End(Contribution):
         where = f"{side} end"
         for c in map(scene.constants, scene.loads() if callable(self.rotation) else scene.span[:1]):
             self._check_rotation(where, self.frame(c))
-        for c in map(scene.constants, scene.loads()):
-            self._check_force(where, c)
-        if self.fixed_rotation is not None and (self.moment or self.follower_moment):
+        if self.turning == HELD and (self.moment or self.follower_moment):
             raise SceneError(
                 f"A moment acts on the {where}, whose directors are held: leave them free, or use a hinge."
             )
+        for c in map(scene.constants, scene.loads()):
+            self._check_force(where, c)
+            self._check_moments(where, c)
 
     def _check_rotation(self, where: str, rotation: Any) -> None:
         if rotation is not None:
@@ -191,6 +211,17 @@ class End(Contribution):
         if (abs(fixed @ force) > NEGLIGIBLE * np.linalg.norm(force)).any():
             what = f"A force acts on the {where} in a direction in which its position is held"
             raise SceneError(f"{what}: leave that component out, or leave the position free there.")
+
+    def _check_moments(self, where: str, c: Constants) -> None:
+        for given, fixed in ((self.moment, True), (self.follower_moment, False)):
+            if given is None or self.turning != AXIS:
+                continue
+            frame = [number_of(x) for x in self.frame(c)]
+            moment, axis = np.array([number_of(x) for x in given(c)]), np.array(self._axis())
+            axis = directors(np.array(frame)) @ axis if fixed else axis
+            if np.linalg.norm(np.cross(axis, moment)) > NEGLIGIBLE * np.linalg.norm(moment):
+                what = f"A moment acts on the {where} across the axis of its hinge, about which alone it turns"
+                raise SceneError(f"{what}: leave that component out, or the directors free there.")
 
 
 def _size(what: str, values: Any, size: int) -> float:

@@ -16,7 +16,7 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk, jv
 from shooting_solver import Rod
 
-from rodfem import Discretization, End, Scene, Solver, clamped, free
+from rodfem import Discretization, End, Plan, Scene, Solver, clamped, free, trace
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 pytestmark = pytest.mark.alone
@@ -418,6 +418,19 @@ def test_torque_on_an_oblong_cantilever(monkeypatch: pytest.MonkeyPatch) -> None
     ends = clamped(), free(follower_moment=lambda c: (0.0, 0.0, c.P))
     scene = column("oblong", ends, (0.5, 0.95), inertia=classics.BEAM, constants={"B2": 1.5, "C": 1e6})
     assert sweep(scene).loads("flutter") == pytest.approx([root(nicolai, 0.5, 0.95)], rel=2e-7)
+
+
+@pytest.mark.parametrize("kind", ["moment", "follower_moment"])
+def test_torque_about_the_axis_of_a_hinge(kind: str) -> None:
+    """Greenhill between tangents that are held: tan x = x, T = 2 x; the potential is minus the torque times T/C."""
+    hinge = End((0.0, 0.0, None), (1.0, 0.0, 0.0, 0.0), hinge=(0.0, 0.0, 2.0), **{kind: lambda c: (0.0, 0.0, c.P)})
+    scene = column("hinge", (clamped(), hinge), (8.0, 10.0), constants={"B2": 1.0, "C": 2.0})
+    straight = trace(scene, plan=Plan(depth=0))["straight"]
+    assert [x.point.load for x in straight.special[:-1]] == pytest.approx([8.986818915818128], rel=1e-10)
+    assert [(p.negative, p.conjugate) for p in straight.points[:: len(straight.points) - 1]] == [
+        (0, pytest.approx(4.0)),
+        (2, pytest.approx(5.0)),
+    ]
 
 
 @pytest.mark.long

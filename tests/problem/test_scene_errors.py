@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from math import cos, pi
 from pathlib import Path
 from typing import Any
@@ -133,6 +133,7 @@ OFF_PLANE: list[tuple[dict, str]] = [
         # loads on what is held
         (held(End(position=lambda c: ZERO, follower=lambda c: ZERO)), "whose position is held"),
         (held(right=End(rotation=(1.0, 0.0, 0.0, 0.0), moment=lambda c: ZERO)), "whose directors are held"),
+        (held(right=replace(hinged((0.0, 0.0, 1.0)), moment=lambda c: (c.F, 0.0, 1.0))), "across the axis of"),
         # nothing that holds, or nothing that gives way
         ({"ends": (pinned(lambda c: (0, 0, None)), pinned(lambda c: (0, 0, None)))}, "drift away along e3"),
         (
