@@ -131,6 +131,14 @@ class Point:
         """Curvatures and twist ``k`` at :attr:`s`, along the directors (m, 3)."""
         return self._nodal.curvature
 
+    @cached_property
+    def middle(self) -> float | None:
+        """Size of the curvature at the middle of the rod, bending alone; None without a solver."""
+        if self.solver is None:
+            return None
+        k = self.profile([sum(self.solver.system.scene.interval) / 2]).curvature[0]
+        return float(np.hypot(k[0], k[1]))
+
     @property
     def force(self) -> np.ndarray:
         """Contact force at :attr:`s`, along the directors (m, 3)."""

@@ -49,6 +49,7 @@ ATTRIBUTES = {
 }
 """Attributes of a special point that have another name than its entries."""
 OF_POINT: dict[str, Source] = {
+    "middle": attrgetter("middle"),
     "soft": partial(_soft, "name"),
     "soft_value": partial(_soft, "value"),
     "soft_uncertainty": partial(_soft, "uncertainty"),
