@@ -24,7 +24,8 @@ finds and classifies the points where it is lost, follows what branches off, and
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
   expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy`, :mod:`section
   <rodfem.problem.section>`).
-* **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`, :func:`free`,
+* **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`,
+  :func:`circular_guide`, :func:`free`,
   :func:`elastic`, :class:`Ring`, or in full :class:`End`.  **Loads**: of an :class:`End`, of a :class:`Scene`, of an
   :class:`Attachment`.  **Constraints**: :func:`at`, :func:`integral`, :func:`everywhere`.  **Tables**:
   :func:`tabulated`, :func:`path`.
@@ -54,7 +55,7 @@ _HOMES = {
     name: home
     for home, names in {
         "codim2.locus": "Locus",
-        "problem.ends": "End clamped pinned sliding hinged sliding_hinge free elastic Ring",
+        "problem.ends": "End clamped pinned sliding hinged sliding_hinge circular_guide free elastic Ring",
         "problem.contribution": "Attachment Constraint integral at everywhere",
         "problem.scene": "Scene Parameter Ordinate Inertia",
         "problem": "section",

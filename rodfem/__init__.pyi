@@ -32,6 +32,7 @@ from rodfem.problem.contribution import everywhere as everywhere
 from rodfem.problem.contribution import integral as integral
 from rodfem.problem.ends import End as End
 from rodfem.problem.ends import Ring as Ring
+from rodfem.problem.ends import circular_guide as circular_guide
 from rodfem.problem.ends import clamped as clamped
 from rodfem.problem.ends import elastic as elastic
 from rodfem.problem.ends import free as free

@@ -367,6 +367,41 @@ class SlidingHinge(End):
             raise SceneError(f"The guide of the {side} end has no place: give three components of a point on it.")
 
 
+@dataclass(frozen=True)
+class CircularGuide(End):
+    """Ball on a circle of a ``radius`` about its ``position``, across the vector of space with the number ``normal``."""
+
+    radius: float = 1.0
+    normal: int = 2
+
+    def held(self, c: Constants) -> list[Any]:
+        """Position of the end: None in the plane of the circle."""
+        return [p if i == self.normal else None for i, p in enumerate(super().held(c))]
+
+    @property
+    def dead(self) -> bool:
+        """No: the circle pushes."""
+        return False
+
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """Force of the circle, towards its centre."""
+        words = f"force of the guide at the {SIDES[number]} end"
+        group = Group(f"f{LETTERS[number]}", words, "guide of an end, direction {}", Motion.MIXED)
+        return [Unknown(group, 0)]
+
+    def lagrangian(self, at: Site) -> Iterator[Any]:
+        """Loads, and the distance from the circle, to first order, with its force."""
+        yield from super().lagrangian(at)
+        centre, plane = End.held(self, at.c), [i for i in range(3) if i != self.normal]
+        yield at.y[-1] * (sum((at.x.r[i] - centre[i]) ** 2 for i in plane) - self.radius**2) / (2 * self.radius)
+
+    def check(self, side: str, scene: Scene) -> None:
+        """Check that the circle is in the plane of a planar rod, and what is checked of every end."""
+        if scene.normal not in (None, self.normal):
+            raise SceneError(f"The circle of the {side} end leaves the plane across {scene.planar}: give that normal.")
+        super().check(side, scene)
+
+
 def clamped(position: Given = (0.0, 0.0, 0.0), rotation: Given = IDENTITY) -> End:
     """Return an end whose position (3,) and directors are given, both as functions of the constants if wanted."""
     return End(position=position, rotation=rotation)
@@ -425,6 +460,21 @@ def sliding_hinge(
     unit = tuple((direction / np.linalg.norm(direction)).tolist())
     push = force if force is None else lambda c: tuple(t * value_of(force, c) for t in unit)
     return SlidingHinge(position, rotation, push, hinge=axis, guide=unit)
+
+
+def circular_guide(
+    radius: float, normal: str = "e3", centre: Given = (0.0, 0.0, 0.0), force: Given = None
+) -> CircularGuide:
+    """Return a ball that slides on a circle of a ``radius`` about ``centre`` (3,), across the vector ``normal``.
+
+    That is ``"e1"``, ``"e2"`` or ``"e3"``, and ``force`` (3,) a dead force.  Raises :class:`SceneError` for others.
+    """
+    if not 0 < (size := number_of(radius)) < np.inf:
+        raise SceneError(f"The circle of an end has the radius {radius!r}: give a positive one.")
+    names = [f"e{i}" for i in (1, 2, 3)]
+    if normal not in names:
+        raise SceneError(f"The circle of an end is across {normal!r}: choose one of {', '.join(names)}.")
+    return CircularGuide(centre, force=force, radius=size, normal=names.index(normal))
 
 
 def free(

@@ -26,7 +26,7 @@ from rodfem.output.plot_diagram import between
 from rodfem.output.plot_frequencies import SPECIAL, curves, ranges_of, top
 from rodfem.output.plot_locus import LINES, in_words, plane_of, stable_region
 from rodfem.output.words import number, readings_of, with_unit, words_of
-from rodfem.tolerances import NEGLIGIBLE, same_special
+from rodfem.tolerances import NEGLIGIBLE, SAME_LOAD, same_special
 from rodfem.writhe import writhe
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def _left(branch: Data, branches: Sequence[Data]) -> str:
     """Name of the branch from whose branch point this one leaves; empty if its first row is elsewhere."""
     name, number = branch["parent"] or ("", 0)
     found = [x["special"][number]["load"] for x in branches if x["name"] == name and number < len(x["special"])]
-    return name if found and np.isclose(found[0], branch["columns"]["load"][0], rtol=1e-9, atol=0.0) else ""
+    return name if found and np.isclose(found[0], branch["columns"]["load"][0], rtol=SAME_LOAD, atol=0.0) else ""
 
 
 def _listed(columns: Data) -> list[str]:
