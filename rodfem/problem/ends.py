@@ -369,7 +369,7 @@ class SlidingHinge(End):
 
 @dataclass(frozen=True)
 class CircularGuide(End):
-    """Ball on a circle of a ``radius`` about its ``position``, across the vector of space with the number ``normal``."""
+    """Ball on a circle of a ``radius`` about its ``position``, across the vector of space of the number ``normal``."""
 
     radius: float = 1.0
     normal: int = 2
