@@ -127,6 +127,10 @@ class Meshes:
             if known is not old and cost(fields, d.elements, d.degree) <= affordable:
                 if found.fulfilled_by(d, known.system.fields.all_vertices(), indicator):
                     return known
+        return self.add(mesh)
+
+    def add(self, mesh: Discretization) -> BranchSolver:
+        """Solver on another ``mesh``."""
         first = self.solvers[0]
         s = first.system
         with s.clock("setup"):

@@ -16,6 +16,7 @@ from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import many
 from rodfem.fem.checks import QuadratureCheck
 from rodfem.fem.newton import TOLERANCE
+from rodfem.stability.motion_names import MotionNames
 from rodfem.stability.near_zero import resolve
 
 ROWS = 4
@@ -45,7 +46,7 @@ class PersistentZeros:
         one that is not zero but within that tolerance, next to a fold, the load's part of it has no digit.
         """
         extra = self.extra(solver, point)
-        recent = [p for p in history[-ROWS:] if p.arclength > 0.0]  # a branch point has zeros of its own
+        recent = history[-ROWS:]
         if extra <= 0 or {p.zero for p in recent} != {point.zero}:
             solver.damp(0)
             return
@@ -57,7 +58,9 @@ class PersistentZeros:
 
     def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
         """Report eigenvalues that are zero at two rows: to round-off, or to what Newton's method leaves of a state."""
-        stay = f"  {many(extra, 'eigenvalue stays', 'eigenvalues stay')} zero that no symmetry of the scene explains"
+        found = MotionNames(solver.system)(point.x, solver.inertia.modes_near_zero(point.x, extra))
+        stay = f"  {many(extra, 'eigenvalue stays', 'eigenvalues stay')} zero that no symmetry of the scene explains "
+        stay += f"({', '.join(dict.fromkeys(found))})"
         if _exact(solver, (before, point), extra) == extra:
             self.observer.note(f"{stay}: these states may turn or move freely at one and the same load")
         else:

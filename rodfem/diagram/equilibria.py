@@ -23,7 +23,6 @@ from rodfem.errors import Argument, ConvergenceError, InputError, Remedy, SceneE
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
-from rodfem.problem.scene import Scene
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 
 BENT = 1e-6
@@ -34,7 +33,10 @@ natural sizes, within which it is on the path whatever the step; least step, ove
 
 
 def first_state(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
-    """Equilibrium at ``load`` from the scene's start; :class:`SceneError` where constraints depend on one another."""
+    """Equilibrium at ``load`` from the scene's start, of an index that the mesh can hold, else :class:`Overfull`.
+
+    Raises :class:`SceneError` where constraints depend on one another.
+    """
     start = solver.start(load)
     try:
         x, outcome = first_equilibrium(solver, load)
@@ -45,6 +47,8 @@ def first_state(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonRes
         require_independent_constraints(solver.shape, start)
     elif may_depend(solver.shape, x):
         require_independent_constraints(solver.shape, x, start)
+    if outcome.converged and solver.conservative and not solver.lost_convexity(x):
+        check_index(solver, load, solver.inertia.at(x).count().negative)
     return x, outcome
 
 
@@ -66,13 +70,22 @@ def is_straight(r: NDArray[np.float64]) -> bool:
     return bool(across <= BENT * length * np.linalg.norm(chord))
 
 
-def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
-    """Raise :class:`InputError` for an ``index`` of a ``scene`` at a ``load`` that so many ``nodes`` cannot hold."""
+class Overfull(InputError):
+    """A state has more half-waves than its mesh can hold."""
+
+
+def check_index(solver: BranchSolver, load: float, index: int) -> None:
+    """Raise :class:`Overfull` for an ``index`` at a ``load`` that the nodes of the mesh cannot hold."""
+    mesh = solver.system.fields.discretization
+    nodes = mesh.elements * mesh.degree
     if index > max(0.9 * nodes, 4):
-        raise InputError(
-            f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index "
-            f"is {index} there)",
-            Remedy("use smaller loads, or more elements ({})", Argument("Discretization", "elements")),
+        raise Overfull(
+            f"At {solver.system.scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can "
+            f"hold (its index is {index} there)",
+            Remedy(
+                "use smaller loads, or more elements ({}), or a start nearer to the equilibrium that is meant",
+                Argument("Discretization", "elements"),
+            ),
         )
 
 
@@ -88,7 +101,7 @@ def check_start(solver: BranchSolver, span: tuple[float, float]) -> str:
         index = _index(solver, load)
         if index is None:
             break
-        check_index(system.scene, load, index, nodes)
+        check_index(solver, load, index)
         if 8 * index > nodes:
             there = _index(BranchSolver(System(system.scene, mesh.finer(2), system.comm)), load)
             if there not in (None, index):

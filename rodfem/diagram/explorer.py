@@ -10,7 +10,7 @@ from math import isfinite
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.mesh_sequence import Gap, arms
+from rodfem.adaptivity.mesh_sequence import TRIES, Gap, arms
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
@@ -19,13 +19,13 @@ from rodfem.continuation.singular_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, lines, start_branch
 from rodfem.deflation.search import Deflation, equilibria_at
 from rodfem.deflation.symmetries import Orbits
-from rodfem.diagram.equilibria import first_state, name_of_first
+from rodfem.diagram.equilibria import Overfull, first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import link
 from rodfem.stability.reduced_stiffness import Bordered
-from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import APART, SAME_SPECIAL, SAME_STATE
 
 TAIL, REACH = 8, 4.0
@@ -134,18 +134,14 @@ class Explorer(Tracer):
             number, *turns = link(self.solver.shape.sample(point.x))
             Tw, Wr = (round(x, 4) + 0.0 for x in turns)  # no negative zero
             self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
-        if point.negative:
-            index = index_range(point.negative, point.zero - self.solver.system.active_drifts(point.x))
-            words = f"  the first state is unstable already (index {index}): stability was lost outside the range"
-            self.observer.note(Remark(words, start))
         assert point.tangent is not None
         ahead = point.x + 0.1 * point.tangent  # rotations that give d3 one direction are a linear space
         return Branch(name_of_first(self.solver.shape, [point.x, ahead]), None, 0, [point])
 
     def _first(self) -> Point:
         start, stop = self.span
+        x, outcome = self._held(start)
         solver = self.solver
-        x, outcome = first_state(solver, start)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
@@ -158,6 +154,16 @@ class Explorer(Tracer):
         if family > 0:
             self._leave_family(point, family, stop > start)
         return point
+
+    def _held(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
+        """First state on a mesh that holds its half-waves; with an accuracy, on one of some finer ones."""
+        while True:
+            try:
+                return first_state(self.solver, load)
+            except Overfull:
+                if self.plan.accuracy is None or len(self.meshes.solvers) == TRIES:
+                    raise
+                self.use(self.meshes.add(self.solver.system.fields.discretization.finer(2)).mesh)
 
     def _leave_family(self, point: Point, freedoms: int, increasing: bool) -> None:
         """Give a first point that may move freely at its load the tangent along which the load changes.

@@ -196,9 +196,9 @@ class Solver:
         found.require_convexity(x)
         if guess is not None and may_depend(found.shape, x):
             require_independent_constraints(found.shape, x, found.start(load))
-        point, mesh = self.point(x), self.equilibria.system.fields.discretization
+        point = self.point(x)
         if found.conservative:
-            check_index(scene, load, point.index, mesh.elements * mesh.degree)
+            check_index(found, load, point.index)
         return point
 
     @checked(point=STATE, method=METHOD, number=count(4, 1))

@@ -24,6 +24,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.ranks import as_failure, without
+from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import DRIFT, ROUND_OFF
 
 NO_CONVERGENCE = "no convergence"
@@ -81,9 +82,7 @@ class Tracer:
         """Follow a branch to its end, or to where that fails."""
         self.use(branch.points[-1].mesh)
         self.control = AccuracyControl(self.meshes, (self.low, self.high))
-        self.solver.damp(0)
-        if branch.parent:
-            self.zeros.damp(self.solver, branch.points[-1])
+        self.zeros.damp(self.solver, branch.points[-1])
         try:
             with as_failure(self.solver.system.comm):
                 self._follow(branch)
@@ -118,6 +117,7 @@ class Tracer:
             try:
                 self.control.row(history[-1], self.solver)
                 if not begun:
+                    self._say_unstable(branch)
                     self._first_specials(branch)
                 begun = True
                 while not self._advance(branch, history):  # each time from where it has gone back to
@@ -172,6 +172,14 @@ class Tracer:
             self._say_early(branch)
         return True
 
+    def _say_unstable(self, branch: Branch) -> None:
+        """Say of the first branch that it begins unstable, on the mesh that it goes on with."""
+        point = branch.points[0]
+        if self.branches and branch is self.branches[0] and point.negative:
+            index = index_range(point.negative, point.zero - self.solver.system.active_drifts(point.x))
+            words = f"  the first state is unstable already (index {index}): stability was lost outside the range"
+            self.observer.note(Remark(words, point.load))
+
     def _say_early(self, branch: Branch) -> None:
         """Warn of a branch that ends for a reason that has a remedy."""
         for reason, remedy in REMEDIES.items():
@@ -187,7 +195,10 @@ class Tracer:
         self._check_symmetry(row)
         require_equilibrium(self.solvers[row.mesh], row)
         self.control.row(row, self.solver)
-        self.zeros.check(self.solver, history, row, self.specials.undecided)
+        known = [
+            p for p in history if p.arclength > 0.0 or branch.parent is None
+        ]  # a branch point has zeros of its own
+        self.zeros.check(self.solver, known, row, self.specials.undecided)
         if row.stretch <= 0:
             self._end_at_zero_stretch(branch, previous, row)
         self._require_convexity(branch, previous, row)
@@ -340,7 +351,7 @@ class Tracer:
         branch.explain()
         self._singular_start(branch)
         last = branch.points[-1]
-        if branch.ended == END_OF_RANGE and last.zero > self.solver.system.active_drifts(last.x):
+        if branch.ended == END_OF_RANGE and last.zero > self.specials.undecided:
             with self.without(
                 f"The last state, at {self.scene.load} = {last.load:g}, is singular, and was not resolved"
             ):

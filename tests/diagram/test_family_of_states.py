@@ -1,10 +1,10 @@
-"""Sweeps of rods that may turn freely, and of masses that depend on the load; equilibria on one path, or none."""
+"""Rods that may turn freely, families of states at each load; sweeps of masses that depend on the load."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from math import cos, sin
+from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
@@ -84,3 +84,54 @@ def test_a_branch(mass: Callable[[Any], Any], spectrum: int, words: str) -> None
     diagram = trace(scene, MESH, Plan(spectrum=spectrum, at=(1.25,), depth=0, error_bars=False))
     assert re.search(words, diagram[0].ended)
     assert (diagram[0].points[-1].load < 2.4) == (spectrum > 0)
+
+
+def wound(s: np.ndarray, torsion: float) -> np.ndarray:
+    """Quaternions of the one turn of a helix of length one, from the frame of its normal, binormal and tangent on."""
+    w, angle = 2 * pi, pi * np.asarray(s)
+    axis = np.array([0.0, np.sqrt(w**2 - torsion**2), torsion]) / w
+    return np.concatenate([np.cos(angle)[:, None], np.sin(angle)[:, None] * axis], axis=1)
+
+
+def test_helices_of_one_turn_of_a_family_at_each_load() -> None:
+    """Between clamps a turn apart a helix of ``C = 3 B`` nutates once a turn: ``k^2 + t^2 (C/B - 2)^2 = (2 pi)^2``.
+
+    All of these states have the energy of the helix, ``((2 pi)^2 + (C/B - 1) t^2) / 2``.
+    """
+
+    def place(c: Any) -> tuple[Any, ...]:
+        return 0.0, ufl.sqrt(4 * pi**2 - c.t**2) * c.t / (4 * pi**2), c.t**2 / (4 * pi**2)
+
+    helix = Scene(
+        "helix", (0.0, 1.0), "unshearable and inextensible",
+        lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + 3 * k[2] ** 2) / 2, {"t": 1.0}, "t",
+        (clamped(), clamped(place, (-1.0, 0.0, 0.0, 0.0))), Ordinate("x", s=0.5, of=lambda r, q: r[0]), (1.0, 5.0),
+        start=lambda s: wound(s, 1.0),
+    )  # fmt: skip
+    found = trace(helix, Discretization(elements=8), depth=0)
+    points = found[0].points
+    assert found[0].ended == "end of range"
+    assert [p.energy - p.load**2 for p in points] == pytest.approx([2 * pi**2] * len(points), abs=1e-11)
+    assert [p.negative for p in points] == [0] * len(points)
+    assert "1 eigenvalue stays zero that no symmetry of the scene explains (rotation about e" in found.notes[0]
+    assert not any("not resolved" in words for words in found.warnings)
+
+
+def test_a_closed_strip_may_slide_between_its_clamps() -> None:
+    """Half a turn in a strip of ``B2 = 2 B1``, ``C = 0.8 B1``, clamped at any place: its energy is by shooting."""
+
+    def start(s: np.ndarray) -> np.ndarray:
+        a, b = np.pi * np.asarray(s), np.pi * np.asarray(s) / 2
+        return np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.sin(b), np.sin(a) * np.cos(b), np.cos(a) * np.sin(b)], 1)
+
+    strip = Scene(
+        "strip", (0.0, 1.0), "unshearable and inextensible",
+        lambda v, k, c: (k[0] ** 2 + c.a * k[1] ** 2 + 0.8 * k[2] ** 2) / 2, {"a": 1.5}, "a",
+        (clamped(), clamped(rotation=(0.0, 0.0, 0.0, -1.0))), Ordinate("x", s=0.5, of=lambda r, q: r[0]), (1.5, 6.0),
+        start=start,
+    )  # fmt: skip
+    found = trace(strip, Discretization(elements=16), depth=0, at=(2.0,), error_bars=False)
+    assert found[0].ended == "end of range"
+    (asked,) = [s.point for s in found[0].special if s.point.load == 2.0]
+    assert asked.energy == pytest.approx(30.29087644785, abs=1e-10)
+    assert "no symmetry of the scene explains (rotation about e3 with" in found.notes[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import pi
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 import ufl
 from classics import circle
 
-from rodfem import Discretization, Ordinate, Plan, Ring, Scene, Solver, pinned, trace
+from rodfem import Discretization, InputError, Ordinate, Plan, Ring, Scene, Solver, clamped, free, pinned, trace
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.explorer import Explorer
 from rodfem.forms.energy import bending_and_twist
@@ -107,3 +108,29 @@ def test_a_column_buckles_in_any_units(stiffness: float, push: float) -> None:
     assert special.law.coefficient == pytest.approx(pi**4 / 8 * one, rel=1e-6)
     assert [branch.ended for branch in found] == ["end of range"] * 2
     assert found.warnings == []
+
+
+@pytest.mark.parametrize("run", [lambda cable: Solver(cable).equilibrium(280.0), trace, partial(trace, accuracy=1e-6)])
+def test_a_first_state_of_more_half_waves_than_a_mesh_holds(run: Callable[[Scene], Any]) -> None:
+    """A slack cable as a straight rod in compression, two per cent too long: its index grows with the mesh."""
+    cable = Scene(
+        "cable", (0.0, 300.0), "unshearable",
+        lambda v, k, c: 1.5e8 * (v[2] - 1) ** 2 + bending_and_twist(k, (1e4, 1e4, 1e4)), {"x": 280.0}, "x",
+        (clamped(), pinned(lambda c: (90.0, 0.0, c.x))), Ordinate("height", s=150.0, of=lambda r, q: r[0]),
+        (280.0, 170.0), planar="e2", distributed=lambda c: (-250.0, 0.0, 0.0),
+        start=lambda s: np.stack([np.cos(0.1555) + 0 * s, 0 * s, np.sin(0.1555) + 0 * s, 0 * s], axis=1),
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"more half-waves .* or a start nearer to the equilibrium"):
+        run(cable)
+
+
+def test_a_first_index_of_the_mesh_that_a_run_goes_on_with() -> None:
+    """A cantilever buckles at ``(2 k - 1)^2 pi^2 / 4``, 55 times below 30,000; four elements hold half of that."""
+    scene = Scene(
+        "column", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
+        {"P": 0.0}, "P", (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (30000.0, 30010.0), planar="e2",
+    )  # fmt: skip
+    found = trace(scene, accuracy=1e-6, depth=0)
+    assert {point.negative for point in found[0].points} == {55}
+    assert found.notes == ["the first state is unstable already (index 55): stability was lost outside the range"]
