@@ -82,8 +82,9 @@ def follower_moment_work(q: Expr, moment: Sequence[Any], dq: Expr) -> Expr:
 
 
 def misalignment(q: Expr, rotation: Sequence[Any]) -> Expr:
-    """``vec(conj(p) q)``, shape (3,): zero where the directors are those of the quaternion ``p = rotation``."""
-    return vector_part(product(conjugate(ufl.as_vector(list(rotation))), q))
+    """``2 vec(conj(p) q)/|p|``, (3,): zero at the directors of ``p = rotation``, with the spin as its derivative."""
+    p = ufl.as_vector(list(rotation))
+    return 2 * vector_part(product(conjugate(p), q)) / ufl.sqrt(ufl.dot(p, p))
 
 
 def angle_about(q: Expr, rotation: Expr, axis: Expr) -> Expr:

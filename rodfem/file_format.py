@@ -89,8 +89,8 @@ class Format:
             )
 
 
-DIAGRAM = Format("rodfem diagram", "the diagram.json of a run")
-STATES = Format("rodfem states", "the states.h5 of a run")
+DIAGRAM = Format("rodfem diagram", "the diagram.json of a run", 2)
+STATES = Format("rodfem states", "the states.h5 of a run", 2)
 MODES = Format("rodfem modes", f"the modes.h5 of a run with {Argument('Plan', 'modes')}")
 LOCUS = Format("rodfem locus", f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
 RESULT = Format("rodfem result", "a rod-00000.json, rod-00001.json ... of rodfem.many")

@@ -265,7 +265,7 @@ class Everywhere(Constraint):
 
     def blocks(self, number: int, degree: int) -> list[Block]:
         """Multiplier, of the degree of the field that is constrained."""
-        return [Block(f"{self.letter}{number}", 1, degree if self.nodal else degree - 1, self.nodal, True, True)]
+        return [Block(f"{self.letter}{number + 1}", 1, degree if self.nodal else degree - 1, self.nodal, True, True)]
 
 
 def integral(of: OfPlace, equals: Given = 0.0) -> Constraint:
