@@ -19,7 +19,7 @@ from rodfem.errors import many
 from rodfem.output.pieces import MEETS, Interval, intervals_of
 from rodfem.output.words import is_sweep
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, on_kink
-from rodfem.tolerances import SAME_SPECIAL
+from rodfem.tolerances import NEGLIGIBLE, SAME_SPECIAL
 
 MOST = 6
 """Intervals of a branch that have a clause each, and branches that are named in one sentence."""
@@ -37,7 +37,7 @@ RECOVERY = {
 """The same where the index does not rise."""
 FORMS = {
     "supercritical pitchfork": "buckles supercritically",
-    "subcritical pitchfork": "buckles subcritically",
+    "subcritical pitchfork": "buckles subcritically and jumps",
     "transcritical": "meets another branch transcritically",
     "vertical branch": "meets a family of states at one and the same load",
 }
@@ -344,6 +344,7 @@ def _width(data: Data) -> float:
 def distinct_digits(*loads: float, width: float = 0.0) -> list[str]:
     """Loads with as many digits as a range of that ``width`` needs: by default from the first load to the last."""
     width = width or abs(loads[-1] - loads[0])
+    loads = tuple(0.0 if abs(load) < NEGLIGIBLE * width else load for load in loads)  # round-off of a computed end
     more = ceil(log10(max(map(abs, loads)) / width)) if width and any(loads) else 0
     return [f"{load:.{min(FEW + max(more, 0), 15)}g}" for load in loads]
 

@@ -279,7 +279,8 @@ class Scene(Contribution, metaclass=Stated):
         ``"e1"`` or ``"e2"``: the rod moves only in the plane across that axis.  Rotations about it, two displacements,
         two forces and two strains are all that is left; the index in space is recorded, too.
     start
-        Quaternion(s) of a first guess, ``start(s)`` of shape (m,) -> (m, 4); by default the identity (a straight rod).
+        Quaternion(s) of a first guess, ``start(s)`` of shape (m,) -> (m, 4); by default the
+        natural shape if that fits between the ends, or a straight rod.
     span
         Default range of the load, from where the continuation starts to where it ends.
     states

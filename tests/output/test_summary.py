@@ -92,7 +92,7 @@ LAW = {"kind": "transcritical", "coefficient": 1.0, "power": 1, "uncertainty": 0
     ("more", "verb"),
     [
         ({"law": LAW}, "meets another branch transcritically;"),
-        ({"law": LAW | {"kind": "subcritical pitchfork"}}, "buckles subcritically;"),
+        ({"law": LAW | {"kind": "subcritical pitchfork"}}, "buckles subcritically and jumps;"),
         (
             {"law": LAW | {"kind": "supercritical pitchfork", "uncertainty": 2.0}},
             "buckles supercritically (or nearly so);",
