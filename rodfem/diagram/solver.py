@@ -36,7 +36,7 @@ from rodfem.stability.dependence import may_depend, require_independent_constrai
 from rodfem.timing import Clock
 
 SCENE: Check = a(Scene, "a rodfem.Scene")
-MESH: Check = a(Discretization, "a Discretization, as in Discretization(elements=8, degree=6); a plan is plan=Plan(...)")
+MESH: Check = a(Discretization, "a Discretization, as in Discretization(elements=8); a plan is plan=Plan(...)")
 RANKS: Check = a(MPI.Comm, "a communicator of mpi4py, as in @=MPI.COMM_SELF")
 POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['branch 1'].points[0]")
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
