@@ -70,6 +70,7 @@ class CriticalLoads:
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
         self.collisions, self._zeros, self._parted = Collisions(solver, eigensolver), 0, 0
         self._ahead = list[Meeting]()
+        self.poles = list[int]()  # in the last step: changes of the number of negative eigenvalues through infinity
 
     def between(self, a: Side, b: Side, behind: Side | None, zeros: int) -> list[Critical]:
         """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish.
@@ -77,7 +78,7 @@ class CriticalLoads:
         Steps are given one after the other, each with the row ``behind`` it; ``zeros`` eigenvalues are zero at all
         loads.
         """
-        self._zeros = zeros
+        self._zeros, self.poles = zeros, []
         sides = [a, *self._met(a, b, behind), b]
         events = [event for step in pairwise(sides) for event in self._step(*step)]
         return sorted(events, key=lambda event: abs(event.load - a.load))
@@ -144,9 +145,11 @@ class CriticalLoads:
     def _diverging(self, a: Side, b: Side, first: int, last: int) -> list[Critical]:
         """Loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
         numbers = range(min(first, last), max(first, last))
-        found = np.sort([load for number in numbers if not isnan(load := self._vanishing(a, b, number))])
+        loads = [self._vanishing(a, b, number) for number in numbers]
+        found = np.sort([load for load in loads if not isnan(load)])
         apart = np.diff(found) >= TOGETHER * unit(a.load, one=self.units.load)
         sign, bounds = 1 if last > first else -1, sorted((a.load, b.load))
+        self.poles += [sign] * (len(loads) - len(found))
         groups = np.split(found, np.flatnonzero(apart) + 1)
         return [self._divergence(a, group.tolist(), bounds, sign) for group in groups if len(group)]
 
@@ -173,8 +176,8 @@ class CriticalLoads:
             ) from trouble
         if pole:  # of a rod whose mass is all at a few points, where these do not move
             self.warn(
-                f"At {self._load} = {found:.8g} an eigenvalue changes its sign through infinity, not zero: the motion "
-                "there has no inertia; give the rod a mass along it."
+                f"At {self._load} = {found:.8g} an eigenvalue changes its sign through infinity, not zero: a motion "
+                "without inertia loses or regains its stability, and counts; give it a mass or a rotary inertia."
             )
         return nan if pole else found
 

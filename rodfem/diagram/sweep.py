@@ -76,6 +76,7 @@ class Sweep:
         self.critical = CriticalLoads(solver, self.eigensolver, observer.warn)
         self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._zeros = self.number  # frequencies that are zero at all loads
+        self._massless, self._counted = 0, False  # unstable motions without inertia, of no finite eigenvalue: 1 or 0
         self.branches: list[Branch] = []
 
     def run(self) -> list[Branch]:
@@ -248,7 +249,7 @@ class Sweep:
     def _record(self, row: Row, *, on_the_way: bool) -> None:
         """Record the frequencies of a row at its point; a special point is not ``on_the_way`` of the curves."""
         point, found = row.point, row.found
-        point.negative = row.side.spectrum.unstable
+        point.negative = row.side.spectrum.unstable + self._massless
         zeros = int((abs(found.values) < min(found.noise, REAL * self.units.omega2)).sum())
         point.zero += zeros
         self._zeros = min(self._zeros, zeros)
@@ -270,10 +271,30 @@ class Sweep:
             elif event.change > 0:
                 self._hidden(event, a, b)
             negative = after
+        negative += self._through_infinity(branch, second) if self.critical.poles else 0
         if negative != b.negative:
             change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
             branch.unexplained.append(change)
             self.observer.warn(Remark(str(change), a.load, b.load))
+
+    def _through_infinity(self, branch: Branch, row: Row) -> int:
+        """Change of the number of unstable motions at poles before a ``row``: one without inertia is unstable beyond.
+
+        At the first pole it is counted whether that is so after it or before it, and rows before it get what they lack.
+        """
+        lacking, poles = 0, self.critical.poles
+        if not self._counted:
+            lacking = (self.eigensolver.at(row.side.x).massless + len(poles)) % 2
+            for point in (*branch.points, row.point):
+                point.negative += lacking
+            for special in branch.special:
+                special.negative_before += lacking
+                special.negative_after += lacking
+            self._counted, self._massless = True, lacking
+        turned = (self._massless + len(poles)) % 2 - self._massless
+        self._massless += turned
+        row.point.negative += turned
+        return lacking + sum(poles) + turned
 
     def _hidden(self, event: Critical, a: Point, b: Point) -> None:
         """Say that round-off hides a collision between two rows; where some are unstable only their number is open."""

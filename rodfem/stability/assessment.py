@@ -168,7 +168,8 @@ class Assessor:
         else:
             with as_failure(self.system.comm):
                 found = self._method(name).nearest(x, max(number, 1))
-            counts = self.nonsymmetric.at(x).spectrum.unstable, self.system.active_drifts(x)
+            pencil = self.nonsymmetric.at(x)
+            counts = pencil.spectrum.unstable + pencil.massless, self.system.active_drifts(x)
             inside = 0.0, nothing, nothing
         return Verdict(
             *(*counts, found.values, found.vectors, found.errors, *inside, found.certified),

@@ -51,6 +51,9 @@ FREQUENCIES = 6
 SLOW, SOLVED = 1e-3, 1e-9
 """Part of the natural size below which eigenvalues are slow, and what a state leaves open of them."""
 
+LITTLE = 1e-6
+"""Inertia, relative to the mass, that makes all eigenvalues finite."""
+
 
 @dataclass(frozen=True)
 class Frequencies:
@@ -209,14 +212,14 @@ class NonsymmetricPencil:
         """Kinetic metric ``M``."""
         return self.solver.mass
 
-    def _in_units(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-        """All of matrix and mass, in units of natural sizes."""
-        stiffness, mass = in_units(self.system, self.matrix, self.mass, self.solver.sizes)
+    def _in_units(self, mass: PETSc.Mat) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """All of matrix and a ``mass``, in units of natural sizes."""
+        stiffness, mass = in_units(self.system, self.matrix, mass, self.solver.sizes)
         return gathered(stiffness).real, gathered(mass).real
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
-        matrix = self._in_units()[0]
+        matrix = self._in_units(self.mass)[0]
         size = abs(matrix).sum(axis=1).max()
         part = (matrix.T - matrix).tocoo()
         counted = abs(part.data) > NEGLIGIBLE * size
@@ -228,7 +231,7 @@ class NonsymmetricPencil:
 
     def about(self, target: float) -> Spectrum:
         """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""
-        return Spectrum(*self._in_units(), target / self._one, self._one)
+        return Spectrum(*self._in_units(self.mass), target / self._one, self._one)
 
     @cached_property
     def spectrum(self) -> Spectrum:
@@ -237,6 +240,14 @@ class NonsymmetricPencil:
             found = self.about(SHIFT * self._one)
             found.floor = self._floor(found)
             return found
+
+    @property
+    def massless(self) -> int:
+        """Number of unstable motions without inertia: a little of it all along the rod makes all eigenvalues finite."""
+        mass = self.mass.copy()
+        mass.axpy(LITTLE * mass.norm() / self.system.metric.norm(), self.system.metric)
+        found = Spectrum(*self._in_units(mass), SHIFT, self._one)
+        return found.unstable - self.spectrum.unstable if found.complete else 0
 
     def _floor(self, spectrum: Spectrum) -> float:
         """Round-off of the slow eigenvalues in the ``spectrum``; infinite where the rod has none.

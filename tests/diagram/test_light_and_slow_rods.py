@@ -7,7 +7,8 @@ critical: the statics of a cantilever under a follower load is regular at every 
 
 from __future__ import annotations
 
-from math import cos, hypot, sin, sqrt
+from dataclasses import replace
+from math import cos, hypot, pi, sin, sqrt
 from typing import Any
 
 import classics
@@ -73,14 +74,30 @@ def test_infinite_eigenvalues_make_no_rod_unstable(mass: float, elements: int, s
         assert found == pytest.approx(slowest(span[0]), rel=10 * mass + 1e-7)
 
 
-@pytest.mark.long
-def test_a_sign_that_changes_through_infinity_is_no_divergence() -> None:
-    diagram = trace(light(0.0, (0.0, 30.0)), Discretization(elements=6), Plan(depth=0, error_bars=False))
+@pytest.mark.usefixtures("few_loads")
+@pytest.mark.parametrize("span", [(16.0, 25.0), (25.0, 16.0)])
+def test_a_sign_that_changes_through_infinity_is_no_divergence(span: tuple[float, float]) -> None:
+    """Two motions are unstable beyond the pole, as with a mass of 1e-3 along the rod: of the tip, and of the rod."""
+    diagram = trace(light(0.0, span), Discretization(elements=6), Plan(depth=0, error_bars=False))
     (branch,) = diagram
-    assert [special.kind for special in branch.special] == [END]
-    assert all(point.negative == (point.load > POLE) for point in branch.points)
-    (said,) = [w for w in diagram.warnings if "through infinity" in w]
+    assert [special.kind for special in branch.special] == [END] and not branch.unexplained
+    assert all(point.negative == 2 * (point.load > POLE) for point in branch.points)
+    (said,) = diagram.warnings
     assert float(said.split("P = ")[1].split()[0]) == pytest.approx(POLE, abs=1e-5)
+
+
+@pytest.mark.usefixtures("few_loads")
+@pytest.mark.parametrize("span", [(18.0, 24.0), (24.0, 18.0)])
+def test_what_passes_through_minus_infinity_stays_unstable(span: tuple[float, float]) -> None:
+    """Tip under a dead load: ``mu = P a / (tan a - a)`` is positive from the pole to ``a = 3 pi/2``, the index is 1."""
+    end = End(force=lambda c: (0.0, 0.0, -c.P), follower=lambda c: (0.0, 0.0, 0.0))
+    scene = replace(light(0.0, span), ends=(clamped(), end))
+    (branch,) = diagram = trace(scene, Discretization(elements=6), Plan(depth=0, error_bars=False))
+    assert [x.point.load for x in branch.special[:-1]] == [pytest.approx((1.5 * pi) ** 2)] and len(
+        diagram.warnings
+    ) == 1
+    assert diagram.assess(branch.points[10]).negative == branch.points[10].negative
+    assert {(p.load > (1.5 * pi) ** 2, p.negative + p.zero) for p in branch.points} == {(False, 1), (True, 2)}
 
 
 MESH = Discretization("auto", 4, 6)
