@@ -99,8 +99,9 @@ class Equations:
     rotation), ``kinetic`` that of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``; it may be
     ``massless``, or ``even``: without the arclength.  ``potential`` is the Lagrangian without the constraints at nodes,
     at an equilibrium the total potential energy, None if a load has none; ``loads`` is that without the rod.  In
-    ``uniform`` equations there is no arclength, and nothing acts at points inside the rod.  ``register`` says what the
-    forms read now, of whichever scene: the ``line`` taken last, and the ``values`` that were put there since then.
+    ``uniform`` equations there is no arclength, no turn between joined ends, and nothing acts at points inside the rod.
+    ``register`` says what the forms read now, of whichever scene: the ``line`` taken last, and the ``values`` that were
+    put there since then.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -165,7 +166,8 @@ class Equations:
         kinetic = self._kinetic(a, b, sites, dx)
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.even = not extract_type(kinetic, ufl.SpatialCoordinate)
-        self.uniform = not (extract_type(first, ufl.SpatialCoordinate) or scene.joints or self.known.tables)
+        places = extract_type(first, ufl.SpatialCoordinate) or scene.joints or self.known.tables
+        self.uniform = not (places or scene.sides[1].turn)
         others = {"energy": W * dx, "metric": self._metric(a, b) * dx, "kinetic": kinetic}
         if scene.conservative:
             others |= {"potential": potential} | ({"loads": sum(loads)} if loads else {})

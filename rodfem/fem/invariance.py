@@ -38,6 +38,7 @@ from rodfem.fem.symmetries import SYMMETRIC_STATE, Symmetry, derivative, element
 from rodfem.linalg.matrices import rounding
 from rodfem.problem.contribution import Block, Motion
 from rodfem.problem.functions import derived
+from rodfem.problem.quaternions import directors, of_vector, product
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
@@ -300,13 +301,14 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
         kernel = (np.cos(turn) - decay) / (1 - 2 * decay * np.cos(turn) + decay**2)
         return np.asarray(0.5 * (a + b * kernel + w * np.sin(turn)) + (0.0 if closed else 0.3 * p * x**2))
 
-    values = wave()
+    values, ahead = wave(), of_vector(scene.sides[1].turn * x * np.array([0.0, 0.0, 1.0]))
     if block.name == "q":
-        values = fields.turning.normalised(_rotated(scene, values, wave, x, rng))
+        values = product(fields.turning.normalised(_rotated(scene, values, wave, x, rng)), ahead)
     if block.name == fields.turning.name:
         return _turned(fields, values, x)
     if block.name == "v":
-        return np.asarray(0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains])
+        values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
+        return (values[..., None, :] @ directors(ahead))[..., 0, :] if block.size == 3 else np.asarray(values)
     return values
 
 

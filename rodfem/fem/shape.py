@@ -240,12 +240,12 @@ def twist(s: np.ndarray, q: np.ndarray) -> float:
     return float(trapezoid(k3, fine)) / (2 * np.pi)
 
 
-def link(sample: dict[str, Any]) -> tuple[int, float, float]:
+def link(sample: dict[str, Any]) -> tuple[float, float, float]:
     """Linking number, twist and writhe of a state of a closed rod, given by :meth:`~rodfem.fem.shape.Shape.sample`.
 
     The linking number of the edge traced by a director with the centreline is ``Lk = Tw + Wr`` (Calugareanu 1959, White
-    1969), with the twist ``Tw = 1/(2 pi) int k3 ds`` and the writhe ``Wr`` of the centreline.  It is an integer, and
-    does not change while the rod is deformed without passing through itself: it belongs to the scene's start.
+    1969), with the twist ``Tw = 1/(2 pi) int k3 ds`` and the writhe ``Wr`` of the centreline.  It is an integer
+    and a ring's turn, and does not change unless the rod passes through itself: it belongs to the scene's start.
     """
     from scipy.interpolate import CubicSpline
 
@@ -253,9 +253,11 @@ def link(sample: dict[str, Any]) -> tuple[int, float, float]:
     closed[-1] = closed[0]
     Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=1e-5)  # the change that is accepted
     Tw = twist(s, np.asarray(sample["q"]))
-    Lk = round(Tw + Wr)
+    a, b = np.asarray(sample["q"])[[0, -1]]
+    turn = np.arctan2(a[0] * b[3] - a[3] * b[0] + a[2] * b[1] - a[1] * b[2], a @ b) / np.pi  # of conj(a) b about d3
+    Lk = round(round(Tw + Wr - turn) + turn, 9) + 0.0  # no negative zero
     if abs(Tw + Wr - Lk) > 0.05:
-        raise InputError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")
+        raise InputError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no linking number: close the rod, without contact.")
     return Lk, Tw, Wr
 
 

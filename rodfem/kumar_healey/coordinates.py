@@ -138,10 +138,10 @@ class Coordinates:
         return (sp.diags(same) + spins).tocsr()
 
     def _closed(self, pencil: MappedPencil, state: State) -> MappedPencil:
-        """Keep of the equations that close a ring's rotation the combinations across the quaternion at its start."""
+        """Keep of the equations that close a ring's rotation the combinations across the quaternion at its end."""
         f, count = self.system.fields, len(self.blocks.columns)
-        start = np.isclose(f.coordinates(f.discretization.degree), self.system.scene.interval[0])
-        q = self.blocks.gathered(state.values("q")[start])[0]
+        end = np.isclose(f.coordinates(f.discretization.degree), self.system.scene.interval[1])
+        q = self.blocks.gathered(state.values("q")[end])[0]
         closing = {f.scalars[x.name]: x.component for x in f.unknown_scalars if x.group == CLOSING_MOMENT}
         columns = np.searchsorted(self.blocks.columns, np.array(list(closing), dtype=int))
         across = np.linalg.svd(q[list(closing.values())][None])[2][1:].T

@@ -23,7 +23,7 @@ import ufl
 from rodfem.errors import InputError, SceneError
 from rodfem.forms import loads
 from rodfem.forms.rotation import IDENTITY, rotation
-from rodfem.problem.arguments import check_vector, convert, number_of, plain, reals, yes_or_no
+from rodfem.problem.arguments import check_vector, convert, number, number_of, plain, reals, yes_or_no
 from rodfem.problem.contribution import (
     DEAD_AT_END,
     FOLLOWER,
@@ -90,6 +90,7 @@ class End(Contribution):
 
     closed = False  # whether it is joined to the other end
     sign = 1.0  # of the right end's quaternion over the left one's, where they are joined
+    turn = 0.0  # about d3, from the left to the right one's
     guide: ClassVar[Direction] = (0.0, 0.0, 0.0)
     """Direction in which it slides where that need not be e1, e2 or e3; zero without one."""
 
@@ -247,7 +248,10 @@ CLOSING_FORCE = Group("f", "closing force", "closing of the ring along e{}", Mot
 
 @dataclass(frozen=True)
 class Ring:
-    """Both ends joined to each other, with equal directors: a closed rod.
+    """Both ends joined to each other, with equal directors, or those of the right end a ``turn`` ahead: a closed rod.
+
+    The turn, in radian, is about the tangent: a strip with half a turn has ``turn=pi``, and may slide along itself if
+    its section looks alike after it.
 
     Where the directors turn about the closed rod an odd number of times in all (a circle without twist: once), its
     quaternion changes sign, ``q(l) = -q(0)``; with ``odd = False`` it does not.  The number itself, and with it the
@@ -255,27 +259,29 @@ class Ring:
     """
 
     odd: bool = True
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the kind; raises :class:`InputError`."""
-        convert(self, odd=yes_or_no)
+        """Check the kinds; raises :class:`InputError`."""
+        convert(self, odd=yes_or_no, turn=number(np.pi))
 
     def __iter__(self) -> Iterator[End]:
         """Yield the left and the right end."""
         for last in (False, True):
-            yield JoinedEnd(sign=-1.0 if self.odd else 1.0, last=last)
+            yield JoinedEnd(sign=-1.0 if self.odd else 1.0, last=last, turn=self.turn)
 
 
 @dataclass(frozen=True)
 class JoinedEnd(End):
     """One end of a closed rod: nothing but the other end holds it.
 
-    Multipliers close ``q(l) = +-q(0)`` and, with a centreline, ``r(l) = r(0)``.  In a plane the angle grows by the
-    whole number of turns that the scene's start makes.
+    Multipliers close ``q(l) = +-q(0) g``, with the quaternion ``g`` of a ``turn`` about d3, and, with a centreline,
+    ``r(l) = r(0)``.  In a plane the angle grows by the whole number of turns that the scene's start makes.
     """
 
     sign: float = 1.0
     last: bool = False
+    turn: float = 0.0
     closed = True
 
     def clamps(self, block: Block, c: Constants) -> list[bool]:
@@ -294,20 +300,28 @@ class JoinedEnd(End):
     def lagrangian(self, at: Site) -> Iterator[Any]:
         """Share of this end in the equations of closure, with their multipliers."""
         sign, size = 1.0 if self.last else -1.0, 4 if at.whole is None else 1
-        turned = [at.turned] if size == 1 else at.turned
+        turned = [at.turned] if size == 1 else at.turned if self.last else self.ahead(at.turned)
         if self.last and size == 1:
             yield -at.y[0] * at.whole
         yield (-self.sign if size == 4 and not self.last else sign) * _dot(at.y[:size], turned, range(size))
         if len(at.y) > size:
             yield sign * _dot(at.y[size:], at.x.r, at.free)
 
+    def ahead(self, q: Any) -> Any:
+        """Quaternion ``q`` turned by the ring's turn about d3."""
+        c, s = np.cos(self.turn / 2), np.sin(self.turn / 2)
+        return [c * q[0] - s * q[3], c * q[1] + s * q[2], c * q[2] - s * q[1], c * q[3] + s * q[0]] if self.turn else q
+
     def check(self, side: str, scene: Scene) -> None:
         """Check that the start of the ring closes; raises :class:`SceneError`."""
         if scene.start is None:
             raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
+        if self.turn and scene.planar is not None:
+            raise SceneError(f"A planar ring cannot have a turn of {self.turn:g}: leave planar or the turn out.")
         first, last = scene.start(np.array(scene.interval))
-        if self.sign * (first @ last) <= 0:
-            what = f"make q(l) = {self.sign:+g} q(0), or choose Ring(odd={self.sign > 0})"
+        if self.sign * np.dot(self.ahead(first), last) <= 0:
+            turn = f" turned by {self.turn:g} about d3" if self.turn else ""
+            what = f"make q(l) = {self.sign:+g} q(0){turn}, or choose Ring(odd={self.sign > 0})"
             raise SceneError(f"The start of the ring does not end as it begins: {what}.")
 
 

@@ -12,7 +12,7 @@ import pytest
 import ufl
 from classics import SUPPORTS, column
 
-from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, pinned, trace
+from rodfem import Discretization, Inertia, Ordinate, Plan, Ring, Scene, clamped, free, pinned, trace
 from rodfem.diagram.diagram import Diagram
 
 
@@ -117,8 +117,8 @@ def test_helices_of_one_turn_of_a_family_at_each_load() -> None:
     assert not any("not resolved" in words for words in found.warnings)
 
 
-def test_a_closed_strip_may_slide_between_its_clamps() -> None:
-    """Half a turn in a strip of ``B2 = 2 B1``, ``C = 0.8 B1``, clamped at any place: its energy is by shooting."""
+def half_turn(ends: Any) -> Diagram:
+    """A strip of ``B2 = a B1``, ``C = 0.8 B1``, closed with half a turn."""
 
     def start(s: np.ndarray) -> np.ndarray:
         a, b = np.pi * np.asarray(s), np.pi * np.asarray(s) / 2
@@ -126,12 +126,25 @@ def test_a_closed_strip_may_slide_between_its_clamps() -> None:
 
     strip = Scene(
         "strip", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + c.a * k[1] ** 2 + 0.8 * k[2] ** 2) / 2, {"a": 1.5}, "a",
-        (clamped(), clamped(rotation=(0.0, 0.0, 0.0, -1.0))), Ordinate("x", s=0.5, of=lambda r, q: r[0]), (1.5, 6.0),
-        start=start,
+        lambda v, k, c: (k[0] ** 2 + c.a * k[1] ** 2 + 0.8 * k[2] ** 2) / 2, {"a": 1.5}, "a", ends,
+        Ordinate("energy", s=None, of=lambda x, c: x.k[0] ** 2), (1.5, 6.0), start=start,
     )  # fmt: skip
     found = trace(strip, Discretization(elements=16), depth=0, at=(2.0,), error_bars=False)
     assert found[0].ended == "end of range"
     (asked,) = [s.point for s in found[0].special if s.point.load == 2.0]
-    assert asked.energy == pytest.approx(30.29087644785, abs=1e-10)
-    assert "no symmetry of the scene explains (rotation about e3 with" in found.notes[0]
+    assert asked.energy == pytest.approx(30.29087644785, abs=1e-10)  # by shooting
+    assert {p.negative for p in found[0].points} == {0}
+    return found
+
+
+def test_a_closed_strip_may_slide_between_its_clamps() -> None:
+    """Any place of it may be the clamped one: no symmetry of the scene, as the clamps stay where they are."""
+    found = half_turn((clamped(), clamped(rotation=(0.0, 0.0, 0.0, -1.0))))
+    assert "1 eigenvalue stays zero that no symmetry of the scene explains (rotation about e3 with" in found.notes[0]
+
+
+def test_a_ring_with_half_a_turn_slides_along_itself() -> None:
+    """Its section looks alike after half a turn: rotations and that motion are its four zero eigenvalues."""
+    found = half_turn(Ring(turn=pi))
+    assert {p.zero for p in found[0].points} == {4} and not found.warnings
+    assert found.notes == ["closed rod: linking number 0.5, twist 0.4986, writhe 0.0014"]
