@@ -371,12 +371,14 @@ class SingularSystem:
             curve = self._curve(share[:2], at, noise)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
         response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self._rest(at, -at.b[:, 0]))]))
-        vectors, seed = [v.copy() for v in null], self.inertia.seed(0)
+        vectors = [v.copy() for v in null]
         orthonormalize(vectors, self.inertia.metric)
+        parts = np.array([[wave.dot(v) for wave in self.inertia.waves(k)] for v in vectors])
+        basis, seen = np.linalg.qr(parts)  # the same on any mesh and number of ranks: the wave i sees none after i
         return SingularState(
             x,
             self.system.scalar(x),
-            [v * (1.0 if seed.dot(v) >= 0 else -1.0) for v in vectors],  # of two directions always the same
+            [combine(vectors, z * np.copysign(1.0, r)) for z, r in zip(basis.T, np.diag(seen), strict=True)],
             response,
             float(np.linalg.norm(at.Z.T @ (at.border @ changes))),
             noise,
