@@ -270,6 +270,15 @@ class Fields:
             out[copies] = named.get(name, 0.0)
         return np.where(self.number < 0, self.clamps, out)
 
+    def wave(self, i: int = 1) -> np.ndarray:
+        """A smooth wave in each component of each field, over natural sizes, zero where it is clamped: local values."""
+        named = {}
+        for block in self.blocks:
+            x, number = self.coordinates(block.degree) - self.scene.interval[0], i * np.arange(1, block.size + 1)
+            named[block.name] = np.sin(number + np.multiply.outer(x / self.scene.length, number))
+        named |= {name: np.sin(i * number) for number, name in enumerate(self.scalars, start=1) if name != "load"}
+        return np.where(self.number < 0, 0.0, self.filled(named))
+
     @cached_property
     def sizes(self) -> np.ndarray:
         """Natural size of each local value: rotations are of order one, the others have units."""

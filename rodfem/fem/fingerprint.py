@@ -50,7 +50,7 @@ def _numbers(shape: Shape, mass: PETSc.Mat, load: float, units: PETSc.Vec) -> li
     The kinetic metric of the system is written into ``mass``; ``shape`` evaluates its states.
     """
     system = shape.system
-    x, change = _waves(system, load), _changes(system)
+    x, change = _waves(system, load), system.vector(system.fields.sizes * system.fields.wave())
     x.pointwiseMult(x, units)
     state, residual = system.at(x), system.new_vector()
     state.residual(residual)
@@ -83,21 +83,4 @@ def _waves(system: System, load: float) -> PETSc.Vec:
     undeformed = np.array([1.0 if i == 2 else 0.0 for i in scene.free_strains])
     rest = {fields.turning.name: start.reshape(*fields.coordinates(fields.discretization.degree).shape, -1)}
     base = fields.filled(rest | {"v": undeformed, LOAD: load})
-    return system.vector(base + 0.1 * fields.sizes * _wave(system))
-
-
-def _changes(system: System) -> PETSc.Vec:
-    """The waves alone, as a change of a state."""
-    return system.vector(system.fields.sizes * _wave(system))
-
-
-def _wave(system: System) -> np.ndarray:
-    """A wave in each component of each field, in natural sizes, zero where the rod is clamped: local values."""
-    fields, scene = system.fields, system.scene
-    named = {}
-    for block in fields.blocks:
-        x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
-        number = np.arange(1, block.size + 1)
-        named[block.name] = np.sin(number + np.multiply.outer(x, number))
-    named |= {name: np.sin(number) for number, name in enumerate(fields.scalars, start=1) if name != LOAD}
-    return np.where(fields.number < 0, 0.0, fields.filled(named))
+    return system.vector(base + 0.1 * fields.sizes * fields.wave())

@@ -214,13 +214,10 @@ class End(Contribution):
             raise SceneError(f"{what}: leave that component out, or leave the position free there.")
 
     def _check_moments(self, where: str, c: Constants) -> None:
-        for given, fixed in ((self.moment, True), (self.follower_moment, False)):
-            if given is None or self.turning != AXIS:
-                continue
-            frame = [number_of(x) for x in self.frame(c)]
-            moment, axis = np.array([number_of(x) for x in given(c)]), np.array(self._axis())
-            axis = directors(np.array(frame)) @ axis if fixed else axis
-            if np.linalg.norm(np.cross(axis, moment)) > NEGLIGIBLE * np.linalg.norm(moment):
+        frame = directors(np.array([number_of(x) for x in self.frame(c)])) if self.turning == AXIS else np.eye(3)
+        for given, fixed in ((self.moment, frame), (self.follower_moment, np.eye(3))):
+            moment, axis = np.array([number_of(x) for x in given(c)] if given else [0.0] * 3), fixed @ self._axis()
+            if self.turning == AXIS and np.linalg.norm(np.cross(axis, moment)) > NEGLIGIBLE * np.linalg.norm(moment):
                 what = f"A moment acts on the {where} across the axis of its hinge, about which alone it turns"
                 raise SceneError(f"{what}: leave that component out, or the directors free there.")
 

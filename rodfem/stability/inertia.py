@@ -244,16 +244,8 @@ class Inertia:
 
     def waves(self, count: int) -> list[PETSc.Vec]:
         """Products with the metric of smooth changes of a state, which know no mesh and no ranks."""
-        fields, out = self.system.fields, list[PETSc.Vec]()
-        for i in range(1, count + 1):
-            named = {}
-            for block in fields.blocks:
-                x = (fields.coordinates(block.degree) - fields.scene.interval[0]) / fields.scene.length
-                number = i * np.arange(1, block.size + 1)
-                named[block.name] = np.sin(number + np.multiply.outer(x, number))
-            wave = np.where(fields.number < 0, 0.0, fields.sizes * fields.filled(named))
-            out.append(self.metric * self.system.vector(wave))
-        return out
+        fields = self.system.fields
+        return [self.metric * self.system.vector(fields.sizes * fields.wave(i)) for i in range(1, count + 1)]
 
 
 class Factored:
