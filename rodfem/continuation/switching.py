@@ -22,7 +22,7 @@ from rodfem.continuation.branch import PITCHFORK, TRANSCRITICAL, VERTICAL_BRANCH
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.first_equilibrium import STILL
 from rodfem.continuation.singular_points import LEVEL
-from rodfem.fem.newton import Correction, Limits, correct, linear_step, newton
+from rodfem.fem.newton import TOLERANCE, Correction, Limits, correct, linear_step, newton
 from rodfem.linalg.orthogonal import combine, project_out
 from rodfem.roots import zero_between
 from rodfem.tolerances import TINY
@@ -175,13 +175,15 @@ def _early(special: SpecialPoint, side: float, begins: int | None, first: Point,
 def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
     """Unit directions in which branches do leave a branch point with several null vectors of different motions.
 
-    Of two null vectors they are the zeros of the force that holds the rod in a direction.  Of more, Newton's method is
-    started in random directions.  Each is taken once more as that in which what Newton's method finds is seen from the
-    branch point.  The orthonormal null vectors, ``ways``, are returned where nothing is found.
+    Of two null vectors they are the zeros of the force that holds the rod in a direction; or any one, of a circle of
+    states, if all forces are what Newton's method leaves.  Of more, Newton's method is started in random directions.
+    Each is taken once more as that in which what it finds is seen from the branch point.  The orthonormal null vectors,
+    ``ways``, are returned where nothing is found.
     """
     n, found = len(ways), list[np.ndarray]()
     if n == 2:
-        zeros = np.array(_zeros(lambda angle: _force(solver, special.point.x, ways, angle)))
+        least = TOLERANCE * FIRST * solver.system.stiffness_scale
+        zeros = np.array(_zeros(lambda angle: _force(solver, special.point.x, ways, angle), least))
         tried = np.stack([np.cos(zeros), np.sin(zeros)], axis=1)
     else:
         tried = np.concatenate([np.eye(n), np.random.default_rng(n).normal(size=(12 * (n - 1), n))])
@@ -227,10 +229,12 @@ def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], a
     return force if newton(iteration, Limits(reach=CLOSE * FIRST)).converged else float("nan")
 
 
-def _zeros(force: Callable[[float], float]) -> list[float]:
-    """Angles in half a circle at which a force is zero."""
+def _zeros(force: Callable[[float], float], least: float) -> list[float]:
+    """Angles in half a circle at which a force is zero; one of them if all forces are below the ``least``."""
     angles = np.pi * (np.arange(49) + (np.sqrt(5) - 1) / 2) / 48  # on no axis of a symmetry
     values = np.array([force(angle) for angle in angles])
+    if (abs(values) <= least).all():
+        return [0.0]
     felt = 1e-6 * np.nanmax(abs(values), initial=0.0)  # round-off: a symmetry turns the direction
     return [
         zero_between(force, float(angles[i]), float(angles[i + 1]), 1e-4)  # in radian

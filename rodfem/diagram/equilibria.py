@@ -33,10 +33,7 @@ natural sizes, within which it is on the path whatever the step; least step, ove
 
 
 def first_state(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult]:
-    """Equilibrium at ``load`` from the scene's start, of an index that the mesh can hold, else :class:`Overfull`.
-
-    Raises :class:`SceneError` where constraints depend on one another.
-    """
+    """First equilibrium at ``load``; :class:`SceneError` for dependent constraints, :class:`Overfull` for its index."""
     start = solver.start(load)
     try:
         x, outcome = first_equilibrium(solver, load)

@@ -12,7 +12,7 @@ import pytest
 import ufl
 from classics import SUPPORTS, column
 
-from rodfem import Discretization, Inertia, Ordinate, Plan, Ring, Scene, clamped, free, pinned, trace
+from rodfem import Discretization, End, Inertia, Ordinate, Plan, Ring, Scene, clamped, free, pinned, trace
 from rodfem.diagram.diagram import Diagram
 
 
@@ -148,3 +148,18 @@ def test_a_ring_with_half_a_turn_slides_along_itself() -> None:
     found = half_turn(Ring(turn=pi))
     assert {p.zero for p in found[0].points} == {4} and not found.warnings
     assert found.notes == ["closed rod: linking number 0.5, twist 0.4986, writhe 0.0014"]
+
+
+def test_one_branch_of_a_circle_of_states_that_no_symmetry_explains() -> None:
+    """A rod that bends alike in all directions while it does not twist: guided, it buckles at ``4 pi^2`` in any."""
+    guided = End(position=(0.0, 0.0, None), rotation=(1.0, 0.0, 0.0, 0.0), force=lambda c: (0.0, 0.0, -c.P))
+    column = Scene(
+        "guided", (0.0, 1.0), "unshearable and inextensible",
+        lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) / 2 - 0.05 * k[1] ** 2 * k[2] ** 2, {"P": 0.0}, "P",
+        (clamped(), guided), Ordinate("middle", s=0.5, of=lambda r, q: r[0]), (35.0, 45.0),
+    )  # fmt: skip
+    found = trace(column, Discretization(elements=6, degree=4), depth=1, error_bars=False)
+    (special,) = found.special("branch point")
+    assert special.point.load == pytest.approx(4 * pi**2, rel=1e-7)
+    assert [branch.name for branch in found] == ["straight", "branch 1"]
+    assert "2 directions at once: a circle of states" in found.in_words()
