@@ -83,6 +83,7 @@ def test_a_diagram_that_is_read_keeps_its_plan(folder: Path) -> None:
     assert read.again(events=(tip,)).special(EVENT)
 
 
+@pytest.mark.alone
 def test_files_of_version_1(folder: Path) -> None:
     """They have the multiplier ``p0`` for ``p1``, twice the moments at the ends, and residuals with these."""
     end = sliding((0.0, None, None), lambda c: (ufl.cos(c.P / 2), 0.0, 0.0, ufl.sin(c.P / 2)))
