@@ -106,7 +106,7 @@ def members(
         chosen = closed(found.values, share, size)
         if len(chosen) == size and share[chosen].min() > (REAL if left else 0.25):
             return found, chosen
-    raise ConvergenceError(f"the {size} eigenvalues near {cluster.mean:.6g} are not found again")
+    raise ConvergenceError(f"The {size} eigenvalues near {cluster.mean:.6g} are not found again: use a smaller range.")
 
 
 def closed(values: np.ndarray, share: np.ndarray, size: int) -> list[int]:
