@@ -32,7 +32,7 @@ from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
 Floats = NDArray[np.float64]
 
 ZERO = 1e-7
-"""A reaction below this, relative to the natural force or moment, is the error of Newton's method."""
+"""A force or moment below this, relative to the natural force or moment, is the error of Newton's method."""
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
 SMALL = 1e-3
@@ -56,7 +56,7 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
         shown |= _moving(branch, here, group, folder / "modes.h5", stage)
         traced = is_traced(branch, data["branches"])
         branches.append(shown | {"image": "" if traced else branch.get("image", "")})
-    _clear_reactions(branches, data["natural"])
+    _clear_ends(branches, data["natural"])
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
 
 
@@ -65,7 +65,7 @@ def end_forces(shapes: Shapes, group: Any) -> dict[str, list[float | None]]:
     found = [profiles_of(group, row) for row in range(len(group["load"]))]
     turns = [directors(shapes.q[:, end]) for end in (0, -1)]
     out: dict[str, list[float | None]] = {}
-    for symbol, words in (("n", "reaction force"), ("m", "reaction moment")):
+    for symbol, words in (("n", "end force"), ("m", "end moment")):
         for end, side, sign in ((0, "left", -1.0), (-1, "right", 1.0)):
             at_end = np.array([one.fields[symbol].reshape(-1, 3)[end] for one in found])
             in_space = sign * np.einsum("pij,pj->pi", turns[end], at_end)
@@ -73,10 +73,10 @@ def end_forces(shapes: Shapes, group: Any) -> dict[str, list[float | None]]:
     return out
 
 
-def _clear_reactions(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
-    """Leave out reactions that vanish in all rows, to round-off."""
-    for name in [name for name in branches[0]["ordinates"] if name.startswith("reaction")]:
-        size = natural.get("force" if name.startswith("reaction force") else "moment", 1.0)
+def _clear_ends(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
+    """Leave out forces and moments on ends that vanish in all rows, to round-off."""
+    for name in [name for name in branches[0]["ordinates"] if name.startswith(("end force", "end moment"))]:
+        size = natural.get("force" if name.startswith("end force") else "moment", 1.0)
         if all(abs(x or 0.0) < ZERO * size for branch in branches for x in branch["ordinates"][name]):
             for branch in branches:
                 del branch["ordinates"][name]

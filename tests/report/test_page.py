@@ -84,12 +84,12 @@ def test_every_kind_of_run_has_a_page(results: Path, name: str) -> None:
     assert dict(data["origin"])["command"] and "dolfinx" in dict(data["origin"])["versions"]
 
 
-def test_reactions_are_ordinates(results: Path) -> None:
-    """A column under the thrust P: its supports push with P along the axis."""
+def test_forces_on_ends_are_ordinates(results: Path) -> None:
+    """A column under the thrust P: its foot, and the load at its head, push with P along the axis."""
     branches = payload_of(results / "pinned")["branches"]
     for branch in branches:
         for side, sign in (("left", 1.0), ("right", -1.0)):
-            found = branch["ordinates"][f"reaction force e₃, {side} end"]
+            found = branch["ordinates"][f"end force e₃, {side} end"]
             assert found == pytest.approx([sign * load for load in branch["load"]], rel=1e-6, abs=1e-9)
 
 
