@@ -63,7 +63,7 @@ _HOMES = {
         "fem.fields": "Discretization",
         "diagram.plan": "Plan",
         "continuation.follow": "StepControl IndexStepControl",
-        "problem.events": "Event",
+        "problem.events": "Event Level",
         "app.run": "run",
         "diagram.diagram": "trace Diagram",
         "diagram.saved": "load",

@@ -42,7 +42,7 @@ from rodfem.fem.newton import correct
 from rodfem.fem.shape import Shape, Transfer, halved, richer_system
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
-from rodfem.problem.events import Event
+from rodfem.problem.events import Event, Level
 from rodfem.roots import zero_between
 from rodfem.tolerances import INSIDE, ROUND_OFF, round_off, same_place, unit
 
@@ -228,7 +228,7 @@ class Enriched:
         if again is not None and alike(again, law):
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
 
-    def _at_event(self, point: Point, event: Event) -> Again:
+    def _at_event(self, point: Point, event: Event | Level) -> Again:
         """The point of the richer mesh at which an event happens: the nearest one, of several."""
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
         node, along = nearest_event(self.solver, event, x, tangent)

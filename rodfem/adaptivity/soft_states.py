@@ -32,7 +32,7 @@ from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
-from rodfem.continuation.kinds import EVENT, FOLD
+from rodfem.continuation.kinds import FOLD, NUMBER
 from rodfem.continuation.observer import Remark
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
@@ -324,7 +324,7 @@ class SoftRows:
 def _given(branch: Branch) -> list[SpecialPoint]:
     """Loads asked for, ends and events of a ``branch``, but for those at special points."""
     singular = {id(s.point) for s in branch.special if s.kind.counted or s.test_function == "stretch"}
-    return [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
+    return [s for s in branch.special if (s.kind.given or s.kind.test == NUMBER) and id(s.point) not in singular]
 
 
 def _is_doubtful(branch: Branch, given: Sequence[SpecialPoint]) -> bool:

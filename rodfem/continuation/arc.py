@@ -27,12 +27,13 @@ from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import ALIGNED, BranchSolver, between, cubic
 from rodfem.continuation.branch_solver import Knot as Row
 from rodfem.continuation.crossings import Node, clear, places
+from rodfem.continuation.kinds import EVENT, LEVEL, Kind
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, SceneError
 from rodfem.fem.checks import Convexity
 from rodfem.fem.newton import correct, linear_step
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import generic
-from rodfem.problem.events import Event
+from rodfem.problem.events import Event, Level
 from rodfem.roots import zero_between
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
 from rodfem.tolerances import INSIDE, ROUND_OFF, TINY
@@ -283,17 +284,55 @@ def end(solver: BranchSolver, arclength: float, x: PETSc.Vec, direction: PETSc.V
     return End(arclength, x, tangent, [solver.shape.sample(state) for state in states])
 
 
-class EventPiece(Chord):
+class SoughtPiece(Chord):
+    """A piece of a branch along which zeros of an ``event`` are sought."""
+
+    kind: Kind
+
+    def __init__(self, solver: BranchSolver, event: Any, a: End, b: End) -> None:
+        super().__init__(solver, a, b)
+        self.event = event
+        self.first, self.last = (self.node(end.x, end.tangent, end.samples) for end in (a, b))
+
+    @abstractmethod
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, seen: Any = None) -> Node:
+        """Node at a state with its unit tangent; what events receive there may have been ``seen``."""
+
+    @abstractmethod
+    def zeros(self) -> list[Node]:
+        """Nodes at which it happens, in order; raises :class:`ConvergenceError` where an equilibrium is not found."""
+
+    def uncertainty(self, node: Node) -> float:
+        """How far the place of a node is uncertain: the last of the halves of a piece."""
+        return LEAST
+
+    def turns(self) -> list[Node]:
+        """Nodes at which it nearly happens."""
+        return []
+
+    def is_zero(self, node: Node) -> bool:
+        """Whether it happens at a node, whatever is next to it."""
+        return False
+
+    def _solved(self, p: Node, q: Node, t: float) -> Node:
+        """Node at a part of the way between two others, solved for from the curve of the whole piece."""
+        node = self.solve(self.first, self.last, p.s + t * (q.s - p.s))
+        if node is None:
+            raise ConvergenceError(f"no equilibrium is found where the event {self.event.name!r} happens")
+        return node
+
+
+class EventPiece(SoughtPiece):
     """A piece of a branch with the number of an event along it.
 
     It is zero to round-off up to the ``level``: :data:`~rodfem.tolerances.ROUND_OFF` times the rate at which it varies
     with the state in a generic direction, as along the branch it need not vary.
     """
 
+    kind = EVENT
+
     def __init__(self, solver: BranchSolver, event: Event, a: End, b: End) -> None:
-        super().__init__(solver, a, b)
-        self.event = event
-        self.first, self.last = (self.node(end.x, end.tangent, end.samples) for end in (a, b))
+        super().__init__(solver, event, a, b)
         varied = (abs(self._change(p, x.samples[-1])) for p, x in ((self.first, a), (self.last, b)))
         self.level = ROUND_OFF / GENERIC * max(varied)
 
@@ -365,15 +404,39 @@ class EventPiece(Chord):
             before, here = ((n.H, n.slope)[order].item() for n in (p, node))
             p, q = (node, q) if here * before > 0 else (p, node)
 
-    def _solved(self, p: Node, q: Node, t: float) -> Node:
-        """Node at a part of the way between two others, solved for from the curve of the whole piece."""
-        node = self.solve(self.first, self.last, p.s + t * (q.s - p.s))
-        if node is None:
-            raise ConvergenceError(f"no equilibrium is found where the event {self.event.name!r} happens")
-        return node
+
+class LevelPiece(SoughtPiece):
+    """A piece of a branch with the number of eigenvalues below a level along it, which changes where one equals it.
+
+    Eigenvalues are sorted, and cross: counts in halves of the piece need none by itself.  ``far`` of a node is the count.
+    """
+
+    kind = LEVEL
+
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, seen: Any = None) -> Node:
+        """Node at a state with its unit tangent."""
+        below = self.solver.spectrum.at(x).below(self.event.value / self.solver.units.omega2)
+        speed, none = float(self.row.dot(tangent)), np.zeros((0, 0))
+        return Node(self.place(x), none, none, below, Knot(x, tangent * (1.0 / speed), speed))
+
+    def zeros(self) -> list[Node]:
+        """Nodes at which the number changes; raises :class:`ConvergenceError` where an equilibrium is not found."""
+        return self._changes(self.first, self.last)
+
+    def _changes(self, p: Node, q: Node) -> list[Node]:
+        if p.far == q.far or q.s - p.s <= LEAST:
+            return [q] * (p.far != q.far)
+        middle = self._solved(p, q, 0.5)
+        return self._changes(p, middle) + self._changes(middle, q)
 
 
-def nearest_event(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec) -> tuple[Node, float]:
+def piece_with(event: Event | Level, solver: BranchSolver, a: End, b: End) -> SoughtPiece:
+    """Piece with what is sought along it."""
+    kind: type[SoughtPiece] = EventPiece if isinstance(event, Event) else LevelPiece
+    return kind(solver, event, a, b)
+
+
+def nearest_event(solver: BranchSolver, event: Event | Level, x: PETSc.Vec, tangent: PETSc.Vec) -> tuple[Node, float]:
     """Node at which an ``event`` happens nearest to a state ``x``, and how far its place is uncertain.
 
     A number that touches zero on another mesh may not reach it on that of the ``solver``: then it is where it turns.
@@ -383,7 +446,7 @@ def nearest_event(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PET
     for s in (-0.02, 0.02):  # in the metric
         there = corrected(solver, x + tangent * s, row)
         both.append(end(solver, s, there, solver.tangent(row, at=there)))
-    piece = EventPiece(solver, event, *both)
+    piece = piece_with(event, solver, *both)
     nodes = piece.zeros() or piece.turns()
     if not nodes:
         raise ConvergenceError(f"the event {event.name!r} does not happen near there")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.kinds import BRANCH_POINT, EVENT, Kind
+from rodfem.continuation.kinds import BRANCH_POINT, NUMBER, Kind
 from rodfem.errors import SMALLER_STEPS, InputError, many
 from rodfem.libraries import optional
 from rodfem.problem.arguments import SHORT
@@ -21,7 +21,7 @@ from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, SoftMode, inde
 if TYPE_CHECKING:
     from rodfem.continuation.branch_solver import BranchSolver
     from rodfem.fem.resultants import Profile, Reactions
-    from rodfem.problem.events import Event
+    from rodfem.problem.events import Event, Level
     from rodfem.stability.cluster import Cluster
 
 NOT_TRACED = "not traced"
@@ -249,7 +249,7 @@ class SpecialPoint:
     omega2_error: float = float("nan")  #: bound of its error
     unfolding: float = float("nan")  #: size of the unfolding parameters: round-off, unless there is an imperfection
     cluster: Cluster | None = None  #: the eigenvalues that collide
-    event: Event | None = None  #: the event that happens here, of those that the plan asks for
+    event: Event | Level | None = None  #: the event that happens here, of those that the plan asks for
 
     def __repr__(self) -> str:
         """Kind, load and change of the index."""
@@ -260,7 +260,7 @@ class SpecialPoint:
     def names(self) -> tuple[str, ...]:
         """Names by which it is found: its kind, that of its normal form, and that of its event."""
         law = "" if self.law is None else self.law.kind
-        event = "" if self.kind != EVENT else self.note if self.event is None else self.event.name
+        event = "" if self.kind.test != NUMBER else self.note if self.event is None else self.event.name
         return tuple(filter(None, (self.kind, law, PITCHFORK * (PITCHFORK in law), event)))
 
     @property

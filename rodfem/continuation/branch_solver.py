@@ -262,9 +262,9 @@ class BranchSolver:
         return RegularPoints(self.inertia)
 
     @cached_property
-    def spectrum(self) -> SymmetricSolver | None:
-        """What finds left-most eigenvalues, if they are recorded."""
-        return SymmetricSolver(self.inertia) if self.modes else None
+    def spectrum(self) -> SymmetricSolver:
+        """What finds left-most eigenvalues, and counts those below a number."""
+        return SymmetricSolver(self.inertia)
 
     @cached_property
     def resultants(self) -> Resultants:
@@ -402,7 +402,7 @@ class BranchSolver:
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
         """Left-most eigenvalues by SLEPc, if asked for; :class:`ConvergenceError` where they contradict the inertia."""
-        if self.spectrum is None:
+        if not self.modes:
             return []
         modes = self.spectrum.at(x).leftmost(self.modes)
         tolerance = self.inertia.tolerance / self.inertia.scale * least_eigenvalue(self.system)

@@ -82,12 +82,14 @@ DIVERGENCE = Kind(
 )  # fmt: skip
 """Under loads without a potential: a frequency becomes imaginary."""
 EVENT = Kind("event", code="UZ", test=NUMBER, marker={"marker": "+", "ms": 8.5, "mec": "black", "mew": 1.6})
+LEVEL = Kind("level", code="UZ", test=NUMBER, marker={"marker": "1", "ms": 9.5, "mec": "black", "mew": 1.6})
+"""An eigenvalue equals a given number."""
 USER = Kind(
     "user", code="UZ", test=LOAD,
     marker={"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
 )  # fmt: skip
 END = Kind("end", code="EP")
-KINDS = {str(kind): kind for kind in (BRANCH_POINT, FOLD, IMPERFECT, FLUTTER, DIVERGENCE, EVENT, USER, END)}
+KINDS = {str(kind): kind for kind in (BRANCH_POINT, FOLD, IMPERFECT, FLUTTER, DIVERGENCE, EVENT, LEVEL, USER, END)}
 """By name, in the order of legends."""
 
 GAP = 1e-5

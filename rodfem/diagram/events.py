@@ -1,4 +1,4 @@
-"""What a plan asks for in a step of a branch: its loads, and its events, zeros of the cubic of a number of the state.
+"""What a plan asks for in a step of a branch: loads, levels of eigenvalues, events: zeros of the cubic of a number.
 
 An event at a row is a special point of the step that ends there, or of the first one of a branch that begins there:
 unless that is a branch point of another one, or the state at which a closed branch began.  A number that is zero at
@@ -15,13 +15,13 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from rodfem.continuation.arc import Arc, End, EventPiece, end
+from rodfem.continuation.arc import Arc, End, SoughtPiece, end, piece_with
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver, between
-from rodfem.continuation.kinds import EVENT, USER
+from rodfem.continuation.kinds import USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
-from rodfem.problem.events import Event
+from rodfem.problem.events import Event, Level
 from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Events:
     of steps on which it is zero.
     """
 
-    def __init__(self, events: Sequence[Event]) -> None:
+    def __init__(self, events: Sequence[Event | Level]) -> None:
         self.events = events
         self._open: dict[str, list[float]] = {}
         self._flat: dict[str, list[float]] = {}
@@ -99,7 +99,7 @@ class Events:
         if not self.events:
             return []
         ends = [self._end(step, row) for row in (step.a, step.b)]
-        return [s for event in self.events for s in self._in_step(step, EventPiece(step.solver, event, *ends))]
+        return [s for event in self.events for s in self._in_step(step, piece_with(event, step.solver, *ends))]
 
     def finish(self, observer: Observer) -> None:
         """Say where an event was not located, and where it is zero all along."""
@@ -123,7 +123,7 @@ class Events:
             self._last = row, end(step.solver, row.arclength, row.x, direction)
         return self._last[1]
 
-    def _in_step(self, step: Step, piece: EventPiece) -> list[SpecialPoint]:
+    def _in_step(self, step: Step, piece: SoughtPiece) -> list[SpecialPoint]:
         """Special points of the event of a piece, which is a step."""
         name, loads = piece.event.name, [step.a.load, step.b.load]
         if piece.is_zero(piece.first) and piece.is_zero(piece.last):
@@ -140,13 +140,13 @@ class Events:
         return [_special(step, piece, node) for node in zeros if node not in known]
 
 
-def _special(step: Step, piece: EventPiece, node: Node) -> SpecialPoint:
+def _special(step: Step, piece: SoughtPiece, node: Node) -> SpecialPoint:
     """The special point of an event at a node, which may be a row."""
-    solver, knot = step.solver, node.kept
+    solver, knot, event = step.solver, node.kept, piece.event
     if node in (piece.first, piece.last):
         point = replace(step.a if node is piece.first else step.b)
     else:
         point = solver.point(knot.x, piece.begin + node.s, knot.slope * knot.speed)
     slope = solver.system.scalar(knot.slope)
     left = abs(slope) * piece.uncertainty(node) + round_off(point.load, solver.units.load)
-    return SpecialPoint(EVENT, point, point.negative, point.negative, left, note=piece.event.name, event=piece.event)
+    return SpecialPoint(piece.kind, point, point.negative, point.negative, left, note=event.name, event=event)

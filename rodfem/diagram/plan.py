@@ -10,7 +10,7 @@ from rodfem.continuation.follow import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.arguments import a, convert, each, interval, optional, real, reals, whole, yes_or_no
-from rodfem.problem.events import Event
+from rodfem.problem.events import Event, Level
 from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
@@ -31,7 +31,7 @@ FINEST, ACCURACY, COARSEST = 1e-11, 1e-8, 1e-1
 """Least accuracy that can be asked for, which is near round-off, one that an error suggests, and the greatest one."""
 
 
-EVENTS = each(a(Event, "Events, as in events=(Event('ends meet', of=f),)"))
+EVENTS = each(a((Event, Level), "Events or Levels, as in events=(Event('ends meet', of=f),)"))
 
 
 def _locus(name: str, value: Any) -> tuple[str, float, float]:
@@ -75,7 +75,7 @@ class Plan:
         that is given the formulation, the factors and the vertices are taken, which are the first mesh; elements and
         degree alone are not.
     events
-        Numbers of the state whose zeros are special points, too (conservative scenes).
+        Numbers of the state whose zeros are special points, too, and levels of eigenvalues (conservative scenes).
     most_branches
         Nothing more is followed from branch points once there are so many branches; 0 for no limit.
     """
@@ -91,7 +91,7 @@ class Plan:
     method: str = ""
     modes: int = 0
     accuracy: float | None = None
-    events: tuple[Event, ...] = ()
+    events: tuple[Event | Level, ...] = ()
     most_branches: int = 0
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Events: the user's own test functions, numbers of the state whose zeros along a branch are special points."""
+"""What a plan may seek along a branch: zeros of a number of the state, and eigenvalues that equal a number."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rodfem.errors import InputError, SceneError
-from rodfem.problem.arguments import function, plain, text
+from rodfem.problem.arguments import finite, function, plain, text
 from rodfem.problem.functions import Role, guarded
 
 ROLE = Role(
@@ -65,3 +65,25 @@ class Event:
         except SceneError as trouble:
             if isinstance(trouble.__cause__, (TypeError, NameError)):
                 raise
+
+
+@dataclass(frozen=True)
+class Level:
+    """A ``value`` of an eigenvalue ``mu = omega^2`` of the second variation, in units of the scene.
+
+    A special point is where the number of smaller eigenvalues changes from row to row, by one or more.
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        """Check the value; raises :class:`InputError`."""
+        finite("value", self.value, 0.5)
+
+    @property
+    def name(self) -> str:
+        """Name of its special points."""
+        return f"eigenvalue {self.value:g}"
+
+    def check(self, length: float) -> None:
+        """Nothing can fail: there is no function of the user's."""

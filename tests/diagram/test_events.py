@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import rodfem
-from rodfem import Discretization, Event, InputError, Plan, clamped, sliding
+from rodfem import Discretization, Event, InputError, Level, Plan, clamped, sliding
 from rodfem.continuation import arc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.forms.energy import bending_and_twist
@@ -46,12 +46,24 @@ def test_the_distance_of_the_ends_of_an_elastica(apart: float) -> None:
     assert [s.kind for s in found["straight"].special].count("event") == 0
 
 
+def test_levels_of_eigenvalues() -> None:
+    """Of a column of rotary inertia alone they are ``B (n pi)^2 - P``, each twice if it bends as easily either way."""
+    rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 45.0), constants={"B2": 1.0})
+    found = rodfem.trace(rod, plan=Plan(depth=0, events=(Level(5.0), Level(-8.0))))
+    for value, modes in ((5.0, (1, 2)), (-8.0, (1,))):
+        points = found.special(f"eigenvalue {value:g}")
+        exact = [(n * np.pi) ** 2 - value for n in modes]
+        assert [s.point.load for s in points] == pytest.approx(exact, rel=0, abs=1e-7)
+        assert all(abs(s.point.load - P) <= s.error_estimate < 1e-6 for s, P in zip(points, exact, strict=True))
+        assert {s.kind for s in points} == {"level"}
+
+
 def test_an_event_that_fails_is_named() -> None:
     rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 5.0), planar="e1")
     wrong = Plan(depth=0, events=(Event("tip", of=lambda state: state.tip),))
     with pytest.raises(InputError, match=r"The event 'tip' fails with AttributeError, .*: it receives a state with"):
         rodfem.trace(rod, plan=wrong)
-    with pytest.raises(InputError, match="give Events, as in"):
+    with pytest.raises(InputError, match="give Events or Levels, as in"):
         Plan(events=(np.sin,))  # type: ignore[arg-type]
 
 

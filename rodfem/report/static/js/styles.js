@@ -13,6 +13,7 @@ export const SYMBOLS = {
   flutter: { symbol: "star", size: 14, color: "#f0e442", line: edge(1.2) },
   divergence: { symbol: "triangle-down", size: 12, color: "#f0e442", line: edge(1.2) },
   event: { symbol: "cross-thin", size: 10, line: edge(1.8) },
+  level: { symbol: "y-up", size: 10, line: edge(1.8) },
   user: { symbol: "x-thin", size: 8, line: edge(1.8) },
 };
 export const ENDS = { symbol: "x", size: 9, color: "white", line: { color: "#b3123e", width: 1.6 } };
