@@ -408,7 +408,7 @@ class EventPiece(SoughtPiece):
 class LevelPiece(SoughtPiece):
     """A piece of a branch with the number of eigenvalues below a level along it, which changes where one equals it.
 
-    Eigenvalues are sorted, and cross: counts in halves of the piece need none by itself.  ``far`` of a node is the count.
+    Eigenvalues are sorted, and cross: counts in halves of the piece need none by itself.  ``far`` of a node is a count.
     """
 
     kind = LEVEL
