@@ -2,21 +2,17 @@
 
 A JSON file carries its mark in the entry ``format``, with ``name``, ``version`` and ``program``; an HDF5 file in the
 attributes ``format``, ``format_version`` and ``program``.  The version of a format rises where a reader of the last one
-would misread a file, or miss what it needs; entries that are merely added do not raise it.  A file without a mark is
-older than all versions: it is read where it has what the reader needs.
-
-Each entry, group and column is described in ``docs/files.md``.
+would misread a file, or miss what it needs; entries that are merely added do not raise it.  ``docs/files.md`` describes
+each entry, group and column.
 """
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from stat import S_ISREG
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,43 +46,35 @@ class Format:
         return {KEYS[key]: value for key, value in self.mark().items()}
 
     def check(self, data: Any, where: Path | str, needs: Sequence[str] = ()) -> None:
-        """Raise :class:`InputError` for another format, a newer version, or what lacks what a reader ``needs``."""
+        """Raise :class:`InputError` for another format or version, or what lacks what a reader ``needs``."""
         if not isinstance(data, Mapping):
             raise InputError(f"{where} has no entries by name, so it is no {self.name}: give {self.file}.")
-        self._check(data.get("format"), data, where, needs)
+        self._check(data.get("format") or {}, data, where, needs)
 
     def check_hdf5(self, file: h5py.File, needs: Sequence[str] = ()) -> None:
         """Check an open HDF5 file, as :meth:`check` does a JSON file; ``needs`` are names of groups or attributes."""
         mark = {key: file.attrs.get(name) for key, name in KEYS.items()}
-        self._check(mark if mark["name"] else None, {*file.attrs, *file}, file.filename, needs)
+        self._check(mark, {*file.attrs, *file}, file.filename, needs)
 
     @contextmanager
     def opened(self, path: Path | str, needs: Sequence[str] = (), unfit: str = "") -> Iterator[h5py.File]:
         """Open an HDF5 file; raises :class:`InputError` for what cannot be read inside of the block, too."""
         import h5py
 
-        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."):
-            require_regular(path)
-            with h5py.File(path, "r") as file:
-                self.check_hdf5(file, needs)
-                if hollow := file.visititems(_hollow):
-                    raise InputError(f"{path} stores a part of the array {hollow} only: run the scene again.")
-                yield file
+        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."), h5py.File(path, "r") as file:
+            self.check_hdf5(file, needs)
+            yield file
 
-    def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
-        if mark is not None and mark["name"] != self.name:
-            raise InputError(f"{where} has the format {mark['name']!r}, not {self.name!r}: give {self.file}.")
-        if mark is not None and mark["version"] > self.version:
-            program, version = mark["program"], mark["version"]
+    def _check(self, mark: Mapping[str, Any], entries: Any, where: Path | str, needs: Sequence[str]) -> None:
+        if mark.get("name") != self.name:
+            raise InputError(f"{where} is no {self.name}, its format is {mark.get('name')!r}: give {self.file}.")
+        if mark["version"] != self.version:
             raise InputError(
-                f"{where} was written by {program}, in version {version} of the format {self.name!r}, and {PROGRAM} "
-                f"reads versions up to {self.version}: read it with {program} or newer, or run the scene again."
+                f"{where} was written by {mark['program']}, in version {mark['version']} of the format {self.name!r}, "
+                f"and {PROGRAM} reads version {self.version}: read it with {mark['program']}, or run the scene again."
             )
         if missing := [name for name in needs if name not in entries]:
-            raise InputError(
-                f"{where} has no {', '.join(missing)}, so it is no {self.name}, or one of a version of rodfem that "
-                f"wrote less: give {self.file}, or run the scene again."
-            )
+            raise InputError(f"{where} has no {', '.join(missing)}, so it is no {self.name}: give {self.file}.")
 
 
 DIAGRAM = Format("rodfem diagram", "the diagram.json of a run", 2)
@@ -115,27 +103,14 @@ def refusal(unfit: str) -> Iterator[None]:
         raise InputError(unfit.replace("{}", reason)) from trouble
 
 
-def require_regular(path: Path | str) -> None:
-    """Raise :class:`OSError` for a pipe, a device, and what is larger than this machine's memory."""
-    status = os.stat(path)
-    if not S_ISREG(status.st_mode) or status.st_size > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
-        raise OSError("no regular file, or one larger than the memory")
-
-
-def _hollow(name: str, item: Any) -> str | None:
-    """Name of an array that is larger in memory than what is stored of it: rodfem stores arrays whole."""
-    return name if getattr(item, "nbytes", 0) and item.nbytes > item.id.get_storage_size() else None
-
-
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
     """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
     try:
-        require_regular(path)
         data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as trouble:
         also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""
         raise InputError(f"There is no {path}: give {form.file}{also}.") from trouble
-    except (OSError, ValueError, RecursionError, MemoryError) as trouble:
+    except (OSError, ValueError, RecursionError) as trouble:
         raise InputError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
     form.check(data, path, needs)
     return data

@@ -51,8 +51,8 @@ def many(
     ``{"error": sentence}``, and the others go on.  ``progress(done, all)`` is called on rank 0 after each of its rods.
     ``scenes`` are shared among the ranks of ``comm``.  A rod is skipped if its file in ``folder`` is whole and has its
     name, load, range and constants: choose another folder if a function of a scene, or ``work``, has changed.  Raises
-    :class:`InputError` where ``folder`` cannot be written, is in use by another process, or has a result in another or
-    a newer format, and where ``work`` returns anything else.
+    :class:`InputError` where ``folder`` cannot be written, is in use by another process, or has a result in another
+    format, and where ``work`` returns anything else.
     """
     folder = Path(folder)
     end_together()
@@ -79,7 +79,8 @@ def many(
 def _check(files: Sequence[Path]) -> None:
     """Raise :class:`InputError` where a file has a format that is not to be written over."""
     for file in files:
-        RESULT.check(_contents(file), file)
+        if data := _contents(file):
+            RESULT.check(data, file)
 
 
 def _result(scene: Scene, work: Work) -> dict[str, Any]:

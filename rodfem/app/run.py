@@ -297,9 +297,7 @@ def draw(output: Path, report: Report) -> None:
     name = "\N{GREEK SMALL LETTER LAMDA}" if data["parameter_label"] == r"\lambda" else data["parameter"]
     caption = f"{data['title']}, {branch}, {name} = {words}"
     with ThreadPoolExecutor(1) as background:  # the shape is drawn by a process of its own, for which the thread waits
-        shape = background.submit(
-            draw_shape_safely, output / "states.h5", branch, row, output / "shape.png", caption=caption
-        )
+        shape = background.submit(draw_shape_safely, output / "states.h5", branch, row, output / "shape.png", caption)
         draw_diagram(data, output / "diagram.png")
     trouble = shape.result()
     report.say(f"Pictures in {output}{os.sep}: diagram.png" + ("" if trouble else ", shape.png"))

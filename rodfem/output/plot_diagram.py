@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle, pairwise, product
 from math import isfinite
@@ -20,14 +18,11 @@ from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.spatial import KDTree
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
-from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output import style
 from rodfem.output.pieces import COUNTED, Piece, endings, pieces_of
 from rodfem.output.style import END, FONT, HALO, LINES, PALETTE
 from rodfem.stability.soft_mode import STABLE
 from rodfem.tolerances import TINY
-
-__all__ = ["draw_diagram", "main"]
 
 Floats = NDArray[np.float64]
 Branches = Sequence[Mapping[str, Any]]
@@ -68,14 +63,13 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     ordinate, are thin lines: they were not traced.
 
     ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
-    200 dpi.  Its suffix decides the format (.png, .pdf, .svg).  Raises :class:`InputError` for another format of file.
+    200 dpi.  Its suffix decides the format (.png, .pdf, .svg).
     """
     return style.save(figure_of(diagram), path)
 
 
 def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
     """Figure of a diagram, as :func:`draw_diagram` writes it, or that of axes that are ``given``: it is drawn there."""
-    DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = diagram["branches"]
     with matplotlib.rc_context(style.STYLE):
         figure, axes = style.sheet(diagram["title"], _about(diagram), given)
@@ -286,23 +280,3 @@ def drawn(branch: Mapping[str, Any]) -> list[tuple[Piece, Floats]]:
         parts = [part for i in range(piece.first, piece.last) for part in (rows[i : i + 1], more.get(i, rows[:0]))]
         found.append((piece, np.vstack([*parts, rows[piece.last]])))
     return found
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw the diagram named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = argparse.ArgumentParser(
-        prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram."
-    )
-    parser.add_argument("diagram", type=Path, help="diagram.json of a scene")
-    parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")
-    given = parser.parse_args(arguments)
-
-    def draw() -> Path:
-        diagram = read_json(given.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
-        return draw_diagram(diagram, given.output or given.diagram.with_suffix(".png"))
-
-    return style.status_of(draw, given.diagram)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -23,7 +23,6 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
-from rodfem.file_format import DIAGRAM
 from rodfem.modes.modes import RIGID
 from rodfem.output.pieces import Interval, intervals_of
 from rodfem.output.style import HALO, PALETTE, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
@@ -56,18 +55,14 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
 
     One line a curve, one colour a kind of motion.  Real frequencies are lines, a complex pair is a cross (real part)
     and a plus (imaginary part), what has diverged is a plus; flutter loads are stars, divergence loads triangles, and
-    unstable ranges are shaded.  The axis shows the ``most`` left-most eigenvalues.  Returns ``path``; raises
-    :class:`ValueError` without any ``omega2``, and :class:`InputError` for another format of file.
+    unstable ranges are shaded.  The axis shows the ``most`` left-most eigenvalues.  Returns ``path``.
     """
     return save(figure_of(diagram, most=most), path)
 
 
 def figure_of(diagram: Mapping[str, Any], given: Axes | None = None, most: int = 3) -> Figure:
     """Figure of the frequencies, as :func:`draw_frequencies` writes it, or that of axes that are ``given``."""
-    DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
-    if not branches:
-        raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")
     about = mesh_in_words(diagram["discretization"]) + _accuracy(branches)
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(str(diagram["title"]), about, given)

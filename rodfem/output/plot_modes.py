@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
@@ -21,18 +19,15 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import POINT, Glyph, Look, Solid, between, glyphs_of, striped
 from rodfem.output.render import axes_of, axis_of
 from rodfem.output.states import curve_of
-from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS, status_of
+from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
 from rodfem.whole_files import draft_of
-
-__all__ = ["draw_modes", "main"]
 
 Floats = NDArray[np.float64]
 PANEL, TITLES = (4.0, 2.75), 0.8  # inches; those that titles take above a panel
@@ -44,29 +39,24 @@ GROWTH = 1e-9
 """Real part of the root of -mu, relative to it, above which a mode grows."""
 
 
-def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence[int] = ()) -> Path:
+def draw_modes(path: Path, branch: str, row: int, output: Path) -> Path:
     """Draw the modes of one state, each in a panel of its own.
 
-    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state, ``chosen`` are numbers of modes, from 1 on
-    (none: all).  ``output`` is the picture to write, and to return; an animation if its suffix is .gif, in which
-    unstable modes grow like ``exp(sqrt(-mu) t)``, then go back, and stable ones oscillate, each in a time of its own.
-    Raises :class:`InputError` if the file has no such modes.
+    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state.  ``output`` is the picture to write, and to
+    return; an animation if its suffix is .gif, in which unstable modes grow like ``exp(sqrt(-mu) t)``, then go back,
+    and stable ones oscillate, each in a time of its own.  Raises :class:`InputError` if the file has no such modes.
     """
     modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)
-    for number in chosen:
-        if not 1 <= number <= count:
-            raise InputError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
-    numbers = [n - 1 for n in chosen] or list(range(count))
-    columns = min(3, len(numbers)) if len(numbers) != 4 else 2
-    rows, moving = ceil(len(numbers) / columns), output.suffix.lower() == ".gif"
+    columns = min(3, count) if count != 4 else 2
+    rows, moving = ceil(count / columns), output.suffix.lower() == ".gif"
     with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
         FigureCanvasAgg(figure)
         figure.subplots_adjust(0.01, 0.01, 0.99, 1 - (TITLES + 0.4) / (rows * PANEL[1] + 0.5), 0.04, 0.36)
         words, top = f"{heading(path)}{branch}, load {modes.load:.6g}", 1 - 0.1 / figure.get_figheight()
         figure.suptitle(words, fontsize=14, y=top, va="top")
-        panels = [_Panel(figure.add_subplot(rows, columns, i), modes, setting, n) for i, n in enumerate(numbers, 1)]
+        panels = [_Panel(figure.add_subplot(rows, columns, n + 1), modes, setting, n) for n in range(count)]
         if moving:
             _animate(figure, panels, draft)
         else:
@@ -208,21 +198,3 @@ class _Panel:
         shades = (colors * light[:, None])[near]
         drawn = PolyCollection(corners[near, :, :2], facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=order)
         return self.axes.add_collection(drawn, autolim=False)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw the modes named on the command line; returns 0, or 2 after one sentence on standard error."""
-    parser = argparse.ArgumentParser(
-        prog="python -m rodfem.output.plot_modes", description="Draw the modes of a state."
-    )
-    parser.add_argument("modes", type=Path, help="modes.h5 of a run with --modes")
-    parser.add_argument("--branch", required=True, help="name of the branch")
-    parser.add_argument("--row", required=True, type=int, help="row of the state, as in states.h5")
-    parser.add_argument("--mode", type=int, nargs="+", default=[], help="numbers of modes, from 1 on (default all)")
-    parser.add_argument("--output", type=Path, default=Path("modes.png"), help=".png, .pdf, .svg; .gif: an animation")
-    given = parser.parse_args(arguments)
-    return status_of(lambda: draw_modes(given.modes, given.branch, given.row, given.output, given.mode), given.modes)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -26,7 +26,7 @@ from rodfem.errors import InputError
 from rodfem.file_format import STATES
 from rodfem.output.glyphs import POINT, Glyph, Look, Solid, glyphs_of, sign_of, striped
 from rodfem.output.states import curve_at
-from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE, status_of
+from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
@@ -37,8 +37,6 @@ from rodfem.whole_files import draft_of, picture_at, write_whole
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Branch, Point
     from rodfem.continuation.branch_solver import BranchSolver
-
-__all__ = ["draw_shape", "draw_shape_safely", "main"]
 
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the caption
@@ -76,8 +74,6 @@ def draw_shape(
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise ValueError(f"picture {path} has an unknown format: expected one of {FORMATS}, try shape.png")
-    if radius is not None and not 0.0 < radius < float("inf"):
-        raise ValueError(f"radius={radius} is not positive: expected a length, try 0.01 or leave it out")
     state = _read(Path(states), branch, row)
     look = Look(radius or thickness(state.centres), state.view() if view is None else view)
     pyvista = _import_pyvista()
@@ -137,7 +133,7 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
         branches = file["branches"]
         if branch not in branches:
             raise InputError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
-        group, first = branches[branch], branches[file.attrs.get("first", branch)]
+        group, first = branches[branch], branches[file.attrs["first"]]
         if not 0 <= row <= (last := len(group["r"]) - 1):
             raise InputError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
         load = float(group["load"][row])
@@ -387,15 +383,13 @@ def snapshot(
 # --- in processes
 
 
-def draw_shape_safely(
-    states: Path, branch: str, row: int, path: Path, *, limit: float = 120.0, **options: str | float | None
-) -> str | None:
+def draw_shape_safely(states: Path, branch: str, row: int, path: Path, caption: str, limit: float = 120.0) -> str:
     """Draw as `draw_shape` does, but in a process of its own, which may crash without harm, within ``limit`` seconds.
 
-    Returns None where the picture was written, else a sentence that says what failed and what to do.
+    Returns a sentence that says what failed and what to do; empty where the picture was written.
     """
     command = [sys.executable, "-P", "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
-    command += [f"--{key}={value}" for key, value in {"output": path, **options}.items() if value is not None]
+    command += [f"--output={path}", f"--caption={caption}"]
     mpi = ("OMPI_", "PMI", "MPI_LOCAL")  # beginnings of names, PMI_ and PMIX_ alike
     environment = {key: value for key, value in os.environ.items() if not key.startswith(mpi)}
     home = str(Path(__file__).resolve().parents[2])
@@ -407,21 +401,22 @@ def draw_shape_safely(
     if done.returncode < 0:
         return f"drawing {path} crashed with signal {-done.returncode}: {LIBRARIES}"
     reason = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-    return f"drawing {path} failed: {reason}" if done.returncode else None
+    return f"drawing {path} failed: {reason}" * bool(done.returncode)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw the shape named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Draw the shape named on the command line, that of the process by default; one sentence, and status 1, if not."""
     parser = argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space.")
     parser.add_argument("states", type=Path, help="states.h5 of a scene")
     parser.add_argument("--branch", required=True, help="name of the branch")
     parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")
     parser.add_argument("--output", dest="path", type=Path, default=Path("shape.png"), help="picture to write")
     parser.add_argument("--caption", help="line at the foot of the picture")
-    parser.add_argument("--radius", type=float, help="mean radius of the rod, nondimensional")
-    options = vars(parser.parse_args(arguments))
-    return status_of(lambda: draw_shape(**options), options["states"])
+    try:
+        print(draw_shape(**vars(parser.parse_args(arguments))))
+    except (ImportError, RuntimeError, ValueError, OSError) as error:
+        sys.exit(str(error).split("\n", 1)[0])
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from math import ceil, floor, log10
 from pathlib import Path
@@ -18,8 +17,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import offset_copy
 
-from rodfem.errors import InputError, printable
-from rodfem.file_format import UNREADABLE
+from rodfem.errors import InputError
 from rodfem.output.words import with_unit
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE
 from rodfem.tolerances import NEGLIGIBLE
@@ -159,16 +157,3 @@ def at_most(error: float) -> str:
     """Return a bound with two digits, never smaller than it is."""
     step = 10.0 ** (floor(log10(error)) - 1) if error > 0 else 1.0
     return f"{ceil(error / step * (1 - NEGLIGIBLE)) * step:.1e}".replace("e-0", "e-")
-
-
-def status_of(draw: Callable[[], Path], what: Path) -> int:
-    """Status of a program that draws: it prints the picture's name, or one sentence and returns 2."""
-    try:
-        print(draw())
-    except (ImportError, RuntimeError, ValueError, OSError) as error:
-        print(printable(str(error).split("\n", 1)[0]), file=sys.stderr)
-    except UNREADABLE as error:  # of matplotlib, h5py or numpy
-        print(printable(f"cannot draw {what} ({error!r}): give the file that a run has written"), file=sys.stderr)
-    else:
-        return 0
-    return 2

@@ -13,7 +13,7 @@ from hemitropic_cases import run_demo
 from mpi4py import MPI
 
 from rodfem.diagram import solver
-from rodfem.output import plot_diagram, plot_modes, render
+from rodfem.output import render
 
 HOME = Path(__file__).parents[2]
 
@@ -94,19 +94,13 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
 @pytest.mark.parametrize(
     ("main", "line", "words"),
     [
-        (plot_diagram.main, "/nonexistent", "There is no /nonexistent: give the diagram.json"),
-        (plot_diagram.main, "/tmp", "is no rodfem diagram"),
-        (plot_modes.main, "/nonexistent --branch a --row 0", "has no modes"),
-        (render.main, "/nonexistent --branch a --row 0 --radius inf", "is not positive"),
         (render.main, "/nonexistent --branch a --row 0 --output a.foo", "unknown format"),
         (render.main, "/etc/passwd --branch a --row 0", "cannot read"),
     ],
 )
-def test_programs_that_draw(main, line: str, words: str, capfd: pytest.CaptureFixture[str]) -> None:
-    status = main(shlex.split(line))
-    out, err = capfd.readouterr()
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert words in err
+def test_programs_that_draw(main, line: str, words: str) -> None:
+    with pytest.raises(SystemExit, match=words):
+        main(shlex.split(line))
 
 
 @pytest.mark.alone

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -20,7 +19,7 @@ import rodfem
 from rodfem import Discretization, Plan
 from rodfem.app import console
 from rodfem.errors import InputError
-from rodfem.output import plot_diagram, plot_modes, render
+from rodfem.output import plot_modes, render
 from rodfem.whole_files import draft_of, locked
 
 pytestmark = pytest.mark.alone
@@ -43,15 +42,11 @@ def bad(good: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(good, tmp_path / "bad"))
 
 
-def refused(read: Callable[[], Any], capfd: pytest.CaptureFixture[str]) -> str:
-    """Sentence with which a function, or a program, refuses."""
-    try:
-        status = read()
-    except InputError as trouble:
-        return str(trouble)
-    out, err = capfd.readouterr()
-    assert (status, out) == (2, ""), f"read without a word: {status!r}"
-    return err.rstrip("\n")
+def refused(read: Callable[[], Any]) -> str:
+    """Sentence with which a function refuses."""
+    with pytest.raises(InputError) as trouble:
+        read()
+    return str(trouble.value)
 
 
 def changed(*path: str | int, to: Any = ...) -> Callable[[dict[str, Any]], None]:
@@ -68,8 +63,8 @@ def changed(*path: str | int, to: Any = ...) -> Callable[[dict[str, Any]], None]
 
 TEXTS = ["", "[]", "3", "{}", "\0" * 99, "[" * 100_000, '{"branches": [']
 ENTRIES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
-    (changed("format", "version", to=99), "reads versions up to 2"),
-    (changed("format", "name", to="rodfem locus"), "has the format 'rodfem locus'"),
+    (changed("format", "version", to=99), "reads version 2"),
+    (changed("format", "name", to="rodfem locus"), "its format is 'rodfem locus'"),
     *((changed(name), f"has no {name}") for name in ("scene", "range", "meshes")),
     (changed("branches", 0, "columns", "load", 1, to=0.0123), "another load in row 1"),
     (changed("branches", 0, "columns", "energy"), "'energy'"),
@@ -78,27 +73,26 @@ ENTRIES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize("text", TEXTS, ids=range(len(TEXTS)))
-def test_texts(text: str, bad: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_texts(text: str, bad: Path) -> None:
     path = bad / "diagram.json"
     path.write_text(text)
     readers = (
         lambda: rodfem.load_json(path),
         lambda: rodfem.load(bad, SCENE),
-        lambda: plot_diagram.main([str(path), "--output", str(bad / "a.png")]),
     )
     for read in readers:
-        sentence = refused(read, capfd)
+        sentence = refused(read)
         assert str(path) in sentence
         assert "\n" not in sentence
     assert not (bad / "a.png").exists()
 
 
 @pytest.mark.parametrize(("change", "words"), ENTRIES)
-def test_entries(change: Callable[[dict[str, Any]], None], words: str, good: Path, bad: Path, capfd: Any) -> None:
+def test_entries(change: Callable[[dict[str, Any]], None], words: str, good: Path, bad: Path) -> None:
     data = json.loads((good / "diagram.json").read_text())
     change(data)
     (bad / "diagram.json").write_text(json.dumps(data))
-    sentence = refused(lambda: rodfem.load(bad, SCENE), capfd)
+    sentence = refused(lambda: rodfem.load(bad, SCENE))
     assert words in sentence
     assert "\n" not in sentence
 
@@ -120,8 +114,8 @@ HERE = "branches/straight"
 STATES: list[tuple[bytes | Callable[[h5py.File], None], str]] = [
     (b"", "states.h5"),
     (b"\x89HDF\r\n\x1a\n" + b"\0" * 4000, "states.h5"),
-    (attribute("format", "rodfem modes"), "has the format 'rodfem modes'"),
-    (attribute("format_version", 99), "reads versions up to 2"),
+    (attribute("format", "rodfem modes"), "its format is 'rodfem modes'"),
+    (attribute("format_version", 99), "reads version 2"),
     (put(f"{HERE}/q", 3.0), "states.h5"),
     (put(f"{HERE}/s", np.full((50, 49), np.nan)), "states.h5"),
 ]
@@ -137,30 +131,30 @@ def spoil(path: Path, change: bytes | Callable[[h5py.File], None]) -> None:
 
 @pytest.mark.few(5)
 @pytest.mark.parametrize(("change", "words"), STATES)
-def test_states(change: Any, words: str, bad: Path, capfd: Any) -> None:
+def test_states(change: Any, words: str, bad: Path) -> None:
     path = bad / "states.h5"
     spoil(path, change)
     for read in (
         lambda: rodfem.load(bad, SCENE),
-        lambda: render.main([str(path), "--branch", "straight", "--row", "0", "--output", str(bad / "a.png")]),
+        lambda: render.draw_shape(path, "straight", 0, bad / "a.png"),
     ):
-        sentence = refused(read, capfd)
+        sentence = refused(read)
         assert words in sentence
         assert "\n" not in sentence
 
 
 @pytest.mark.parametrize("name", ["q", "motion"])
 @pytest.mark.parametrize("value", [3.5, h5py.SoftLink("/branches")], ids=range(2))
-def test_modes(name: str, value: Any, bad: Path, capfd: Any) -> None:
+def test_modes(name: str, value: Any, bad: Path) -> None:
     path = bad / "modes.h5"
     with h5py.File(path) as file:
         (row,) = file["branches/straight"]
     spoil(path, put(f"branches/straight/{row}/{name}", value))
     for read in (
         lambda: rodfem.load_modes(path, "straight", int(row)),
-        lambda: plot_modes.main([str(path), "--branch", "straight", "--row", row, "--output", str(bad / "a.png")]),
+        lambda: plot_modes.draw_modes(path, "straight", int(row), bad / "a.png"),
     ):
-        sentence = refused(read, capfd)
+        sentence = refused(read)
         assert "modes.h5" in sentence
         assert "\n" not in sentence
 
@@ -175,20 +169,7 @@ def entries(folder: Path, *path: str | int, to: Any = ...) -> None:
     (folder / "diagram.json").write_text(json.dumps(data))
 
 
-def larger_than_memory(file: h5py.File) -> None:
-    del file[f"{HERE}/r"]
-    file.create_dataset(f"{HERE}/r", shape=(200_000, 20_000, 3), chunks=(1000, 100, 3), compression="gzip")
-
-
-def fifo(path: Path) -> None:
-    path.unlink()
-    os.mkfifo(path)
-
-
 PROGRAMS: list[tuple[Callable[[Path], None], str, str]] = [
-    (lambda bad: spoil(bad / "states.h5", larger_than_memory), "view convert load", "a part of the array branches/"),
-    (lambda bad: fifo(bad / "diagram.json"), "info list view convert load", "diagram.json"),
-    (lambda bad: fifo(bad / "states.h5"), "view convert load", "states.h5"),
     (lambda bad: spoil(bad / "states.h5", without(f"{HERE}/r")), "view convert", "'r'"),
     (lambda bad: spoil(bad / "states.h5", put(f"{HERE}/s", np.zeros((50, 49)))), "view", "states.h5"),
     (lambda bad: entries(bad, "scene"), "info list view", "has no scene"),
