@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import OrdinateBound, bound
 from rodfem.adaptivity.mesh_sequence import start_mesh
+from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import Curves
@@ -136,11 +137,13 @@ class Sweep:
             self._take(branch, latest)
             for load in loads[1:]:
                 state = steps.to(load)
-                if why := self.solver.lost_convexity(state) or self._dependent(state):
+                point = self._point(state)
+                if why := Arc(self.solver, latest, point).lost_convexity() or self._dependent(state):
                     return why
                 if load in stops:
                     steps.known = steps.known[-1:]
-                self._take(branch, self._point(state))
+                latest = point
+                self._take(branch, latest)
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._close(branch, None)
         return ""

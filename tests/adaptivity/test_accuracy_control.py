@@ -120,6 +120,21 @@ def test_every_row_of_a_taut_rod(accuracy: float) -> None:
     assert len({p.mesh for p in branch.points}) > 2
 
 
+@pytest.mark.alone
+def test_a_graded_mesh_beats_uniform_ones() -> None:
+    """Equal elements with eight times the unknowns err more at the end of the branch of the taut rod."""
+    found = pulled(1e-6)
+    end = found.branches[0].points[-1]
+    mesh = found.solvers[end.mesh].system.fields.discretization
+    assert np.diff(mesh.vertices).max() > 100 * np.diff(mesh.vertices).min()
+    uniform = Discretization("auto", 8 * (len(mesh.vertices) - 1), mesh.degree)
+    solver = Solver(boundary_layer.scene(), uniform).equilibria
+    x, outcome = solver.at_load(solver.shape.restore(found.solvers[end.mesh].shape.sample(end.x)), 6.0)
+    assert outcome.converged
+    errors = [abs(ordinate - boundary_layer.shortening(6.0)) for ordinate in (end.ordinate, solver.shape.ordinate(x))]
+    assert 1000 * errors[0] < errors[1]
+
+
 @pytest.mark.long
 def test_what_was_used_where(folder: Path) -> None:
     """Files name the mesh of each row; rows of all meshes are read back, on another mesh too."""

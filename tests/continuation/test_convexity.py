@@ -131,13 +131,21 @@ def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) 
     assert branch.points[-1].load < 10 * e - 11 * width * (e - 0.3) / ((e - 0.3) ** 2 + width**2) ** 0.5 + 1e-6
 
 
-@pytest.mark.long
 @pytest.mark.alone
-def test_a_sweep() -> None:
-    """Of a stiffness that vanishes at P = 30: of ten times the load there would be sixty critical loads before."""
-    until = 30.0
+@pytest.mark.parametrize(
+    ("energy", "until"),
+    [
+        (lambda v, k, c: softening(v, k, Constants(P=c.P / 30)), 30.0),
+        (narrow(lambda c: 1 - c.P / 29.7, 0.003), 29.6109),
+    ],
+)
+def test_a_sweep(energy: Energy, until: float) -> None:
+    """Of a stiffness that vanishes, and of one that is negative between two loads only.
+
+    Of ten times the follower force there would be sixty critical loads where the stiffness nears zero.
+    """
     scene = rod(
-        lambda v, k, c: softening(v, k, Constants(P=c.P / 30)),
+        energy,
         (0.0, 60.0),
         ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -1e-3 * c.P))),
         inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),

@@ -88,5 +88,14 @@ def test_every_question_has_its_program() -> None:
 
 
 @pytest.mark.alone
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_a_lesson_is_a_notebook(path: Path) -> None:
+    jupytext = pytest.importorskip("jupytext")
+    notebook = jupytext.read(path)
+    assert {cell.cell_type for cell in notebook.cells} == {"markdown", "code"}
+    assert notebook.cells[0].source.startswith("# ")
+
+
+@pytest.mark.alone
 def test_the_page_lists_all_lessons() -> None:
     assert re.findall(r"\]\((\d\d_\w+\.py)\)", (COURSE / "README.md").read_text()) == [p.name for p in LESSONS]

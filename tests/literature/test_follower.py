@@ -67,6 +67,13 @@ def test_flutter(span: tuple[float, float], J: float) -> None:
                 assert np.nanmin([abs(column(value, p.load, *plane) - value) for plane in ((1, J), (10, 0))]) < 1e-6
 
 
+@pytest.mark.usefixtures("few_loads")
+def test_flutter_by_mumps() -> None:
+    found = trace(scene("follower", span=(15.0, 25.0)), Discretization("pointwise", 4, 6, factors="petsc"))
+    (flutter,) = found.special("flutter")
+    assert abs(flutter.point.load - double(20.0, 120.0)[0]) <= flutter.error_estimate <= 1e-9
+
+
 @pytest.mark.long
 def test_ordinate_of_a_load_that_is_not_known_better() -> None:
     """A stretching column stays straight, and its length is ``1 - P/EA``: its bar is that of P over EA.

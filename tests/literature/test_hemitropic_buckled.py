@@ -143,6 +143,17 @@ def test_states_have_the_flip_symmetry_of_the_paper() -> None:
             np.testing.assert_allclose(R[::-1], F @ R @ F, atol=1e-9)
 
 
+def test_formulations_agree_within_their_estimates() -> None:
+    both = [branches(formulation, 10, 6) for formulation in ("reduced", "pointwise")]
+    assert sum(len(b.special) for b in both[0]) > 15
+    for a, b in zip(*both, strict=True):
+        assert (a.name, a.ended) == (b.name, b.ended)
+        for s, t in zip(a.special, b.special, strict=True):
+            assert (s.kind, s.negative_before, s.negative_after) == (t.kind, t.negative_before, t.negative_after)
+            assert abs(s.point.load - t.point.load) <= s.error_estimate + t.error_estimate
+            assert abs(s.point.ordinate - t.point.ordinate) <= s.ordinate_error + t.ordinate_error
+
+
 @pytest.mark.long
 def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
     """Where ``2 E(m) = K(m)``, at ``P0 = 4 K^2``, the ends of a pinned column meet: its loop may turn about any axis.

@@ -197,6 +197,30 @@ def test_triple_cluster(method: str, apart: float) -> None:
     assert np.linalg.eigvalsh(gram / np.sqrt(np.outer(np.diag(gram), np.diag(gram)))).min() > 0.1  # three directions
 
 
+@pytest.mark.parametrize(("mass", "rotary"), [(1.0, 0.0), (0.0, 1.0), (1.0, 0.1)])
+def test_fields_without_mass(mass: float, rotary: float) -> None:
+    """Eigenvalues of a pinned column by each method: ``(w^4 - P w^2) / (mass + rotary w^2)`` with ``w = n pi``."""
+    inertia = Inertia(rho_A=lambda c: mass, rho_I=lambda c: (rotary, 0.0, 0.0))
+    given = classics.column("massless", classics.SUPPORTS["pinned-pinned"], (0.0, 8.0), planar="e1", inertia=inertia)
+    solver = Solver(given, Discretization("pointwise", 6, 6)).equilibria
+    x, _ = solver.at_load(solver.start(5.0), 5.0)
+    w2 = (np.arange(1, 4) * np.pi) ** 2
+    for method in SOLVERS:
+        found = Assessor(solver.system)(x, method, 3)
+        np.testing.assert_allclose(found.values, w2 * (w2 - 5.0) / (mass + rotary * w2), rtol=1e-8, err_msg=method)
+        assert found.certified, method
+
+
+@SERIAL
+def test_ten_thousand_elements() -> None:
+    """The straight cord is unstable below ``k0^2 - w^2`` = 49.348022 with ``tan(w/2) = w/2``."""
+    solver = Solver(scene("cord"), Discretization("reduced", 10_000, 1)).equilibria
+    solver.system.set_phase(None)
+    for load, negative in ((49.3479, 1), (49.3481, 0)):
+        x, _ = solver.at_load(solver.start(load), load)
+        assert Assessor(solver.system)(x, "count").negative == negative
+
+
 @pytest.mark.few(1)
 @pytest.mark.parametrize("method", SOLVERS)
 def test_an_unstable_direction_without_mass(method: str) -> None:
