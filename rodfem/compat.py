@@ -164,11 +164,7 @@ def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
 
 
 def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.ndarray) -> None:
-    """Add a real form to a PETSc matrix, without the final exchange between ranks.
-
-    ``rows`` and ``columns`` are the global numbers of the local degrees of freedom, -1 for what is left out; the matrix
-    has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first.
-    """
+    """Add a real form to a PETSc matrix, without the final exchange between ranks."""
     if not COMPLEX:
         fem.petsc.assemble_matrix(matrix, form)
         return
@@ -235,11 +231,7 @@ def pack_constants(form: Any) -> np.ndarray:
 
 @contextmanager
 def compilation() -> Iterator[None]:
-    """Compile with rodfem's options alone, and without the chatter of FFCx and of setuptools.
-
-    FFCx and dolfinx also read options from files of the current folder and of the home folder; their tolerances would
-    change the equations.
-    """
+    """Compile with rodfem's options alone, and without the chatter of FFCx and of setuptools."""
     root, readers = logging.getLogger(), {place: getattr(*place) for place in _OPTION_FILES}
     level, disabled = root.level, root.manager.disable
     logging.disable(max(disabled, logging.INFO))

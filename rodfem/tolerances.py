@@ -60,12 +60,7 @@ def same_place(x: Any, s: float, length: float) -> Any:
 
 
 def same_special(special: Pair, located_to: float, place: Pair, one: Pair) -> bool:
-    """Whether a ``special`` point and a ``place`` on one mesh, each a load and an ordinate, are one.
-
-    ``one`` has the natural sizes of loads and ordinates.
-
-    Loads are as near as the first one is ``located_to``, a few times: others may be nearer than ordinates are known.
-    """
+    """Whether a ``special`` point and a ``place`` on one mesh, each a load and an ordinate, are one."""
     (load, ordinate), (of_load, of_ordinate) = special, one
     near = abs(load - place[0]) <= LOCATED * (located_to + round_off(load, of_load))
     return near and abs(ordinate - place[1]) <= SAME_SPECIAL * unit(ordinate, place[1], one=of_ordinate)

@@ -92,10 +92,7 @@ def with_added(path: Path, add: Callable[[h5py.File], None], *, first: bool) -> 
 
 @contextmanager
 def locked(folder: Path, comm: MPI.Comm) -> Iterator[None]:
-    """Make ``folder``, and keep other processes from writing into it; collective over ``comm``.
-
-    The system frees the lock with the end of the process, however it ends.  Raises :class:`InputError` on every rank.
-    """
+    """Make ``folder``, and keep other processes from writing into it; collective over ``comm``."""
     place = folder.resolve()
     if comm.bcast(place in FOLDERS):
         yield

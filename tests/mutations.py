@@ -93,9 +93,6 @@ TABLE = {
             "first=not self._saved", "first=True",
             "output/test_files.py output/test_formats.py hard/test_files_after_a_kill.py diagram/test_diagram.py"),
     },
-    "rodfem/app/screen.py": {
-        "terminal-left-without-its-cursor": ("            self._progress.stop()\n", "", "app/test_screen.py"),
-    },
     "rodfem/codim2/criteria.py": {
         "differences-along-a-locus-by-the-bounds-alone": (
             "float(min(DIFFERENCE, room / 100 / plane.width[which]))", "DIFFERENCE", "codim2/test_locus.py"),

@@ -86,10 +86,7 @@ class OrdinateBound:
         return bound(self.coarse.ordinate(x), self.richer.ordinate(again), left, rho, self._change(x, again))
 
     def _change(self, x: PETSc.Vec, again: PETSc.Vec) -> float:
-        """Largest change of the ordinate over the element in which it is taken; none at a vertex, or of an integral.
-
-        The ordinate is evaluated at its own place, with the changes of position and rotation of all others.
-        """
+        """Largest change of the ordinate over the element in which it is taken; none at a vertex, or of an integral."""
         if not self._tried:
             return 0.0
         first, second = self.coarse.system.at(x), self.richer.system.at(again)
@@ -184,10 +181,7 @@ class Enriched:
         special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
 
     def again(self, point: Point, *, fixed_load: bool) -> Again:
-        """Solve for a point on the richer mesh, at its load, once, or across its tangent; or ConvergenceError.
-
-        One more step of Newton's method tells what arithmetic leaves open.
-        """
+        """Solve for a point on the richer mesh, at its load, once, or across its tangent; or ConvergenceError."""
         key = id(point), self.system.damping
         if fixed_load and key in self._at_loads:
             return self._at_loads[key][1]

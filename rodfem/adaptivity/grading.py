@@ -32,10 +32,7 @@ LEAST_DECAY, MOST_DECAY = 1.5, 1e3
 
 @dataclass(frozen=True)
 class Smoothness:
-    """Decay of the strains of a state on elements of a ``degree``: ``|coefficient j| < amplitude decay^-j``.
-
-    ``vertices`` has shape (E + 1,), ``amplitude`` and ``decay`` (E,).
-    """
+    """Decay of the strains of a state on elements of a ``degree``: ``|coefficient j| < amplitude decay^-j``."""
 
     vertices: np.ndarray
     degree: int
@@ -98,10 +95,7 @@ class SmoothnessIndicator:
         return float(np.sqrt(parts[-2:].sum() / max(parts.sum(), system.scene.length)))
 
     def changed(self, before: PETSc.Vec, after: PETSc.Vec, *, state: bool) -> float:
-        """Norm of the change of the strains over that of those after, or one radian along the rod.
-
-        Of two states, or (``state=False``) of two null vectors of metric norm 1, of either sign.
-        """
+        """Norm of the change of the strains over that of those after, or one radian along the rod."""
         system = self.solver.system
         same = state or (system.metric * before).dot(after) >= 0
         apart = before - after if same else before + after

@@ -58,10 +58,7 @@ def internal_accuracy(scene: Scene, accuracy: float) -> float:
 
 
 def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
-    """Discretisation to start with: few elements of nearly equal size, of a degree that grows with the digits.
-
-    Breaks of the ``scene`` are vertices; each rank of ``comm`` has an element.
-    """
+    """Discretisation to start with: few elements of nearly equal size, of a degree that grows with the digits."""
     degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
     pieces = pieces_of(scene)
     almost = 1e-6  # part of an element that a piece may have more than a whole number of them
@@ -233,10 +230,7 @@ class AccuracyControl:
             raise TooCoarse(special.point, error, special.null_vectors, order)
 
     def _error_of(self, special: SpecialPoint) -> float:
-        """Error of a special point in load and ordinate, relative to those that exceed their natural size.
-
-        It is never within the accuracy where the mesh does not resolve its state.
-        """
+        """Error of a special point in load and ordinate, relative to those that exceed their natural size."""
         error = special.ordinate_error / unit(special.point.ordinate, one=self.units.ordinate)
         if special.kind.singular or special.test_function == "stretch":
             error = max(error, special.error_estimate / unit(special.point.load, one=self.units.load))
@@ -306,10 +300,7 @@ class AccuracyControl:
 
 
 def _index(point: Point, richer: Enriched, x: PETSc.Vec) -> int:
-    """Index on the richer mesh; the point's own if eigenvalues that are zero on one of the two make up for it.
-
-    One factorisation suffices if it is the same; else a second one separates zero eigenvalues from others.
-    """
+    """Index on the richer mesh; the point's own if eigenvalues that are zero on one of the two make up for it."""
     inertia = richer.solver.inertia
     found = inertia.at(x)
     drifts = found.drifts

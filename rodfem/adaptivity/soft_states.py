@@ -196,10 +196,7 @@ def _across(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], others: Sequence[PE
 
 
 def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
-    """Point on a richer mesh, and what was found when it was computed there; or ConvergenceError.
-
-    Next to a ``soft`` mode Newton's method slides away, or ends by chance: it is damped, and elsewhere if it fails.
-    """
+    """Point on a richer mesh, and what was found when it was computed there; or ConvergenceError."""
     system = richer.system
     given = system.damping
     first, second = sorted((given, richer.solver.inertia.tolerance), reverse=soft)
@@ -221,10 +218,7 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
 def _nearest(
     solver: BranchSolver, point: Point, number: int, zeros: Sequence[PETSc.Vec]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The ``number`` eigenvalues nearest zero but for those of ``zeros``, ascending, and their uncertainty.
-
-    What arithmetic leaves open of the state, one more step of Newton's method tells.
-    """
+    """The ``number`` eigenvalues nearest zero but for those of ``zeros``, ascending, and their uncertainty."""
     found = solver.inertia.at(point.x)
     found.count()
     with solver.inertia.afresh():

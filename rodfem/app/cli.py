@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 from rodfem.app.interrupts import end_quietly, listen
 from rodfem.errors import ConvergenceError, InputError, SetupError
 
-NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib", "rich")
+NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
 
 def check_installation() -> None:

@@ -33,10 +33,7 @@ def leave_the_run() -> None:
 
 @contextmanager
 def as_sentence(file: Path, remedy: str) -> Iterator[None]:
-    """Raise :class:`~rodfem.errors.InputError` with the last line of a ``file`` that ran, and a ``remedy``.
-
-    Its functions are decorated with it, too.
-    """
+    """Raise :class:`~rodfem.errors.InputError` with the last line of a ``file`` that ran, and a ``remedy``."""
     try:
         yield
     except InputError:

@@ -101,7 +101,7 @@ def run(
     output = Path(output or Path("results") / scene.name)
     plan.check(scene, discretization)
     terminal = Terminal(plan, output, comm, words, quiet=quiet, verbose=verbose)
-    with locked(output, comm), terminal:
+    with locked(output, comm):
         diagram = traced(scene, discretization, plan, terminal, comm)
         _report(diagram, terminal, figures)
     return diagram
@@ -116,7 +116,7 @@ class Terminal(Report):
         """Write what the ``plan`` asks for into a folder ``output`` that there is, on the first rank of ``comm``."""
         super().__init__(comm, words=words, verbose=verbose)
         if quiet:
-            self.on = self.live = False
+            self.on = False
         self.plan, self.output, self.comm, self._saved = plan, output, comm, 0
         self.files: list[str] = []
         self.data: dict[str, Any] = {}
@@ -180,7 +180,6 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     if plan.locus is not None:
         _follow(diagram, terminal, figures, plan.locus)
     if figures:
-        terminal.working("pictures")
         terminal.name("diagram.png", "shape.png")
         on_first(terminal.comm, lambda: draw(output, terminal))
     diagram.complete = True
@@ -198,7 +197,6 @@ def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     saved: list[tuple[str, int]] = []
     for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
         where = f"{scene.load} = {special.point.load:.10g}"
-        terminal.working(f"{branch.name} at {where}: stability{' and modes' if plan.modes else ''}")
         try:
             verdict, modes = _verdict(finder_on(special.point.mesh), special, plan)
         except (InputError, ConvergenceError) as trouble:
@@ -236,7 +234,6 @@ def _draw_modes(saved: list[tuple[str, int]], terminal: Terminal, figures: bool)
     pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
     terminal.name(*(f"{picture}{suffix}" for picture in pictures for suffix in (".png", ".gif")))
     for (name, row), picture in zip(saved, pictures, strict=False):
-        terminal.working(f"{name}, row {row}: pictures and animations of its modes")
         for suffix in (".png", ".gif"):
             target = output / f"{picture}{suffix}"
             on_first(terminal.comm, partial(draw_modes, output / "modes.h5", name, row, target))
@@ -257,7 +254,6 @@ def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[st
                 terminal.say(
                     "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
                 )
-            terminal.working(f"locus {len(saved) + 1}, of the {which}")
             try:
                 near.append(diagram.locus(special, asked[0], asked[1:]))
             except (InputError, ConvergenceError) as trouble:

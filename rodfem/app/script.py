@@ -16,10 +16,7 @@ from rodfem.app.interrupts import end_quietly
 
 
 def lesson(name: str) -> bool:
-    """Whether the cell of a file of this ``__name__`` is to run: it is the program, or a notebook, without options.
-
-    What a lesson prints is printed by the first rank alone, until nobody reads it.
-    """
+    """Whether the cell of a file of this ``__name__`` is to run: it is the program, or a notebook, without options."""
     if name != "__main__":
         return False
     file, options = getattr(sys.modules[name], "__file__", None), sys.argv[1:]

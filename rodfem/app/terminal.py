@@ -5,15 +5,12 @@ A verbose one has what is technical, too: unknowns, meshes, special points as th
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
 from math import isfinite
 from textwrap import fill
 from time import monotonic
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from mpi4py import MPI
@@ -32,16 +29,12 @@ from rodfem.output.table import row_data, special_data
 from rodfem.output.words import COUNT, INDEX, in_decimals, index_in_words, is_estimated, rounded_up, table_of, with_unit
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
-from rodfem.ranks import RANK
 from rodfem.stability.assessment import Verdict
 from rodfem.stability.soft_mode import index_range
 from rodfem.timing import WORK, Clock
 
-if TYPE_CHECKING:
-    from rodfem.app.screen import Screen
-
 WIDTH, PAUSE = 110, 30.0
-"""Columns of a paragraph; seconds between two lines of progress that stay."""
+"""Columns of a paragraph; seconds between two lines of progress."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
@@ -83,14 +76,8 @@ def _eigenvalues(found: Verdict, modes: Modes | None) -> Iterator[str]:
         yield modes.note
 
 
-def is_screen(stream: TextIO) -> bool:
-    """Whether a stream is a terminal on which a line can change: what Open MPI gives its ranks is none."""
-    dumb = os.environ.get("TERM") in ("dumb", "unknown")
-    return stream.isatty() and not dumb and not any(name in os.environ for name in RANK)
-
-
 class Report(Observer):
-    """Prints on rank 0: on a terminal in colours, with a line that says what is done now, until it is closed."""
+    """Prints on rank 0."""
 
     def __init__(
         self,
@@ -105,39 +92,12 @@ class Report(Observer):
         self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
-        self.live = self.on and comm.size == 1 and is_screen(self.stream)
         self.known: list[Branch] = []
         self.load, self.shown = "load", monotonic()
 
-    @cached_property
-    def screen(self) -> Screen:
-        """The terminal, where output is :attr:`live`."""
-        from rodfem.app.screen import Screen
-
-        return Screen(self.stream)
-
-    def __enter__(self) -> Self:
-        """Nothing is shown yet."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Remove the line of what is done now, also after an error or an interrupt."""
-        if self.live:
-            self.screen.close()
-
-    @property
-    def width(self) -> int:
-        """Columns that a paragraph may take: no more than a terminal has."""
-        return min(WIDTH, self.screen.width) if self.live else WIDTH
-
     def say(self, line: str = "") -> None:
         """Print one line."""
-        if not self.on:
-            return
-        if self.live:
-            for part in self.words(line).split("\n"):
-                self.screen.show(part)
-        else:
+        if self.on:
             self.stream.write(f"{self.words(line)}\n")
             self.stream.flush()
 
@@ -145,11 +105,6 @@ class Report(Observer):
         """Print a technical line, if all are wanted."""
         if self.verbose:
             self.say(line)
-
-    def working(self, words: str) -> None:
-        """Say on a terminal what is done now, and takes long."""
-        if self.live:
-            self.screen.status(self.words(words), long=True)
 
     def note(self, sentence: str) -> None:
         """Print it."""
@@ -218,19 +173,15 @@ class Report(Observer):
         self.detail(f"       load           ordinate       int W ds  {self.count:>{self.wide}}  zero  located to")
 
     def progress(self, branch: Branch, point: Point) -> None:
-        """Keep one line up to date while a branch is traced; elsewhere than on a terminal print it now and then."""
-        if not self.live and monotonic() - self.shown < PAUSE:
+        """Print a line now and then while a branch is traced."""
+        if monotonic() - self.shown < PAUSE:
             return
         self.shown, waiting = monotonic(), not_followed(self.known)
-        words = (
-            f"{branch.name}, {len(self.known)} known, {many(waiting, 'branch point')} left to follow, "
+        self.say(
+            f"  ... {branch.name}, {len(self.known)} known, {many(waiting, 'branch point')} left to follow, "
             f"{self.load} = {in_decimals(point.load, 5, self.units.load)}, {self.count} {point.negative}, "
             f"{len(branch.points)} points"
         )
-        if self.live:
-            self.screen.status(self.words(words), long=False)
-        else:
-            self.say(f"  ... {words}")
 
     def special(self, branch: Branch, special: SpecialPoint) -> None:
         """Print a special point as it is found, as AUTO does."""
@@ -285,7 +236,7 @@ class Report(Observer):
         """Print a diagram, the contents of ``diagram.json``, in sentences."""
         self.say("\nIn words (rodfem explain WORD has more)")
         for sentence in in_sentences(data):
-            self.say(fill(sentence, self.width, initial_indent="  ", subsequent_indent="    "))
+            self.say(fill(sentence, WIDTH, initial_indent="  ", subsequent_indent="    "))
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""

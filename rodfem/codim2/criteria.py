@@ -398,10 +398,7 @@ class Collision(Criterion):
         raise ConvergenceError("two eigenvalues do not collide near by")
 
     def _by_both_sides(self, found: Zero, slope: float) -> Zero:
-        """Correct a zero of ``D`` twice, by its ``slope``; its uncertainty is the last change and the round-off of D.
-
-        If left vectors are not found, as next to a double zero, the zero stays that of the eigenvalues.
-        """
+        """Correct a zero of ``D`` twice, by its ``slope``, unless its left vectors are not found (a double zero)."""
         t, _, now, x = found
         with suppress(ConvergenceError):
             for _ in range(2):

@@ -207,10 +207,7 @@ class RicherMesh:
         self.criterion = criterion_of(self.richer.solver, plane, kind, self._transferred(near))
 
     def compare(self, node: LocusPoint) -> tuple[list[float], bool]:
-        """Bounds of the errors of both parameters, and whether the mesh resolves the state; or ConvergenceError.
-
-        Distances are across the curve, but for turning points and ends to those of the other curve.
-        """
+        """Bounds of the errors of both parameters, and whether the mesh resolves the state; or ConvergenceError."""
         near, resolved = self._transferred(node), True
         if node.sought is None:
             found = self.criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
@@ -268,10 +265,7 @@ class _Curve:
     """The curve of a special point of a diagram, the ``first`` one, in a plane: ``nodes`` with ``marks`` by number."""
 
     def __init__(self, solver: BranchSolver, special: SpecialPoint, plane: Plane, *, doubtful: bool) -> None:
-        """Find the point again; of a ``doubtful`` one no row is resolved.
-
-        Raises :class:`InputError` where it has no locus, and :class:`ConvergenceError`.
-        """
+        """Find the point again; of a ``doubtful`` one no row is resolved."""
         load, parameter = plane.names
         p = np.array([special.point.load, solver.system.scene.parameters[parameter].value])
         if plane.outside(p) is not None:

@@ -97,11 +97,7 @@ class Place:
 
 
 def place(criterion: Criterion, node: LocusPoint, sought: Sought, windows: tuple[float, ...] = WINDOWS) -> Place:
-    """Where ``sought`` is on the curve of a ``criterion`` through ``node``, close to it: the best of ``windows``.
-
-    Windows that cannot be filled, or that leave the bounds, are passed over.  Raises :class:`ConvergenceError` where
-    fewer than two can.
-    """
+    """Where ``sought`` is on the curve of a ``criterion`` through ``node``, close to it: the best of ``windows``."""
     best: Place | None = None
     other: Place | None = None
     for half in windows:

@@ -284,11 +284,7 @@ def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
 def equilibria_at(
     solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
 ) -> list[Point]:
-    """Equilibria of traced branches at exactly ``load``, each once, which a search for further ones deflates.
-
-    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.  ``here`` brings
-    points of ``branches`` to the mesh of ``solver``.
-    """
+    """Equilibria of traced branches at exactly ``load``, each once, which a search for further ones deflates."""
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
         for point in _along(solver, branch, [here(p) for p in branch.points], load):

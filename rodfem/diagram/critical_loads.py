@@ -73,11 +73,7 @@ class CriticalLoads:
         self.poles = list[int]()  # in the last step: changes of the number of negative eigenvalues through infinity
 
     def between(self, a: Side, b: Side, behind: Side | None, zeros: int) -> list[Critical]:
-        """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish.
-
-        Steps are given one after the other, each with the row ``behind`` it; ``zeros`` eigenvalues are zero at all
-        loads.
-        """
+        """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish."""
         self._zeros, self.poles = zeros, []
         sides = [a, *self._met(a, b, behind), b]
         events = [event for step in pairwise(sides) for event in self._step(*step)]
@@ -182,11 +178,7 @@ class CriticalLoads:
         return nan if pole else found
 
     def _divergence(self, a: Side, loads: list[float], bounds: list[float], sign: int) -> Critical:
-        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero.
-
-        Those that are zero at all loads are among them: there they are not told apart, and they add nothing.  The load
-        is within ``bounds``.
-        """
+        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
         at, number = self._side(a, loads[0]), len(loads)
         places = np.argsort(abs(at.spectrum.values), kind="stable")[: number + self._zeros]
         cluster = cluster_at(

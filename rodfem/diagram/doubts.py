@@ -85,10 +85,7 @@ class Quadrature:
         self._on = cache(lambda mesh: QuadratureCheck(solvers[mesh].system))
 
     def examine(self, branch: Branch) -> None:
-        """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so.
-
-        Of a state that the mesh does not resolve its bar says so.
-        """
+        """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so."""
         first = branch.points[: branch.parent is None]
         asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
         found = self._reasons(first, asked)

@@ -99,10 +99,7 @@ def _nearest(found: Factored, zero: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def image_of(branch: Branch, solver: BranchSolver) -> str:
-    """The symmetry, in words, of the equations that carries a branch to one with the opposite ordinate; empty for none.
-
-    It is found at two states on the mesh of the ``solver``.
-    """
+    """The symmetry, in words, that carries a branch to one with the opposite ordinate; empty for none."""
     chosen, size = _sampled(branch, solver)
     if not chosen or any(abs(point.ordinate) <= OTHER * size for point in chosen):
         return ""
@@ -118,10 +115,7 @@ def image_of(branch: Branch, solver: BranchSolver) -> str:
 
 
 def other_ordinates(branch: Branch, first: Point, image: Point, solver: BranchSolver) -> str:
-    """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty where it keeps them, or signs.
-
-    It carries the ``first`` state after the branch point to the state ``image`` on the other side.
-    """
+    """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty if it keeps their size."""
     system, near = solver.system, CARRIED * solver.system.norm(first.x - image.x)
     found, phase = [m for m in candidates(system) if system.norm(m(system, first.x) - image.x) <= near], system.phase
     found = mirrors(system, first.x, found) if found else []  # a small imperfection carries the one near the other, too

@@ -82,11 +82,7 @@ def _on(step: Step, arc: Arc, load: float) -> Iterator[Point]:
 
 
 class Events:
-    """The events of one branch, and what is to be said of each.
-
-    By the name of an event, ``_open`` has the loads at the ends of steps in which it was not located, ``_flat`` those
-    of steps on which it is zero.
-    """
+    """The events of one branch, and what is to be said of each."""
 
     def __init__(self, events: Sequence[Event | Level]) -> None:
         self.events = events

@@ -88,21 +88,14 @@ class SpecialSearch:
         return min([self.gaps.reach(self.meshes.solvers[point.mesh], point), *ahead])
 
     def _shorten(self, a: Point, b: Point) -> None:
-        """Ask for short steps from ``a`` to beyond ``b``, unless they are short already.
-
-        A piece is known for as long as the branch is followed: it may go back beyond one on account of another one.
-        """
+        """Ask for short steps from ``a`` to beyond ``b``, unless they are short already."""
         first, last = a.arclength, b.arclength
         if sum(-inf < since < last and first < until for since, until, _ in self._short) < SHORTER:
             self._short.append((first, 2 * last - first, (last - first) / PARTS))
             raise Unresolved
 
     def after(self, b: Point) -> list[SpecialPoint]:
-        """Special points that the row ``b`` shows, in order; a singular row, of no index, waits for the next one.
-
-        Raises :class:`Gap` for one that an imperfection takes apart, unless it is known, and :class:`Unresolved` if
-        shorter steps are to be tried.
-        """
+        """Special points that the row ``b`` shows, in order; a singular row, of no index, waits for the next one."""
         settled = self._open[0]
         if settled.mesh != b.mesh:
             self._open = [self.meshes.here(settled, self.meshes.solvers[b.mesh])]
@@ -275,11 +268,7 @@ class SpecialSearch:
         return replace(special_point(piece, at, found, fold=False), test_function="slope")
 
     def _located(self, piece: Piece, at: Candidate, *, turns: bool, ended: bool) -> SpecialPoint | None:
-        """The fold or branch point of a crossing; None where there is no singular state.
-
-        Whether the load ``turns`` back in its piece tells the fold of this branch from that of another one.
-        Raises :class:`Gap` for an imperfection that is not known, unless the branch has ``ended``.
-        """
+        """The fold or branch point of a crossing; None where there is no singular state."""
         clearly = is_fold(piece.solver, at.x, at.null)
         tried = dict[bool, SingularState | None]()
         for fold in {True: (turns, not turns), False: (False,)}[clearly]:

@@ -217,11 +217,7 @@ class Sweep:
         return point
 
     def _point(self, x: PETSc.Vec) -> Point:
-        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check it.
-
-        Next to a state whose matrix is singular Newton's method ends early by its own measure: where it fails
-        the check the equations are solved once more.
-        """
+        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check it."""
         point = self._evaluated(x)
         try:
             require_equilibrium(self.solver, point)
@@ -281,10 +277,7 @@ class Sweep:
             self.observer.warn(Remark(str(change), a.load, b.load))
 
     def _through_infinity(self, branch: Branch, row: Row) -> int:
-        """Change of the number of unstable motions at poles before a ``row``: one without inertia is unstable beyond.
-
-        At the first pole it is counted whether that is so after it or before it, and rows before it get what they lack.
-        """
+        """Change of the number of unstable motions at poles before a ``row``, and of the rows before the first."""
         lacking, poles = 0, self.critical.poles
         if not self._counted:
             lacking = (self.eigensolver.at(row.side.x).massless + len(poles)) % 2

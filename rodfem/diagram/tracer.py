@@ -222,10 +222,7 @@ class Tracer:
             self._insert(branch, specials + self._requests(step))
 
     def _leave(self, branch: Branch, specials: list[SpecialPoint], b: Point) -> None:
-        """End a branch where it leaves the range before one of its ``specials``, found up to ``b``.
-
-        A branch that goes out of the range and comes back turns at a fold beyond it.
-        """
+        """End a branch where it leaves the range before one of its ``specials``, found up to ``b``."""
         margin = ON_BOUND * (self.high - self.low)
         out = next((s for s in specials if not self.low - margin <= s.point.load <= self.high + margin), None)
         if out is None:

@@ -88,11 +88,7 @@ class Motions(Shape):
         return np.asarray(out)
 
     def dual(self, x: PETSc.Vec, y: PETSc.Vec) -> Motion:
-        """Nodal weights of the linear functional ``d -> y . d`` of perturbations of the state ``x``.
-
-        ``sum over nodes of (r . displacement + w . rotation)`` is its value, where ``y`` involves nothing but positions
-        and rotations, as a product with the kinetic metric does.
-        """
+        """Nodal weights of the linear functional ``d -> y . d`` of perturbations of the state ``x``."""
         turning, weights = self.system.fields.turning, self.system.change(y)
         field = self.system.at(x).turned[self.cells]
         q, dq = turning.quaternion(field), turning.functional(field, weights.turned[self.cells])
@@ -142,11 +138,7 @@ class ModeFinder:
         return verdict, Modes(**state, error=errors, note=note)
 
     def few(self, x: PETSc.Vec, number: int, double: float = np.nan) -> Few:
-        """The ``number`` left-most modes (nearest zero without a potential) of ``x``, and rigid motions.
-
-        They have no weights and error bars.  ``double`` is an eigenvalue that has a single vector, at flutter.
-        Raises :class:`~rodfem.errors.ConvergenceError` if the eigensolver fails.
-        """
+        """The ``number`` left-most modes (nearest zero without a potential) of ``x``, and rigid motions."""
         if not self.assessor.conservative:
             return self._few_nearest(x, number, double)
         return self._turned(x, self.assessor.leftmost(x, number), self.assessor.symmetric.mass)[0]

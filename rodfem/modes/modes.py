@@ -101,12 +101,7 @@ def save_modes(
     first: bool,
     scene: Scene | None = None,
 ) -> None:
-    """Append the ``modes`` of a ``row`` of a ``branch`` to the HDF5 file ``path`` (``first``: a new one), on one rank.
-
-    ``about`` says in the file's attributes what rod it is.  Group ``/branches/<branch>/<row>``, named as in
-    ``states.h5``, has the state's ``load``, ``s``, ``r``, ``q`` and the arrays of :class:`Modes`; a complex number is a
-    compound of ``r`` and ``i``.  What holds and loads the ``scene``, if given, is written for pictures.
-    """
+    """Append the ``modes`` of a ``row`` of a ``branch`` to a file (``first``: a new one), on one rank."""
 
     def add(file: h5py.File) -> None:
         if first:

@@ -54,11 +54,7 @@ def as_data(
     branches: Sequence[Branch], systems: Sequence[System], clock: Clock,
     span: tuple[float, float], accuracy: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
-
-    ``systems`` are those of the meshes that the points of ``branches`` name by their number; ``discretization`` is the
-    one with most unknowns.  ``span`` is the range of the load, ``accuracy`` that of the plan; ``clock`` has the times.
-    """
+    """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene)."""
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
     load, ordinate = scene.parameters[scene.load], scene.ordinate
@@ -180,13 +176,7 @@ def states_of(
     branches: Sequence[Branch], solvers: Sequence[BranchSolver], path: Path,
     *, first: bool, run: str = "", modes: Sequence[Sequence[Typical]] | None = None,
 ) -> bytes:  # fmt: skip
-    """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
-
-    ``docs/files.md`` has the groups.  Null vectors of special points are motions; the groups of
-    :func:`rodfem.problem.supports.write` and the bending stiffness under ``section`` are for pictures.  ``solvers`` are
-    those of the meshes that points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file,
-    which stays as it is unless it is the ``first``; ``run`` names the run, and ``modes`` are recorded of each branch.
-    """
+    """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective."""
     sampled = [_sampled(branch, solvers) for branch in branches]
     system = solvers[0].system
 
@@ -237,11 +227,7 @@ def _trimmed(row: Any) -> Any:
 
 
 def load_state(path: Path, branch: str, row: int, solver: BranchSolver) -> PETSc.Vec:
-    """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
-
-    ``path`` is that of ``states.h5``, ``row`` a number of ``branch``; the state is one of ``solver``.  Raises
-    :class:`InputError` where the file is another one, has the row in the other formulation, or lacks an unknown.
-    """
+    """State vector of a saved row, to start from or to examine; the elements and the degree may differ."""
     system = solver.system
     sample = _sample(path, branch, row, system.fields.discretization.formulation)
     names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]

@@ -156,11 +156,7 @@ def between(body: str, start: Floats, end: Floats, radius: float, color: str) ->
 
 
 def turn(centre: Floats, axis: Floats, size: float, front: Floats, color: str) -> Glyph:
-    """Arrow of a ``color`` about an ``axis`` (3,) through ``centre``, in the sense of a moment along it.
-
-    It winds along the axis a little, so that it is seen from all sides.  Its head is in the direction ``front``, its
-    radius is ``size``.
-    """
+    """Arrow of a ``color`` about an ``axis`` (3,) through ``centre``, in the sense of a moment along it."""
     return glyph("turn", color, centre, size * _triad(axis / np.linalg.norm(axis), front))
 
 
@@ -195,11 +191,7 @@ def striped(
     colors: Sequence[str],
     sides: int = 2 * SIDES,
 ) -> list[Solid]:
-    """A rod of a mean ``radius`` and so many ``sides`` with a stripe along d1, in two ``colors``.
-
-    Its ``pose`` has arclengths (n,), centreline (n, 3) and directors (n, 3, 3), in whose planes of d1 and d2 are the
-    cross-sections of :func:`profile_of`, by the ``section`` that it takes.
-    """
+    """A rod of a mean ``radius`` and so many ``sides`` with a stripe along d1, in two ``colors``."""
     s, centres, frames = pose
     around = (1.0, np.linspace(-np.pi, np.pi, sides + 1)[:-1]), (1.02, np.linspace(-0.3, 0.3, sides // 6 + 1))
     outlines = [size * radius * profile_of(s, section, angles) for size, angles in around]
@@ -248,10 +240,7 @@ class Look(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """A point of the rod ``at`` a place, before a motion at ``home``, its directors, and the way out of the rod's end.
-
-    That is ``outward`` along the rod, ``away`` along its chord; both are zero inside the rod.
-    """
+    """A point of the rod, before a motion at ``home``, its directors, and the ways out along rod and chord."""
 
     at: Floats
     home: Floats
@@ -392,10 +381,7 @@ def _tie(tie: Tie, s: Floats, centres: Floats, home: Floats, look: Look) -> list
 
 
 def _loads(load: tuple[Floats, Floats], share: Floats, place: _Place, clear: float, look: Look) -> list[Glyph]:
-    """Arrows of a force and of a moment, by their ``share`` (2,) of the greatest ones, ``clear`` of the support.
-
-    A force ends at the rod where it pushes against it, and begins there where it pulls.
-    """
+    """Arrows of a force and of a moment, by their ``share`` (2,) of the greatest ones, ``clear`` of the support."""
     (force, moment), out = load, list[Glyph]()
     if share[0] > POINT:
         size = ARROW * look.radius * max(share[0], 0.4)

@@ -78,10 +78,7 @@ def pieces_of(branch: Branch) -> list[Piece]:
 
 
 def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
-    """Least index between two rows, and how many eigenvalues may be negative as well.
-
-    Of either end it is known or not, then the index of the row, and the number of undecided eigenvalues there.
-    """
+    """Least index between two rows, and how many eigenvalues may be negative as well."""
     least = [own if known is None else known for known, own, _ in ends]
     if not any(undecided for *_, undecided in ends):
         return max(least), 0
@@ -134,10 +131,7 @@ def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
 
 
 def _in_space(branch: Branch) -> list[int]:
-    """Index among all perturbations in each row, empty where it is not known.
-
-    That of a singular row leaves out the eigenvalues that vanish there, so that the other rows decide.
-    """
+    """Index among all perturbations in each row, empty where it is not known."""
     column = branch["columns"].get("negative_in_space") or [None]
     singular = {int(point["row"]) for point in branch.get("special", []) if point["kind"] in COUNTED}
     return [] if None in column else [0 if row in singular else index for row, index in enumerate(column)]
@@ -164,11 +158,7 @@ class Interval:
 
     @property
     def rank(self) -> int:
-        """Of two intervals that meet, the one of greater rank has the segment between their rows.
-
-        It is the less stable one, or one that is undecided by an eigenvalue near zero: between a row of known and one
-        of undecided index that is undecided, too.
-        """
+        """Of two intervals that meet, the one of greater rank has the segment between their rows."""
         return 4 if self.kind == UNDECIDED and self.soft else (STABLE, PLANAR, UNDECIDED, UNSTABLE).index(self.kind)
 
     @property

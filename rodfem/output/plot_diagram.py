@@ -53,18 +53,7 @@ class Line(NamedTuple):
 
 
 def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
-    """Draw every branch as ordinate against load, with its stability and its special points.
-
-    Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues next to it; those of a
-    planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
-    dots, with the least and the greatest index.  Where a stable and another part lie on each other, the other one is
-    drawn upon the stable one, which is wider.  A step in which the index changes without a special point has a mark of
-    warning, and so has a first state that is singular.  Images of branches by a symmetry of the scene, of the opposite
-    ordinate, are thin lines: they were not traced.
-
-    ``diagram`` are the contents of ``diagram.json``; ``path`` is the picture to write, and to return, 7.5 in by 5 in at
-    200 dpi.  Its suffix decides the format (.png, .pdf, .svg).
-    """
+    """Draw every branch as ordinate against load, with its stability and its special points."""
     return style.save(figure_of(diagram), path)
 
 

@@ -51,12 +51,7 @@ PARTS = {
 
 
 def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> Path:
-    """Draw the square roots of the left-most eigenvalues against the load, as in Kumar & Healey (2010), figure 11.
-
-    One line a curve, one colour a kind of motion.  Real frequencies are lines, a complex pair is a cross (real part)
-    and a plus (imaginary part), what has diverged is a plus; flutter loads are stars, divergence loads triangles, and
-    unstable ranges are shaded.  The axis shows the ``most`` left-most eigenvalues.  Returns ``path``.
-    """
+    """Draw the square roots of the left-most eigenvalues against the load, as in Kumar & Healey (2010), figure 11."""
     return save(figure_of(diagram, most=most), path)
 
 
@@ -109,10 +104,7 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
 
 
 def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
-    """Mark flutter and divergence loads with their values: of divergence above the axis, where its frequency is.
-
-    Returns their kinds.
-    """
+    """Mark flutter and divergence loads with their values: of divergence above the axis, where its frequency is."""
     found = [special for special in specials if special["kind"] in SPECIAL]
     for special in found:
         here = float(special["load"]), abs(complex(special["omega2"])) ** 0.5
@@ -169,10 +161,7 @@ class Range(NamedTuple):
 
 
 def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()) -> list[FrequencyCurve]:
-    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve.
-
-    With its ``special`` points curves have points between rows where two frequencies meet.
-    """
+    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve."""
     found: dict[int, list[Member]] = {}
     rows = zip(*(columns[name] for name in ("load", "omega2", "motion", "curve")), strict=True)
     for row, (load, *modes) in enumerate(rows):

@@ -76,10 +76,7 @@ def _animate(figure: Figure, panels: Sequence[_Panel], path: Path) -> None:
 
 
 def amplitude(root: complex, grows: bool, time: float) -> complex:
-    """Amplitude of a mode ``exp(root t)`` in the loop of its animation, of period 1 in ``time``; the greatest is 1.
-
-    One that grows does so, then goes back; any other oscillates.
-    """
+    """Amplitude of a mode ``exp(root t)`` in the loop of its animation, of period 1 in ``time``; the greatest is 1."""
     if not grows:
         return complex(np.cos(2 * np.pi * time))
     most = np.log(1 / 0.06) / root.real  # from a faint amplitude on

@@ -103,10 +103,7 @@ def view_in(states: Path, branch: str, row: int) -> Floats:
 
 @dataclass(frozen=True)
 class State:
-    """A state at n places along the rod: arclengths ``s``, ``centres`` (n, 3), and ``directors`` (n, 3, 3) as columns.
-
-    ``reference`` is the centreline (n, 3) of the state that it has left, of the first branch at the nearest load.
-    """
+    """A state at n places of the rod, with the ``reference`` (n, 3) from which it has moved; directors are columns."""
 
     s: Floats
     centres: Floats
@@ -200,10 +197,7 @@ def _write(plotter: Any, caption: str, notes: Sequence[str], solids: Sequence[So
 
 
 def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
-    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``.
-
-    ``frame`` (3, 3) has the directors at its first end; ``load`` is the direction to show, by default of dead forces.
-    """
+    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``."""
     load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
     along = {"axis": axis_of(setting, reference), "down": setting.down, "side": setting.widest(frame)}
     return view_of(reference, moved, load=load, feet=feet, **along)
@@ -272,10 +266,7 @@ def view_of(
 
 
 def _loaded(right: Floats, up: Floats, load: Floats, arch: Floats | None) -> tuple[Floats, Floats, float]:
-    """Directions and tilt of a picture in which a ``load`` is seen; ``arch`` (n, 3) is a rod that may be one.
-
-    A load that is not nearly along the motion, which is upwards, is itself upwards, and the rod is seen from aside.
-    """
+    """Directions and tilt of a picture in which a ``load`` is seen; ``arch`` (n, 3) is a rod that may be one."""
     aside = load - (load @ right) * right
     standing = up * _standing(up, arch, load)
     if abs(up @ aside) >= NEAR * np.linalg.norm(aside):
@@ -355,11 +346,7 @@ def snapshot(
     path: Path | str | None,
     caption: str | None,
 ) -> Snapshot:
-    """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one.
-
-    ``solvers`` are those of the meshes, ``point`` is one of the ``branches`` or any other of these meshes; ``path`` is
-    that of the picture (None: none is kept), and ``caption`` its text.
-    """
+    """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one."""
     from rodfem.continuation.branch import Branch
     from rodfem.output.files import save_states
 

@@ -104,10 +104,7 @@ def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
 
 @dataclass(frozen=True)
 class Profiles:
-    """Profiles of one state, of E elements with p points each.
-
-    ``points`` (E, p) are arclengths, ``fields`` by symbol the components along the directors, (E, p, 3).
-    """
+    """Profiles of one state, of E elements with p points each."""
 
     points: Floats
     fields: dict[str, Floats]
@@ -153,10 +150,7 @@ def check_run(data: dict[str, Any], states: Path) -> None:
 
 
 def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Centreline (n, 3) and unit quaternions (n, 4) at arclengths ``at`` (n,) of a state, by splines through its nodes.
-
-    The nodes are at ``s`` (m,), with positions ``r`` (m, 3) and quaternions ``q`` (m, 4) of any length and sign.
-    """
+    """Centreline (n, 3) and unit quaternions (n, 4) of a state at arclengths ``at`` (n,), by splines."""
     opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
     signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
     turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
@@ -175,11 +169,7 @@ def curve_at(group: Mapping[str, Any], row: int, count: int) -> tuple[Floats, Fl
 
 
 def to_vtkhdf(folder: Path, target: Path) -> list[Path]:
-    """Write a file for each branch: a row is a step, the centreline a polyline with all fields; returns the files.
-
-    Modes, where there are any, have a file for each state: vectors at its nodes, real parts of complex ones.  Raises
-    :class:`InputError` for a folder without a run.
-    """
+    """Write a file for each branch: a row is a step, the centreline a polyline with all fields; returns the files."""
     written = []
     for rows in rows_of(folder):
         path = target / f"{file_name(rows.name)}.vtkhdf"
@@ -242,10 +232,7 @@ def _write_curves(
 
 
 def to_csv(folder: Path, target: Path) -> list[Path]:
-    """Write ``rows.csv``, a line for each row of each branch, and ``special.csv``; returns the files.
-
-    Raises :class:`InputError` for a folder without a run.
-    """
+    """Write ``rows.csv``, a line for each row of each branch, and ``special.csv``; returns the files."""
     data = read_json(folder / "diagram.json", DIAGRAM, ("branches",))
     rows, special = list[dict[str, Any]](), list[dict[str, Any]]()
     for branch in data["branches"]:
@@ -267,10 +254,7 @@ def _table(rows: list[dict[str, Any]]) -> bytes:
 
 
 def to_netcdf(folder: Path, target: Path) -> list[Path]:
-    """Write ``diagram.nc``, the content of :meth:`rodfem.Diagram.to_xarray`; returns the file.
-
-    Raises :class:`InputError` for a folder without a run, and :class:`SetupError` without xarray.
-    """
+    """Write ``diagram.nc``, the content of :meth:`rodfem.Diagram.to_xarray`; returns the file."""
     data, every = read_json(folder / "diagram.json", DIAGRAM, ("branches", "constants")), list(rows_of(folder))
     fields = []
     for rows in every:

@@ -62,10 +62,7 @@ class Sheet(Figure):
 
 
 def sheet(title: str, about: str, given: Axes | None = None) -> tuple[Figure, Axes]:
-    """A figure of one picture with its title, and in small letters what it is computed with.
-
-    If axes are ``given``, they and their figure as they are; raises :class:`InputError` for anything else.
-    """
+    """A figure of one picture with its title, and in small letters what it is computed with."""
     if given is not None:
         if not isinstance(given, Axes):
             raise InputError(f"ax is {given!r}: give axes of matplotlib, as in ax=pyplot.gca().")
@@ -83,10 +80,7 @@ def entries_of(axes: Axes) -> dict[str, Artist]:
 
 
 def explain(axes: Axes, handles: Sequence[Artist]) -> None:
-    """Write the legend below the axes, each entry once: inside there may be no room.
-
-    Entries that it had are kept, those of another diagram in the same axes.
-    """
+    """Write the legend below the axes, each entry once: inside there may be no room."""
     entries = entries_of(axes) | {str(handle.get_label()): handle for handle in handles}
     columns = max(1, min(4, 150 // (12 + max(map(len, entries), default=0))))
     place = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": offset_copy(axes.transAxes, axes.figure, 0, -36, "points")}

@@ -174,11 +174,7 @@ def law_in_words(special: Data) -> str:
 
 
 def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, str]]:
-    """Load and ordinate of each row of a branch, those with an estimate, as ``0.3216501 (3e-07)``.
-
-    Special points have bounds of their own.  Those of other rows are relative, to ``natural`` sizes by the name of the
-    number.
-    """
+    """Load and ordinate of each row of a branch, those with an estimate, as ``0.3216501 (3e-07)``."""
     rows = len(branch["columns"]["load"])
     found = [_reading(row_of(branch, row), natural) for row in range(rows)]
     for special in branch["special"]:
@@ -209,11 +205,7 @@ class Words:
 
 
 def words_of(branch: Data, *, planar: bool = False, leaves: str = "") -> list[Words]:
-    """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it.
-
-    Of a ``planar`` rod it is that in its plane, where the index in space is unknown.  The first row is a branch point
-    of the branch that this one ``leaves``, if it has a name.
-    """
+    """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it."""
     specials, warnings, out = defaultdict(list), _warnings(branch), list[Words]()
     for special in branch["special"]:
         specials[special["row"]].append(special)

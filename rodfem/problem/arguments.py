@@ -90,10 +90,7 @@ def encodes(name: str) -> bool:
 
 
 def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Decorator of a function whose arguments are checked, and converted; a default is not.
-
-    The function raises :class:`TypeError`, with the names of its arguments, if one is missing or unknown.
-    """
+    """Decorator of a function whose arguments are checked, and converted; a default is not."""
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(function)

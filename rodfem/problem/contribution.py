@@ -101,10 +101,7 @@ Term = Callable[[Site, Any], Any]
 
 @dataclass(frozen=True)
 class Load:
-    """A kind of load: its ``potential`` in space, that ``in_plane`` if it is another, or else its virtual ``work``.
-
-    A ``moment`` of a planar rod is about the normal, a force in the plane.
-    """
+    """A kind of load: its ``potential`` in space, that ``in_plane`` if it is another, or else its virtual ``work``."""
 
     potential: Term | None = None
     in_plane: Term | None = None

@@ -281,10 +281,7 @@ def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
 def some_places(
     scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x, s: float | None = None
 ) -> tuple[Place, Place]:
-    """Return a point and a place along the rod in the ``state`` of :data:`STATES`, whose vectors pass through ``wrap``.
-
-    The arclength ``s`` is by default one inside the rod: at an end a factor may vanish, or a logarithm have its pole.
-    """
+    """A point and a place along the rod in a ``state`` of :data:`STATES`, by default at an ``s`` inside the rod."""
     return places_at(scene.length, inside(scene.interval)[0] if s is None else s, STATES[state], wrap)
 
 

@@ -153,11 +153,7 @@ class Ordinate:
 
 
 def rotations(values: Any) -> np.ndarray:
-    """Quaternions of unit norm, along the last axis, of an array; those that are so but for round-off stay as they are.
-
-    Zero quaternions, and those that are not finite, stay for the check of the start.  Raises :class:`TypeError` for
-    complex numbers.
-    """
+    """Quaternions of unit norm of an array; what is so but for round-off, zero, or not finite, stays as it is."""
     if np.iscomplexobj(values):
         raise TypeError("complex numbers")
     q = np.asarray(values, dtype=float)

@@ -128,10 +128,7 @@ class Section:
         return Scales(L, self.bending[0] / L**2, L**2 * sqrt(self.mass / self.bending[0]))
 
     def scaled(self, scales: Scales) -> Section:
-        """The same section in other units: with its own ``scales`` a section without dimensions, whose ``E I1`` is one.
-
-        ``scales`` may be those of another section, too.
-        """
+        """The same section in other units; in its own ``scales`` its ``E I1`` is one."""
         L = scales.length
         density = self.density * L**4 / (scales.force * scales.time**2) if scales.time else 0.0
         second = {name: getattr(self, name) / L**4 for name in ("I1", "I2", "J")}
@@ -167,20 +164,14 @@ MATERIAL = {
 
 @checked(radius=LENGTH, **MATERIAL)
 def circle(radius: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A solid circle of a ``radius``; ``E, nu, density`` are Young's modulus, Poisson's ratio and mass per volume.
-
-    Raises :class:`InputError` for numbers that no section has.
-    """
+    """A solid circle of a ``radius``; ``E, nu, density`` are Young's modulus, Poisson's ratio and mass per volume."""
     second, shear = pi * radius**4 / 4, 6 * (1 + nu) / (7 + 6 * nu)
     return Section(pi * radius**2, second, second, 2 * second, (shear, shear), E, nu, density)
 
 
 @checked(outer=LENGTH, inner=LENGTH, **MATERIAL)
 def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A circular tube with the radii ``outer`` and ``inner``; ``E, nu, density`` are as for :func:`circle`.
-
-    Raises :class:`InputError` for numbers that no section has.
-    """
+    """A circular tube with the radii ``outer`` and ``inner``; ``E, nu, density`` are as for :func:`circle`."""
     if not inner < outer:
         raise InputError(f"inner is {inner:g}: give a radius below the outer one, {outer:g}.")
     second, m = pi * (outer**4 - inner**4) / 4, (inner / outer) ** 2
@@ -190,10 +181,7 @@ def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.
 
 @checked(width=LENGTH, height=LENGTH, **MATERIAL)
 def rectangle(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A rectangle of a ``width`` along ``d1`` and a ``height`` along ``d2``.
-
-    ``E, nu, density`` are as for :func:`circle`.
-    """
+    """A rectangle of a ``width`` along ``d1`` and a ``height`` along ``d2``."""
     long, short = max(width, height), min(width, height)
     # the sum of tanh(n pi long / 2 short) / n^5, which converges slowly, by that of its difference from 1 / n^5
     # the seventh term is below 1e-17 in a square
@@ -204,23 +192,9 @@ def rectangle(width: float, height: float, *, E: float, nu: float, density: floa
     return Section(width * height, width * height**3 / 12, height * width**3 / 12, J, (shear, shear), E, nu, density)
 
 
-@checked(width=LENGTH, thickness=LENGTH, **MATERIAL)
-def strip(width: float, thickness: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A strip: a flat :func:`rectangle` of a ``width`` and a ``thickness``, which bends easily about its width ``d1``.
-
-    ``E, nu, density`` are as for :func:`circle`.  Raises :class:`InputError` for a strip that is thicker than wide.
-    """
-    if thickness > width:
-        raise InputError(f"thickness is {thickness:g}: give no more than the width, {width:g}, or a section.rectangle.")
-    return rectangle(width, thickness, E=E, nu=nu, density=density)
-
-
 @checked(width=LENGTH, height=LENGTH, **MATERIAL)
 def ellipse(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A solid ellipse whose axes are ``width`` along ``d1`` and ``height`` along ``d2``, twice the semi-axes.
-
-    ``E, nu, density`` are as for :func:`circle`.
-    """
+    """A solid ellipse whose axes are ``width`` along ``d1`` and ``height`` along ``d2``, twice the semi-axes."""
     a, b = width / 2, height / 2
 
     def shear(along: float, across: float) -> float:

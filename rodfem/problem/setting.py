@@ -128,11 +128,7 @@ class Setting:
 
 
 def read(group: Any, row: int | None = None) -> Setting:
-    """Read what was written below a group of a file, with the section of the file; what is not there is left out.
-
-    ``row`` is that of the state; None where the group has one state only.  Raises :class:`SceneError` where a support
-    or a constraint is not whole.
-    """
+    """Read what was written below a group of a file, with the section of the file; what is not there is left out."""
     row, section, distributed, foundation = row or 0, None, None, None
     supports, ties = _all(Support, group, SUPPORTS, row), _all(Tie, group, TIES, row)
     notes = [tie.note for tie in ties if tie.note]

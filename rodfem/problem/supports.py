@@ -39,10 +39,7 @@ FLAT = 1e-3
 
 
 def supports_of(scene: Scene, sample: Sample, first: dict[str, Support] | None = None) -> dict[str, Support]:
-    """Supports of a rod by the names of their places, in a state given by :meth:`~rodfem.fem.shape.Shape.sample`.
-
-    Springs are those of the ``first`` state's supports, by default of this one.  A ring has no supports at its ends.
-    """
+    """Supports of a rod by the names of their places, in a state given by :meth:`~rodfem.fem.shape.Shape.sample`."""
     places: list[tuple[str, float, End, Callable[[Constants], Any] | None]] = [
         (f"{side} end", s, end, None)
         for side, s, end in zip(SIDES, scene.interval, scene.sides, strict=True)
@@ -137,11 +134,7 @@ def _springs(second: Floats) -> Floats:
 
 
 def _load_of(energy: OfPlace, c: Constants, x: Place, springs: Floats) -> Floats:
-    """Force and moment (2, 3) of a potential at a place ``x``, in the frame of space, where it is no spring's.
-
-    Of springs of translation, with the stiffness ``springs[0]``, what is across all their directions; of springs of
-    rotation, with ``springs[1]``, nothing.
-    """
+    """Force and moment (2, 3) of a potential at a place ``x``, in the frame of space, where it is no spring's."""
     out = -derivative_of(energy, c, x)
     if springs[0].any():
         values, axes = np.linalg.eigh(springs[0])
@@ -160,10 +153,7 @@ def distributed_on(scene: Scene, load: float) -> tuple[Floats, Floats, Floats]:
 
 
 def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
-    """Stiffness per length (n, 3, 3) of an elastic foundation at arclengths (n,), None where the potential is none's.
-
-    It is one's where it is a spring's everywhere, and no function of the strains.
-    """
+    """Stiffness per length (n, 3, 3) of an elastic foundation at arclengths (n,); None for other potentials."""
     if scene.potential is None:
         return None
     s, load = _stations(scene), float(sample["load"])
@@ -212,10 +202,7 @@ def _surface(scene: Scene, of: OfPlace, s: float, sample: Sample) -> tuple[Float
 
 
 def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | None:
-    """Vector ``a`` (3,) where an integrand is ``a . r'`` and a constant, None where it is not, or the rod is closed.
-
-    By least squares at random rotations, positions and free strains.
-    """
+    """Vector ``a`` (3,) where an integrand is ``a . r'`` and a constant, None where it is not, or the rod is closed."""
     rng = np.random.default_rng(1)
     rows, values = [], []
     for s in _stations(scene).tolist():

@@ -78,10 +78,7 @@ class Table:
 
 
 class Entry(Variable):  # type: ignore[misc]
-    """Component ``number`` of a ``table`` at an expression, which is its first operand.
-
-    It is a Variable to UFL, which lets it pass everywhere; two of one table at one expression are the same.
-    """
+    """Component ``number`` of a ``table`` at an expression, which is its first operand."""
 
     __slots__ = ("number", "table")
 

@@ -165,10 +165,7 @@ class _Trial:
             )
 
     def _pairs(self) -> Iterator[tuple[float, float, Constants]]:
-        """Values of expression and function, nan if UFL has none, inf if undefined, and the constants there.
-
-        They are tried in all :data:`STATES`, and in the first one at loads and arclengths.
-        """
+        """Values of expression and function, nan if UFL has none, inf if undefined, and the constants there."""
         for state in range(len(STATES) if self.of_place else 1):
             if self.of_place:
                 self.expressions(state)  # what it raises is no matter of the state

@@ -61,10 +61,7 @@ class Page:
 
 
 def write_report(folder: Path, path: Path | None = None) -> Path:
-    """Write the report on the run in a folder, to ``report.html`` there by default; returns its path.
-
-    Raises :class:`~rodfem.errors.InputError` where the files of the run are unfit, or the page cannot be written.
-    """
+    """Write the report on the run in a folder, to ``report.html`` there by default; returns its path."""
     path = folder / "report.html" if path is None else path
     write_whole({path: page_of(payload_of(folder)).encode()})
     return path
@@ -100,10 +97,7 @@ def _text(file: Traversable) -> str:
 
 
 class Loaded(dict[str, Any]):
-    """Entries of a group by name, arrays and groups alike; ``attrs``, ``name`` and ``file`` are those of the group.
-
-    One reading for all rows, where each row would read a dozen small arrays.
-    """
+    """Entries of a group by name, arrays and groups alike; ``attrs``, ``name`` and ``file`` are those of the group."""
 
     def __init__(self, group: Any) -> None:
         """Read a group and all below it."""

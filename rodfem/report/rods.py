@@ -182,11 +182,7 @@ class Shapes:
 
 
 def shapes_of(group: Any, count: int) -> Shapes:
-    """Read the states below the group of a branch at ``count`` stations, by splines through the nodes.
-
-    The centre of a rod that nothing holds, which may be anywhere, is the origin.  Raises :class:`InputError` where a
-    state is not finite, or no curve.
-    """
+    """Read the states below the group of a branch at ``count`` stations, by splines through the nodes."""
     try:
         rows = [curve_at(group, row, count) for row in range(len(group["s"]))]
     except ValueError as trouble:  # of the splines
@@ -242,12 +238,7 @@ class Shown(NamedTuple):
 
 
 def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[Shown]:
-    """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical.
-
-    ``path`` is the file with error bars, None where it has not this state, and ``place`` the branch and row in it;
-    ``typical`` are modes that the run has recorded there, at nodes ``s``, and ``zeros`` is the number of eigenvalues
-    that vanish, symmetries included.
-    """
+    """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical."""
     shown: list[Shown] = []
     if path is not None:
         modes = load_modes(path, *place)
@@ -273,10 +264,7 @@ def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[Shown]:
 
 
 def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Setting, look: Look) -> list[dict[str, Any]]:
-    """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one.
-
-    ``shapes`` are those of the branch, ``modes`` those of :func:`modes_of`.
-    """
+    """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one."""
     r, frames = shapes[row]
     span = float(np.linalg.norm(np.ptp(r, axis=0)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import subprocess
@@ -20,6 +21,7 @@ from mpi4py import MPI
 
 import rodfem
 from rodfem.app.run import run
+from rodfem.app.terminal import Report
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
 from rodfem.problem.ends import clamped, free
@@ -175,3 +177,20 @@ def test_an_equilibrium_that_there_is_not() -> None:
         hemitropic.equilibrium(1.5)
     with pytest.raises(rodfem.ConvergenceError, match=r"No equilibrium was found at lam = 0.5: go there in steps"):
         hemitropic.equilibrium(0.5, guess=hemitropic.equilibria.system.new_vector())
+
+
+def test_a_log_of_a_long_run_has_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, plan = hemitropic_cases.scene(span=(0.0, 0.2)), Plan(depth=1, error_bars=False)
+    plain, log = io.StringIO(), io.StringIO()
+    rodfem.trace(scene, MESH, plan, Report(stream=plain))
+    monkeypatch.setattr("rodfem.app.terminal.PAUSE", -1.0)
+    rodfem.trace(scene, MESH, plan, Report(stream=log))
+    assert [x for x in log.getvalue().splitlines() if not x.startswith("  ... ")] == plain.getvalue().splitlines()
+    assert log.getvalue().count("\n  ... straight, 1 known, 0 branch points left to follow, lam = ") > 2
+
+
+def test_most_branches() -> None:
+    scene = hemitropic_cases.scene(span=(0.0, 0.5))
+    found = rodfem.trace(scene, MESH, Plan(most_branches=1, error_bars=False))
+    assert len(found) == 1 and sum(s.to_follow for s in found.special()) == 2
+    assert found.in_words().endswith("2 branch points were not followed.")
