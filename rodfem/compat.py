@@ -41,8 +41,7 @@ except ModuleNotFoundError as missing:
     ) from missing
 
 
-REAL: Any = np.float64
-"""Numbers of states and forms, whatever those of PETSc."""
+REAL: Any = np.float64  # numbers of states and forms, whatever those of PETSc
 _FOR = hashlib.sha1(code_cache.processor().encode()).hexdigest()[:16]
 C_COMPILER = {
     name: {"cffi_extra_compile_args": ["-O1", "-march=native", "-fvisibility=hidden", "-g0", f"-DPROCESSOR={_FOR}"]}

@@ -10,8 +10,7 @@ import re
 from dataclasses import dataclass
 
 CONTROL = re.compile("[\\x00-\\x09\\x0b-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
-INTERRUPTED = 130
-"""Status of a program that is interrupted."""
+INTERRUPTED = 130  # status of a program that is interrupted
 
 
 def many(count: int, noun: str, plural: str = "") -> str:

@@ -23,8 +23,7 @@ from rodfem.errors import Argument, InputError
 if TYPE_CHECKING:
     import h5py
 
-PROGRAM = f"rodfem {__version__}"
-"""Name and version of the program, as files have it."""
+PROGRAM = f"rodfem {__version__}"  # name and version of the program, as files have it
 KEYS = {"name": "format", "version": "format_version", "program": "program"}
 """Entries of a mark, and the attributes that an HDF5 file has for them."""
 

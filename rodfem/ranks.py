@@ -24,10 +24,8 @@ from rodfem.errors import INTERRUPTED, ConvergenceError, InputError
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-RANK = ("PMIX_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK")
-"""Variables of the environment, one of which every rank has."""
-ADDRESS = re.compile(r" at 0x\w+")
-"""Place of an object in the memory of its rank, in its text."""
+RANK = ("PMIX_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK")  # variables of the environment, one of which every rank has
+ADDRESS = re.compile(r" at 0x\w+")  # place of an object in the memory of its rank, in its text
 PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
 """Seconds after which a rank that others do not join failed alone; between two looks for them at last, and at first."""
 

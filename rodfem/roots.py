@@ -10,8 +10,7 @@ from collections.abc import Callable
 from math import copysign
 from sys import float_info
 
-ROUND_OFF = 4 * float_info.epsilon
-"""Relative distance of neighbours."""
+ROUND_OFF = 4 * float_info.epsilon  # relative distance of neighbours
 
 
 def zero_between(f: Callable[[float], float], a: float, b: float, within: float) -> float:

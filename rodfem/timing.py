@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
 
-WORK = ("assembly", "solve", "stability")
-"""What a point of a branch costs."""
+WORK = ("assembly", "solve", "stability")  # what a point of a branch costs
 
 
 class Clock:

@@ -18,27 +18,20 @@ from typing import Any
 import numpy as np
 
 Pair = tuple[float, float]
-TINY = 1e-300
-"""Floor of a number that may be zero and is divided by, or has its root or logarithm taken: absolute."""
+TINY = 1e-300  # floor of a number that may be zero and is divided by, or has its root or logarithm taken: absolute
 NEGLIGIBLE = 1e-12
 """A difference or a part below this, relative to the whole, is round-off of arithmetic: nothing was solved for."""
 ROUND_OFF = 1e-12
 """Uncertainty of a load or an ordinate, relative to it or to one, by Newton's tolerance and the conditioning near a
 singular point."""
-INSIDE = 1e-9
-"""Part of a step that is left out at its ends: what happens there belongs to the row."""
-SAME_PLACE = 1e-9
-"""Arclengths that differ by less than this, relative to the rod's length, are one place."""
-SAME_LOAD = 1e-9
-"""Loads that differ by less than this, relative to the span, are one: that of a bound, or of a search."""
+INSIDE = 1e-9  # part of a step that is left out at its ends: what happens there belongs to the row
+SAME_PLACE = 1e-9  # arclengths that differ by less than this, relative to the rod's length, are one place
+SAME_LOAD = 1e-9  # loads that differ by less than this, relative to the span, are one: that of a bound, or of a search
 SAME_STATE, SAME_SPECIAL = 1e-7, 1e-6
 """Equilibria, and special points, that agree to this in load, energy and stretch are one, up to a symmetry."""
-LOCATED = 10.0
-"""Uncertainties of a load on one mesh by which that of another special point differs at least."""
-APART = 1e-5
-"""Equilibria nearer to each other than this, in the metric, are one."""
-SAME_EIGENVALUE = 1e-6
-"""Eigenvalues closer than this, relative to the greatest, are one."""
+LOCATED = 10.0  # uncertainties of a load on one mesh by which that of another special point differs at least
+APART = 1e-5  # equilibria nearer to each other than this, in the metric, are one
+SAME_EIGENVALUE = 1e-6  # eigenvalues closer than this, relative to the greatest, are one
 DRIFT = 1e-6
 """Largest drift scalar of an equilibrium, or of a unit vector, over the lowest bending eigenvalue: beyond it a mesh
 breaks a symmetry, or the vector is one of a Jordan block."""

@@ -26,16 +26,13 @@ if TYPE_CHECKING:
     import h5py
     from mpi4py import MPI
 
-DRAFTS = ".*.rodfem-part*"
-"""Names of drafts: that of the file, whose suffix says what it is to those who write it."""
-LOCK = ".lock"
-"""File whose lock says that the folder is in use; it has the process and the host in words."""
+DRAFTS = ".*.rodfem-part*"  # names of drafts: that of the file, whose suffix says what it is to those who write it
+LOCK = ".lock"  # file whose lock says that the folder is in use; it has the process and the host in words
 OF_A_RUN = ("modes.h5", "modes-*.png", "modes-*.gif", "locus-*.json", "locus.png", "diagram.png", "shape.png")
 """Names of the files that a run may write next to its diagram and states."""
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
 """Suffixes of pictures of diagrams; without one it is PNG."""
-FOLDERS: set[Path] = set()
-"""Folders whose lock this process has."""
+FOLDERS: set[Path] = set()  # folders whose lock this process has
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
 

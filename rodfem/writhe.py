@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from rodfem.tolerances import SAME_PLACE, TINY
 
 Floats = NDArray[np.float64]
-FEW, MOST = 16, 1024
-"""Edges of the first polygon, and of the last one, where curves touch."""
+FEW, MOST = 16, 1024  # edges of the first polygon, and of the last one, where curves touch
 
 
 def writhe(curve: Callable[[Floats], Floats], ends: tuple[float, float], to: float = 1e-3) -> float:

@@ -49,12 +49,9 @@ from rodfem.tolerances import INSIDE, ROUND_OFF, round_off, same_place, unit
 RESOLVED_TO = 0.1
 """Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
 order of which errors of loads are, is one per cent."""
-RESOLVED = 1e-9
-"""Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
-LEFT = 0.5
-"""Part of an error of an event that is left at most: that of a number of the nodes falls with their distance."""
-LOCATED = 1e-10
-"""Uncertainty of the load at which the stretch vanishes on one mesh, relative to it or to one."""
+RESOLVED = 1e-9  # last coefficients smaller than this, of all or of one radian along the rod, are round-off
+LEFT = 0.5  # part of an error of an event that is left at most: that of a number of the nodes falls with their distance
+LOCATED = 1e-10  # uncertainty of the load at which the stretch vanishes on one mesh, relative to it or to one
 
 
 def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:

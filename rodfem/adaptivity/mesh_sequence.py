@@ -36,19 +36,15 @@ from rodfem.problem.scene import Scene
 from rodfem.stability.inertia import ROUGH
 from rodfem.tolerances import SAME_LOAD, TINY, unit
 
-TRIES, MOST = 4, 16
-"""Meshes tried at one place, and in a run."""
+TRIES, MOST = 4, 16  # meshes tried at one place, and in a run
 GROWN, SELDOM = 1.5, 10
 """An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
-NEAR = 0.1
-"""Points of a branch nearer to each other than this, in arclength, are at one place."""
+NEAR = 0.1  # points of a branch nearer to each other than this, in arclength, are at one place
 OWN_MESH = Remedy(
     "use {} and {} instead of an accuracy", *(Argument("Discretization", name) for name in ("elements", "degree"))
 )
-LEAST = 1e-6
-"""Least bound of a step next to a gap."""
-ARM = 0.05
-"""Distance, in the metric, at which the four arms that would meet are looked for."""
+LEAST = 1e-6  # least bound of a step next to a gap
+ARM = 0.05  # distance, in the metric, at which the four arms that would meet are looked for
 
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:

@@ -17,8 +17,7 @@ from types import ModuleType
 
 from rodfem.errors import InputError
 
-_read: list[Path] = []
-"""The files that are read for the rod that they state."""
+_read: list[Path] = []  # the files that are read for the rod that they state
 
 
 class RunsItselfError(BaseException):

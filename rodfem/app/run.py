@@ -75,26 +75,10 @@ def run(
     written any more or is in use by another process, and :class:`~rodfem.errors.ConvergenceError` where not even a
     first equilibrium is found.
 
-    Parameters
-    ----------
-    scene
-        Statement of the problem.
-    discretization
-        By default 8 elements of degree 6, or a few to start with where the plan has an accuracy.
-    plan
-        By default the range of the scene; its fields may be given instead, as ``of_plan``.
-    output
-        Folder, by default ``results/<name>``.
-    figures
-        Whether pictures are drawn.
-    comm
-        The ranks that share the rod.
-    quiet
-        Whether nothing is printed.
-    verbose
-        Whether what is technical is printed, too: unknowns, meshes, points as they are found, times, and methods.
-    words
-        Rewords each line on the terminal.
+    ``scene``, ``discretization``, ``plan``, or its fields ``of_plan``, and ``comm`` are as for :func:`rodfem.trace`;
+    ``output`` is a folder, by default ``results/<name>``; ``figures`` says whether pictures are drawn, ``quiet`` that
+    nothing is printed, ``verbose`` that what is technical is printed, too: unknowns, meshes, points as they are found,
+    times, and methods.  ``words`` rewords each line on the terminal.
     """
     leave_the_run()
     plan, discretization = plan_of(plan, of_plan), discretization or Discretization()

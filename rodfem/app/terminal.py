@@ -33,8 +33,7 @@ from rodfem.stability.assessment import Verdict
 from rodfem.stability.soft_mode import index_range
 from rodfem.timing import WORK, Clock
 
-WIDTH, PAUSE = 110, 30.0
-"""Columns of a paragraph; seconds between two lines of progress."""
+WIDTH, PAUSE = 110, 30.0  # columns of a paragraph; seconds between two lines of progress
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 

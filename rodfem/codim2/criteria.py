@@ -45,8 +45,7 @@ IMPERFECT = 1e-7
 FEWER = 1e-5
 """Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
 their mean, are not equal by a symmetry."""
-FIRST = 1e-4
-"""First step of the secants, relative to the bounds, below which they end where they no longer shrink."""
+FIRST = 1e-4  # first step of the secants, relative to the bounds, below which they end where they no longer shrink
 DIFFERENCE = 1e-3
 """Step of the central differences of ``D``, and of a count next to a divergence load, relative to the bounds."""
 Interval = tuple[float, float]

@@ -48,8 +48,7 @@ from rodfem.tolerances import INSIDE, same_special
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
-REACH = 1e-6
-"""Distance, in the metric, that a point on a line of parameters may move by, however short the step."""
+REACH = 1e-6  # distance, in the metric, that a point on a line of parameters may move by, however short the step
 NEAREST = "the index is that of the frequencies nearest zero: the mesh has too many unknowns to find all of them"
 
 

@@ -58,41 +58,18 @@ class Row:
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
-    ``scene`` and ``title`` name the rod, ``kind`` its special points, ``labels``, ``words`` and ``units`` the two
-    parameters in mathematics and words.  ``ordinate`` (n,) is the scene's, with ``ordinate_name`` and ``natural`` size.
-    ``constants`` are all other parameters, ``discretization`` is the mesh; ``states`` are not saved.  Of a ``planar``
-    rod the index is that of changes in its plane, and stability is not that in space.  ``solve`` gives the rows where a
-    parameter, 0 or 1, has a value; None in a locus from a file.
+    ``names``, ``bounds`` and ``values`` are the two parameters, the scene's load first, their intervals, and both at
+    each row, (n, 2).  ``index`` (n, 2) is that of the equilibria on the two sides of the curve: the eigenvalues that
+    vanish on it positive, and negative; under loads without a potential the number of unstable ones.  ``lower`` is the
+    side of the load on which it is the lower one at the start: -1 below, 1 above, 0 not known.
 
-    Attributes
-    ----------
-    names, bounds, values
-        The two parameters, the scene's load first, their intervals, and both at each row, (n, 2).
-    index
-        Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
-        negative.  Under loads without a potential the number of unstable eigenvalues.
-    lower
-        Side of the load on which the index is the lower one at the start: -1 below, 1 above, 0 not known.
-    omega2
-        The double eigenvalue of flutter, (n,), nan for others.
-    located_to
-        How far the parameters are uncertain for the given discretisation, (n, 2): of turning points, cusps and ends
-        also along the curve.
-    error
-        How far, across the curve, that of a richer discretisation is away in either parameter, (n, 2); of turning
-        points, cusps and ends how far those of that curve are.  It is nan where it was not asked for, inf where the
-        richer one does not find the point.
-    unresolved
-        Rows whose state, or null vector, the discretisation does not resolve, where errors may exceed their bounds.
-    marks
-        Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
-        eigenvalue has passed through zero, not located.
-    start, ended
-        Row of the special point from which the curve was started; why it ends, at its first and at its last row.
-    crossings
-        Load and ordinate at the start, and wherever else the curve passes the second parameter's value there.
-    note
-        Why errors that were asked for are not estimated; empty where they are.
+    ``located_to`` (n, 2) are the uncertainties of the parameters on the mesh: of turning points, cusps and ends also
+    along the curve.  ``error`` (n, 2) says how far, across the curve, that of a richer mesh is away in either
+    parameter; of turning points, cusps and ends how far those of that curve are.  It is nan where it was not asked for,
+    inf where the richer mesh does not find the point; rows that are ``unresolved`` may exceed it.
+
+    ``marks`` are rows at which the curve turns in a parameter, cusps, and rows (away from the ``start``) before which
+    another eigenvalue has passed through zero, not located; ``ended`` says why it ends, at its first and last row.
     """
 
     scene: str
@@ -106,7 +83,7 @@ class Locus:
     ordinate: np.ndarray
     index: np.ndarray
     lower: int
-    omega2: np.ndarray
+    omega2: np.ndarray  # the double eigenvalue of flutter, nan for others
     located_to: np.ndarray
     error: np.ndarray
     marks: list[Mark]
@@ -114,11 +91,11 @@ class Locus:
     ended: tuple[str, str]
     constants: dict[str, float]
     discretization: dict[str, Any]
-    states: list[PETSc.Vec] = field(default_factory=list)
-    crossings: list[tuple[float, float]] = field(default_factory=list)
+    states: list[PETSc.Vec] = field(default_factory=list)  # not saved
+    crossings: list[tuple[float, float]] = field(default_factory=list)  # load, ordinate at the start's parameter
     words: tuple[str, str] = ("", "")
     units: tuple[str, str] = ("", "")
-    note: str = ""
+    note: str = ""  # why errors that were asked for are not estimated
     natural: float = 1.0
     planar: bool = False
     unresolved: list[int] = field(default_factory=list)

@@ -33,10 +33,8 @@ from rodfem.output.words import number
 from rodfem.roots import zero_between
 from rodfem.tolerances import TINY
 
-WINDOWS = tuple(0.064 / 2**i for i in range(11))
-"""Half widths of windows, as arclengths, from wide to narrow."""
-POINTS = 8
-"""Points of a window: an even number, none of them in the middle, where the end of a fold is singular."""
+WINDOWS = tuple(0.064 / 2**i for i in range(11))  # half widths of windows, as arclengths, from wide to narrow
+POINTS = 8  # points of a window: an even number, none of them in the middle, where the end of a fold is singular
 PLACES = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
 """Chebyshev's points of a window of half width one; what is sought must be in the inner half of it."""
 UNPLACED = 1e-5
@@ -54,10 +52,8 @@ ENDS = "the fold ends on a branch point"
 DIVERGES = "the double eigenvalue vanishes: divergence"
 PASSES = "the fold passes a branch point"
 """Marks of rows; at the last one the coupling vanishes as well, but the fold goes on."""
-Row = tuple[LocusPoint, str]
-"""A point of a locus and the kind of its mark; empty for none."""
-Test = Callable[[LocusPoint], float]
-"""What vanishes at a point of codimension two."""
+Row = tuple[LocusPoint, str]  # a point of a locus and the kind of its mark; empty for none
+Test = Callable[[LocusPoint], float]  # what vanishes at a point of codimension two
 
 
 @dataclass(frozen=True)

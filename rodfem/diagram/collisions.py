@@ -33,14 +33,12 @@ from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricPencil, N
 from rodfem.stability.spectrum import SHIFT, Spectrum, inside
 from rodfem.tolerances import TINY, round_off, unit
 
-SAME = 1e-9
-"""Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+SAME = 1e-9  # loads, or eigenvalues, that differ by less than this, relative to them, are one
 JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
 MOVED, OUTSIDE = 0.3, 0.2
 """Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, of another one."""
-AROUND = (1e-4, 1e-5, 1e-6)
-"""Half widths, relative to a divergence load, over which its eigenvalues are sampled."""
+AROUND = (1e-4, 1e-5, 1e-6)  # half widths, relative to a divergence load, over which its eigenvalues are sampled
 
 
 @dataclass(frozen=True)

@@ -54,8 +54,7 @@ PARTS, PART = 100, 0.47
 """Times that steps of a sweep are parted, at most, and where: not in the middle, which is likely to be special."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
-NEARER, CLOSEST = 10, 1e-6
-"""Loads at which a meeting is looked for, at most, and their least distance, over a step."""
+NEARER, CLOSEST = 10, 1e-6  # loads at which a meeting is looked for, at most, and their least distance, over a step
 SMALL, CLEAR, ONE = 0.3, 100.0, 0.9
 """Relative distance of two eigenvalues that do not meet in a step; products of changes, over their noise, that are none
 of round-off; square of the cosine of two vectors that are nearly one."""

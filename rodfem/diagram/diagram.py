@@ -63,29 +63,10 @@ class Diagram:
     It is a sequence of branches, in the order in which they were found, which are also found by name.  All methods that
     compute are collective over the ranks that share the rod.
 
-    Attributes
-    ----------
-    scene, plan
-        What was traced.
-    branches
-        All branches.
-    solvers
-        Solver of each mesh, by the number that a point has in ``mesh``.
-    warnings, notes
-        Sentences on what went wrong without stopping the computation, and on what is worth knowing; each has the
-        ``branch`` and the ``loads`` that it is about, or None.
-    clock
-        Seconds by scope.
-    run
-        Name of this run on the first rank, which its files have in common.
-    origin
-        Command, date and versions of its libraries.
-    asked
-        Plan and fingerprint of the equations, as they were traced; None: unknown.
-    lacks
-        What its plan had and the file that it was read from does not hold: ``events`` or ``steps``.
-    complete
-        Whether all that was asked for has been done.
+    ``scene`` and ``plan`` are what was traced, ``branches`` all branches, and ``solvers`` those of the meshes, by the
+    number that a point has in ``mesh``.  ``warnings`` and ``notes`` are sentences on what went wrong without stopping
+    the computation, and on what is worth knowing; each has the ``branch`` and the ``loads`` that it is about, or None.
+    ``complete`` says whether all that was asked for has been done.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[BranchSolver]) -> None:
@@ -93,11 +74,9 @@ class Diagram:
         self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
         self.warnings: list[Remark] = []
         self.notes: list[Remark] = []
-        self.run = uuid4().hex
-        self.origin = origin()
-        self.asked: dict[str, Any] | None = None
-        self.lacks = ""
-        self.complete = False
+        self.run, self.origin, self.complete = uuid4().hex, origin(), False
+        self.asked: dict[str, Any] | None = None  # plan and fingerprint of the equations, as they were traced
+        self.lacks = ""  # what its plan had and its file does not hold: ``events`` or ``steps``
 
     # --- what there is ---------------------------------------------------------------------------------------------
 
@@ -210,21 +189,11 @@ class Diagram:
     ) -> Locus:
         """Follow a special point in the plane of the load and a second parameter.
 
-        Parameters
-        ----------
-        special
-            A fold, a branch point, a flutter load or a divergence load of this diagram.
-        parameter
-            Name of the second parameter of the scene.
-        interval
-            Least and greatest value of that parameter.
-        load
-            Least and greatest load, by default those of the diagram.
-        steps
-            Control of the step, by default :data:`rodfem.codim2.follow.STEPS`.
-
-        Raises :class:`~rodfem.errors.InputError` for a parameter, bounds or a kind of special point that make no sense,
-        and :class:`~rodfem.errors.ConvergenceError` where the special point is not found again.
+        ``special`` is a fold, a branch point, a flutter load or a divergence load of this diagram, ``interval`` has the
+        least and greatest value of the ``parameter``, and ``load`` those of the load, by default the diagram's;
+        ``steps`` control the step, by default :data:`rodfem.codim2.follow.STEPS`.  Raises
+        :class:`~rodfem.errors.InputError` for a parameter, bounds or a kind of special point that make no sense, and
+        :class:`~rodfem.errors.ConvergenceError` where the special point is not found again.
         """
         from rodfem.codim2.follow import STEPS, locus
 
@@ -440,8 +409,6 @@ def trace(
 
     Parameters
     ----------
-    scene
-        The rod.
     discretization
         Elements and degree, by default 8 elements of degree 6; where the plan has an accuracy few elements to start
         with.
@@ -450,24 +417,12 @@ def trace(
         ``of_plan``: ``trace(scene, depth=1, at=(0.5,))``.
     observer
         What hears of the progress; by default nothing does.
-    comm
-        Ranks that share the rod.
 
-    Returns
-    -------
-    diagram
-        Branches, special points and solvers; its ``warnings`` say what could not be decided.
-
-    Raises
-    ------
-    InputError
-        For bad input, before any computation.
-    ConvergenceError
-        Where not even a first equilibrium is found.
-
-    An error after the first branch was begun, or an interrupt, carries the branches so far in its attribute
-    ``diagram``.  On several ranks one that nobody catches ends all ranks, which would wait for the one that fails; so
-    does the end of what started them (:func:`rodfem.ranks.end_together`).
+    Raises :class:`~rodfem.errors.InputError` for bad input, before any computation, and
+    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.  An error after the first
+    branch was begun, or an interrupt, carries the branches so far in its attribute ``diagram``.  On several ranks of
+    ``comm`` one that nobody catches ends all ranks, which would wait for the one that fails; so does the end of what
+    started them (:func:`rodfem.ranks.end_together`).
     """
     plan = plan_of(plan, of_plan)
     diagram = traced(scene, discretization or Discretization(), plan, observer or Observer(), comm)

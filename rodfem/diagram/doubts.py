@@ -19,8 +19,7 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.motion_names import MotionNames
 from rodfem.stability.near_zero import resolve
 
-ROWS = 4
-"""Rows one after the other that have as many zero eigenvalues, before these are said to stay."""
+ROWS = 4  # rows one after the other that have as many zero eigenvalues, before these are said to stay
 
 
 class PersistentZeros:

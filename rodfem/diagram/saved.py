@@ -34,16 +34,7 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     """Read a diagram that :meth:`Diagram.save` or :func:`rodfem.run` has written; collective.
 
     States are those of the file, on the meshes that they were computed on.  Tangents and null vectors are computed
-    anew.
-
-    Parameters
-    ----------
-    folder
-        Where ``diagram.json`` and ``states.h5`` are.
-    scene
-        The rod: a file holds numbers, not the functions that state a scene.
-    comm
-        Ranks that share the rod: as many as there are, whatever number wrote the file.
+    anew.  A file holds numbers, not the functions that state a ``scene``.  Any number of ranks reads it.
 
     Raises :class:`~rodfem.errors.InputError` where the files are missing, are those of another scene or of a newer
     format, or lack something.

@@ -40,18 +40,11 @@ MESH: Check = a(Discretization, "a Discretization, as in Discretization(elements
 RANKS: Check = a(MPI.Comm, "a communicator of mpi4py, as in @=MPI.COMM_SELF")
 POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['branch 1'].points[0]")
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
-METHOD: Check = text("auto")
-"""Checks of arguments that several functions have."""
+METHOD: Check = text("auto")  # checks of arguments that several functions have
 
 
 class Solver:
-    """Computes single equilibria of a scene on one mesh, with their index; collective over the ranks of ``comm``.
-
-    Attributes
-    ----------
-    equilibria
-        What the numerics work with: a :class:`~rodfem.continuation.branch_solver.BranchSolver`.
-    """
+    """Computes single equilibria of a scene on one mesh, with their index; collective over the ranks of ``comm``."""
 
     @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=count(4), clock=a(Clock, "a Clock"))
     def __init__(
@@ -63,22 +56,10 @@ class Solver:
         spectrum: int = 0,
         clock: Clock | None = None,
     ) -> None:
-        """Set up the discrete rod.
+        """Set up the discrete rod, by default on 8 elements of degree 6.
 
-        Parameters
-        ----------
-        scene
-            The rod.
-        discretization
-            Elements and degree, by default 8 elements of degree 6.
-        comm
-            Ranks that share the rod.
-        spectrum
-            Number of left-most eigenvalues that are recorded of each state (conservative scenes).
-        clock
-            Where times are noted.
-
-        Raises :class:`~rodfem.errors.InputError` for a discretisation that does not fit the scene.
+        ``spectrum`` is the number of left-most eigenvalues that are recorded of each state (conservative scenes);
+        ``clock`` notes times.  Raises :class:`~rodfem.errors.InputError` for a ``discretization`` that does not fit.
         """
         Plan(scene.span, spectrum=spectrum).check(scene, discretization or Discretization())
         if scene.conservative:
@@ -168,15 +149,7 @@ class Solver:
 
     @checked(load=number(1.0), guess=STATE)
     def equilibrium(self, load: float, guess: Point | SpecialPoint | PETSc.Vec | None = None) -> Point:
-        """Equilibrium at exactly ``load``.
-
-        Parameters
-        ----------
-        load
-            Value of the scene's load.
-        guess
-            A state nearby to start Newton's method from: on the same mesh, at another load perhaps.  Without one the
-            scene's own start is taken, as for the first state of a diagram.
+        """Equilibrium at exactly ``load``, from a ``guess`` on this mesh, at any load, or the scene's start.
 
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, or whose index the mesh cannot
         hold, :class:`~rodfem.errors.SceneError` where constraints of the scene follow from others or the stored energy
@@ -206,16 +179,8 @@ class Solver:
         """Decide the stability of an equilibrium on this mesh by a given method.
 
         Eigenvalues near zero are computed again on richer meshes; those that have another sign there are undecided.
-        What vanishes at a special point is zero there, and undecided, if that is given itself.
-
-        Parameters
-        ----------
-        point
-            The equilibrium.
-        method
-            ``auto``, or a name of ``rodfem.stability.METHODS``.
-        number
-            How many eigenvalues are computed.
+        What vanishes at a special point is zero there, and undecided, if that is given itself.  ``method`` is ``auto``,
+        or a name of ``rodfem.stability.METHODS``, ``number`` how many eigenvalues are computed.
 
         Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply and for more eigenvalues
         than the mesh has, and :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.

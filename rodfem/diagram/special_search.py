@@ -31,17 +31,13 @@ from rodfem.continuation.singular_points import (
 )
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
-DIP = 0.1
-"""Eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most."""
+DIP = 0.1  # eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most
 HALVINGS = 0, 6, 36
 """Bisections after which a mode that passes zero is among those nearest zero: none in most steps, many next to dozens
 of softer ones."""
-PATIENCE = 4
-"""Rows with an eigenvalue near zero after which it is taken to stay zero."""
-ASIDE = 0.02
-"""Distance of a regular state from a singular one at the end of a piece, over the piece."""
-SHORTER, PARTS = 2, 8
-"""How many times steps are made shorter about one place of a branch, and by what factor."""
+PATIENCE = 4  # rows with an eigenvalue near zero after which it is taken to stay zero
+ASIDE = 0.02  # distance of a regular state from a singular one at the end of a piece, over the piece
+SHORTER, PARTS = 2, 8  # how many times steps are made shorter about one place of a branch, and by what factor
 
 
 class Unresolved(Exception):

@@ -49,8 +49,7 @@ from rodfem.stability.nonsymmetric import (
 from rodfem.stability.spectrum import SHIFT
 from rodfem.tolerances import DRIFT, ROUND_OFF, round_off, unit
 
-LOADS = 101
-"""Number of loads at which a range is sampled."""
+LOADS = 101  # number of loads at which a range is sampled
 
 
 class Row(NamedTuple):

@@ -50,8 +50,7 @@ SEEN = 1e-3
 """Response of a mode to a functional, relative to the greatest one, below which the functional does not observe it."""
 DOUBLE = 1e-3
 """Eigenvalues nearer than this, relative, to a double one are that: round-off parts them by its square root."""
-FEWEST, MOST = 4, 8
-"""Modes of a state: those of negative eigenvalues are among them up to the latter."""
+FEWEST, MOST = 4, 8  # modes of a state: those of negative eigenvalues are among them up to the latter
 FLOOR = 5e-12
 """Least uncertainty of an eigenvalue by round-off, relative to the greatest one (rings of 32 elements: 2e-12)."""
 

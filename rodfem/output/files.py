@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     import h5py
     from petsc4py import PETSc
 
-NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")
-"""Numbers whose natural sizes stand in the file."""
+NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")  # numbers whose natural sizes stand in the file
 PARTS = ("assembly", "solve", "stability", "location", "error bars", "modes", "setup")
 """Parts of a run whose times stand in the file."""
 MEANING = {column.name: column.words for column in COLUMNS}

@@ -28,19 +28,14 @@ from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
 Floats = NDArray[np.float64]
-Surface = tuple[Floats, NDArray[np.int64]]
-"""Corners (n, 3), and the numbers (k, 3) of those of each triangle."""
+Surface = tuple[Floats, NDArray[np.int64]]  # corners (n, 3), and the numbers (k, 3) of those of each triangle
 
-FLATTEST = 7.0
-"""Greatest proportion of the sides of a rod's cross-section that is drawn."""
-SIDES = 24
-"""Corners of a round cross-section."""
+FLATTEST = 7.0  # greatest proportion of the sides of a rod's cross-section that is drawn
+SIDES = 24  # corners of a round cross-section
 COILS = {"coil": (6, 1.5, 11.0), "small coil": (4, 0.9, 7.0)}
 """Turns of a spring, their radius, and its length at rest, in radii of the rod."""
-POINT = 1e-9
-"""A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
-BLOCK, ARROW = 2.4, 13.0
-"""Half the size of a block, and the length of an arrow, in radii of the rod."""
+POINT = 1e-9  # a length, or a part of one, below this has no direction in a picture: also the floor of a divisor
+BLOCK, ARROW = 2.4, 13.0  # half the size of a block, and the length of an arrow, in radii of the rod
 
 
 # --- bodies

@@ -19,8 +19,7 @@ from rodfem.tolerances import SAME_SPECIAL
 
 COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
 """Kinds whose index before and after is that of the steps next to them."""
-COMPLETE = ("", "end of range", "closed loop", "not traced")
-"""Ends that need no mark."""
+COMPLETE = ("", "end of range", "closed loop", "not traced")  # ends that need no mark
 MEETS, SQUEEZED, BEGINS = "meets", "stretch reaches zero", "begins here: "
 """Beginning of an end on another branch, whose points say so; reason of an end at a load that is solved for; beginning
 of the note at the first row of a branch that was traced to both sides."""

@@ -34,14 +34,11 @@ MARKERS: dict[str, Mapping[str, Any]] = {
     UNEXPLAINED: {"marker": "^", **style.WARNING},
     SINGULAR: {"marker": "s", **style.WARNING},
 }
-ENDS = "ends: "
-"""Beginning of the words for the end of a branch before the range ends."""
+ENDS = "ends: "  # beginning of the words for the end of a branch before the range ends
 SHAPES, HUES = ("", "^", "<", "v", ">", "p", "h"), 7
 """Marks along the curves of branches, another one whenever the hues that differ at a glance are used up."""
-GAP = 11.0
-"""Pixels between an index and lines."""
-SEEN = 2e-4
-"""Distance from the chord above which a step is no straight line, in parts of the branch's range."""
+GAP = 11.0  # pixels between an index and lines
+SEEN = 2e-4  # distance from the chord above which a step is no straight line, in parts of the branch's range
 
 
 class Line(NamedTuple):

@@ -28,16 +28,14 @@ from rodfem.output.pieces import Interval, intervals_of
 from rodfem.output.style import HALO, PALETTE, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
 from rodfem.stability.soft_mode import STABLE
 
-Member = tuple[float, int, complex, str]
-"""Load, row, eigenvalue and motion of a point of a curve."""
+Member = tuple[float, int, complex, str]  # load, row, eigenvalue and motion of a point of a curve
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}
 """Places in the palette."""
 RANGES = ("#E9E4F3", "#FBE6D9", "#F3D3C6")
 """Shades of ranges of divergence, of flutter, and of both."""
-REAL = 1e-6
-"""An imaginary part smaller than this, relative to the root, is round-off."""
+REAL = 1e-6  # an imaginary part smaller than this, relative to the root, is round-off
 LEAST = 1e-3
 """Least frequency at the top of a picture; distance of eigenvalues that have met from their mean, relative to it."""
 SHARES = np.array([0.001, *np.linspace(0.125, 0.875, 7)]) ** 2

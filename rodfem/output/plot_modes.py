@@ -35,8 +35,7 @@ LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
 FRAMES, RISING = 60, 0.8
 """Pictures of an animation, and the share of its time in which a mode grows; in the rest it goes back, pale."""
-GROWTH = 1e-9
-"""Real part of the root of -mu, relative to it, above which a mode grows."""
+GROWTH = 1e-9  # real part of the root of -mu, relative to it, above which a mode grows
 
 
 def draw_modes(path: Path, branch: str, row: int, output: Path) -> Path:

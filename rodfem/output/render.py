@@ -43,13 +43,11 @@ SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 SHINE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
-TILT = np.radians(20.0)
-"""By which a picture is seen from above."""
+TILT = np.radians(20.0)  # by which a picture is seen from above
 NEAR, LEVEL = 0.9, 0.1
 """Cosines: from which on a direction is that of the nearest axis of space, or a load that of the motion; below which an
 axis of space is across."""
-UNSEEN = 1e-3
-"""Displacement, or distance of the ends, that a picture does not show, relative to the rod's size."""
+UNSEEN = 1e-3  # displacement, or distance of the ends, that a picture does not show, relative to the rod's size
 
 
 def draw_shape(

@@ -31,12 +31,10 @@ from rodfem.whole_files import with_added, write_whole
 
 Floats = NDArray[np.float64]
 
-POINTS = "points"
-"""Name of the arclengths of the profiles in the file."""
+POINTS = "points"  # name of the arclengths of the profiles in the file
 PROFILES = {"v": "strain", "k": "curvature", "n": "force", "m": "moment"}
 """Symbols of the profiles, components along the directors, and their names in the file."""
-DRIFT = "drift"
-"""Beginning of the names of scalars that are zero at every equilibrium."""
+DRIFT = "drift"  # beginning of the names of scalars that are zero at every equilibrium
 VECTORS = {
     "r": "centreline, components in space",
     "directors": "directors d1, d2, d3, components in space",

@@ -43,8 +43,7 @@ LINES: dict[str, dict[str, Any]] = {
     UNSTABLE: {"linestyle": (0, (1.0, 1.3)), "linewidth": 1.9},
 }
 """Lines of a diagram by stability, the most stable one first."""
-THIN: dict[str, Any] = {"linewidth": 0.9, "alpha": 0.75}
-"""Line of an image of a branch."""
+THIN: dict[str, Any] = {"linewidth": 0.9, "alpha": 0.75}  # line of an image of a branch
 WARNING: dict[str, Any] = {"ms": 9.0, "mec": LOAD, "mew": 1.8, "mfc": "#F0E442"}
 END: dict[str, Any] = {"marker": "X", "ms": 8.5, "mfc": "white", "mec": LOAD, "mew": 1.3}
 """Marks of what a diagram does not explain, and of an end before the range ends."""

@@ -21,10 +21,8 @@ from rodfem.output.words import is_sweep
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, on_kink
 from rodfem.tolerances import NEGLIGIBLE, SAME_SPECIAL
 
-MOST = 6
-"""Intervals of a branch that have a clause each, and branches that are named in one sentence."""
-DIGITS, FEW = 10, 6
-"""Significant digits of a load at most, and of one without an error bar."""
+MOST = 6  # intervals of a branch that have a clause each, and branches that are named in one sentence
+DIGITS, FEW = 10, 6  # significant digits of a load at most, and of one without an error bar
 EVENTS = {
     FOLD: "turns back in a fold",
     FLUTTER: "flutters: two frequencies coincide and become complex",

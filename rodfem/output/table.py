@@ -169,8 +169,7 @@ ENTRIES = dict(line.split(": ", 1) for line in GLOSSARY.split("\n## ", 1)[1].spl
 """Text of each entry by its names, which are between bars."""
 KNOWN = {"kind", *(name for key in ENTRIES for name in key.split(" | "))}
 ENTRIES |= {x.name: f"{x.words[:1].upper()}{x.words[1:]}." for x in (*COLUMNS, *SPECIAL) if x.name not in KNOWN}
-NAMES = {name: key for key in ENTRIES for name in key.split(" | ")}
-"""Entry of each name."""
+NAMES = {name: key for key in ENTRIES for name in key.split(" | ")}  # entry of each name
 
 
 def title(entry: str) -> str:

@@ -28,12 +28,10 @@ INDEX, COUNT = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
 READ = {"load": "error_estimate", "ordinate": "ordinate_error_estimate"}
 """Numbers of a row whose errors files have, and where special points have them."""
-FINEST, LARGEST = 9e-15, 1e12
-"""Least error, and greatest number, that are written without an exponent."""
+FINEST, LARGEST = 9e-15, 1e12  # least error, and greatest number, that are written without an exponent
 NO_ESTIMATE, GIVEN = " (no estimate)", " (given)"
 """Behind a number without an error bar, and behind a load that was asked for."""
-WHOLE = 1e-9
-"""Round-off of the logarithm of a power of ten."""
+WHOLE = 1e-9  # round-off of the logarithm of a power of ten
 
 
 # --- numbers

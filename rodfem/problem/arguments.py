@@ -25,12 +25,10 @@ from rodfem.expressions import Condition, Expr
 P = ParamSpec("P")
 T = TypeVar("T")
 Check = Callable[[str, Any], Any]
-ONE_THREAD = RLock()
-"""Held while a public function works: neither PETSc nor FFCx can be used by two threads."""
+ONE_THREAD = RLock()  # held while a public function works: neither PETSc nor FFCx can be used by two threads
 SHORT = Repr()
 SHORT.maxother = SHORT.maxstring = 60
-UNORDERED = str, bytes, Set, Mapping
-"""Kinds that can be iterated over and are no lists of numbers."""
+UNORDERED = str, bytes, Set, Mapping  # kinds that can be iterated over and are no lists of numbers
 
 
 def refused(name: str, value: Any, wanted: str) -> InputError:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
-"""Factors of the components that make the conjugate."""
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # factors of the components that make the conjugate
 
 
 def _euler_rodrigues() -> np.ndarray:

@@ -118,21 +118,11 @@ ALONG_THE_ROD = Role("ordinate along the rod", "of(x, c)", along=True)
 class Ordinate:
     """The number that a bifurcation diagram shows against the load: at a point, or an integral over the rod.
 
-    Parameters
-    ----------
-    name
-        The number in words.
-    s
-        Arclength at which it is taken; None: it is an integral over the rod.
-    of
-        With ``s``: ``of(r, q)`` of the centreline ``r`` (3,) and the unit quaternion ``q`` (4,) there, numpy arrays.
-        Without: the integrand ``of(x, c)``, a UFL expression of the state along the rod as in a scene's ``potential``
-        (see :mod:`rodfem.problem.ends`): its energy, ``lambda x, c: W(x.v, x.k, c)``, or its twist, ``x.k[2] / (2 *
-        pi)``.
-    label
-        The number in TeX, for the axis of a figure.
-    unit
-        Name of its unit ("m"), where it has one.
+    ``name`` says it in words, ``label`` in TeX, for the axis of a figure, and ``unit`` names its unit ("m").  At the
+    arclength ``s`` it is ``of(r, q)`` of the centreline ``r`` (3,) and the unit quaternion ``q`` (4,) there, numpy
+    arrays.  Without ``s`` it is the integral of ``of(x, c)``, a UFL expression of the state along the rod as in a
+    scene's ``potential`` (see :mod:`rodfem.problem.ends`): its energy, ``lambda x, c: W(x.v, x.k, c)``, or its twist,
+    ``x.k[2] / (2 * pi)``.
     """
 
     name: str

@@ -24,8 +24,7 @@ T = TypeVar("T")
 
 SUPPORTS, DISTRIBUTED, SECTION, FOUNDATION, TIES = "supports", "distributed", "section", "foundation", "constraints"
 """Groups below that of a branch or a state, and of the file."""
-HELD, AXIS, TURNS = "held", "axis", "free"
-"""Freedom of directors: held, rotating about one axis, rotating freely."""
+HELD, AXIS, TURNS = "held", "axis", "free"  # freedom of directors: held, rotating about one axis, rotating freely
 
 
 @dataclass(frozen=True)

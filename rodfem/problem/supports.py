@@ -32,8 +32,7 @@ from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPO
 
 Floats = NDArray[np.float64]
 Sample = dict[str, Any]
-CHANGING = ("frame", "force", "moment", "follower", "follower_moment")
-"""What changes with the state of a support."""
+CHANGING = ("frame", "force", "moment", "follower", "follower_moment")  # what changes with the state of a support
 FLAT = 1e-3
 """Curvature times the rod's length, or difference of two curvatures relative to them, that is taken for zero."""
 

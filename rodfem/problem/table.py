@@ -119,17 +119,10 @@ def tabulated(s: Any, values: Any, order: int = 1) -> Table:
         stiffness = rodfem.tabulated(s, EI)
         energy = lambda v, k, c: bending_and_twist(k, (stiffness(c.s), 1.0, 1.0))
 
-    Parameters
-    ----------
-    s
-        Arclengths (n,), increasing, from one end of the rod to the other.
-    values
-        A number for each, (n,), or a vector, (n, m): then the function returns a tuple.
-    order
-        1: linear in between; 3: a cubic spline with two continuous derivatives, whose first two pieces, and last two,
-        are one cubic each ("not a knot": de Boor, A Practical Guide to Splines, 1978, chapter IV).
-
-    Raises :class:`SceneError` for what is no such table.
+    Arclengths ``s`` (n,) increase from one end of the rod to the other; ``values`` are a number for each, (n,), or a
+    vector, (n, m): then the function returns a tuple.  ``order`` 1 is linear in between, 3 a cubic spline with two
+    continuous derivatives, whose first two pieces, and last two, are one cubic each ("not a knot": de Boor, A Practical
+    Guide to Splines, 1978, chapter IV).  Raises :class:`SceneError` for what is no such table.
     """
     if order not in (1, 3):
         raise SceneError(f"A table along the rod has the order {order!r}: choose 1 (linear) or 3 (a cubic spline).")
@@ -167,19 +160,11 @@ def path(t: Any, values: Any, smooth: bool = True) -> Table:
         place = rodfem.path(t, np.transpose(columns))
         ends = (clamped(), clamped(lambda c: place(c.t)))
 
-    Parameters
-    ----------
-    t
-        Values of the constant, (n,), increasing, over its whole range.
-    values
-        A number for each, (n,); a position or a force, (n, 3); or a rotation, (n, 4), a quaternion with the scalar
-        first.  Quaternions get the signs by which each is near the one before, are interpolated by their components,
-        and normalised then: give rows that are less than 120 degrees apart.
-    smooth
-        True: a cubic spline with two continuous derivatives.  False: linear in between; a branch has a point exactly at
-        each corner, and no step across one.
-
-    Raises :class:`SceneError` for what is no such table.
+    ``t`` (n,) increases over the whole range of the constant; ``values`` are a number for each, (n,), a position or a
+    force, (n, 3), or a rotation, (n, 4), a quaternion with the scalar first.  Quaternions get the signs by which each
+    is near the one before, are interpolated by their components, and normalised then: give rows that are less than 120
+    degrees apart.  It is a cubic spline with two continuous derivatives; unless ``smooth`` it is linear in between, and
+    a branch has a point exactly at each corner.  Raises :class:`SceneError` for what is no such table.
     """
     kind = Rotations if np.ndim(values) == 2 and np.shape(values)[1] == 4 else Table
     return kind("path of the load", t, values, smooth=smooth)

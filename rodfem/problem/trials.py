@@ -44,10 +44,8 @@ from rodfem.tolerances import NEGLIGIBLE
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-OF_PLACES = ("f(x, c)", "of(x, c)", "W(v, k, c)")
-"""Calls of functions of a place."""
-SAME = 1e-9
-"""Difference of two values of a function, over the larger one, below which they are equal."""
+OF_PLACES = ("f(x, c)", "of(x, c)", "W(v, k, c)")  # calls of functions of a place
+SAME = 1e-9  # difference of two values of a function, over the larger one, below which they are equal
 ASIDE = 1e-3
 """Displacement over length, strain or rotation out of the plane, to either side, at which energies are tried."""
 

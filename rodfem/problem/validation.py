@@ -21,17 +21,13 @@ if TYPE_CHECKING:
     from rodfem.problem.functions import Constants
     from rodfem.problem.scene import Scene
 
-LARGEST, TINIEST = 1e60, 1e-60
-"""Lengths, widths of ranges and stiffnesses whose powers are floats."""
+LARGEST, TINIEST = 1e60, 1e-60  # lengths, widths of ranges and stiffnesses whose powers are floats
 FLEXIBLE = "choose a kind of rod without the stiff strains"
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
-NEXT = 1e-6
-"""Least distance of two places, over the length: an element between them loses as many digits."""
-PLACES = 1001
-"""Arclengths at which a start is evaluated."""
-TURNED = 0.3
-"""Angle, in radian, between neighbours that may be a jump."""
+NEXT = 1e-6  # least distance of two places, over the length: an element between them loses as many digits
+PLACES = 1001  # arclengths at which a start is evaluated
+TURNED = 0.3  # angle, in radian, between neighbours that may be a jump
 
 
 def check_scene(scene: Scene) -> None:

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 
 UNLISTED = ("load", "negative", "zero", "mesh", "unstable", "negative_in_space", "drift", "error")
 """Columns that are no ordinates: the abscissa, counts, and residuals."""
-VANISHED = 1e-9
-"""Share of the greatest recorded eigenvalue up to which one may be one that vanishes."""
+VANISHED = 1e-9  # share of the greatest recorded eigenvalue up to which one may be one that vanishes
 DERIVED = {
     "end shortening": "end shortening: length − distance of the ends",
     "writhe": "writhe: Gauss integral of the centreline, to about 1e-4",

@@ -31,14 +31,11 @@ from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
 
 Floats = NDArray[np.float64]
 
-ZERO = 1e-7
-"""A force or moment below this, relative to the natural force or moment, is the error of Newton's method."""
+ZERO = 1e-7  # a force or moment below this, relative to the natural force or moment, is the error of Newton's method
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
-SMALL = 1e-3
-"""Share of the greatest eigenvalue below which differences of eigenvalues are relative to this share."""
-BUDGET = 50_000
-"""Stations of all states together above which each has fewer: about 6 MB of the page."""
+SMALL = 1e-3  # share of the greatest eigenvalue below which differences of eigenvalues are relative to this share
+BUDGET = 50_000  # stations of all states together above which each has fewer: about 6 MB of the page
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
