@@ -190,12 +190,16 @@ class AccuracyControl:
         self.accuracy = meshes.accuracy or np.inf
         self.checked: tuple[float, float, int] | None = None  # indicator and error of a point, and the points since
         self.place, self.error, self.tries = -np.inf, np.inf, 0
+        self.accepted: list[float] = []  # arclengths of the last two rows since then
         self.excused = -np.inf
 
     def row(self, point: Point, solver: BranchSolver) -> None:
         """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
-        if self.meshes.accuracy is None:
-            return
+        if self.meshes.accuracy is not None:
+            self._estimate(point, solver)
+            self.accepted = [*self.accepted[-1:], point.arclength]
+
+    def _estimate(self, point: Point, solver: BranchSolver) -> None:
         indicator = self.meshes.indicator(solver.mesh)(point.x).indicator
         if self.checked is not None and self.checked[2] < SELDOM and not self._at_bound(point):
             before, error, since = self.checked
@@ -261,10 +265,11 @@ class AccuracyControl:
         point, helps = trouble.point, True
         if abs(point.arclength - self.place) < NEAR:
             self.tries += 1
-            helps = not isfinite(trouble.error) or trouble.error < 0.5 * self.error
+            passed = any(self.place <= row < point.arclength for row in self.accepted)  # that place was resolved
+            helps = passed or not isfinite(trouble.error) or trouble.error < 0.5 * self.error
         else:
             self.tries = 0
-        self.place, self.error, self.checked = point.arclength, trouble.error, None
+        self.place, self.error, self.checked, self.accepted = point.arclength, trouble.error, None, []
         if helps and self.tries < TRIES and len(self.meshes.solvers) < MOST:
             return self.meshes.raised(trouble, self.tries)
         self.excused = point.arclength + NEAR

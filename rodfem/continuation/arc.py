@@ -219,12 +219,14 @@ class Chord(ABC):
 
     def solve(self, p: Node, q: Node, s: float) -> Node | None:
         """Node at a place between two others; None where there is no equilibrium near where it is expected."""
-        solver, (guess, slope) = self.solver, self.curve(p, q, s)
+        solver, (guess, slope), broken = self.solver, self.curve(p, q, s), self.solver.system.active_drifts
         try:
             x = corrected(solver, guess, self.row)
         except ConvergenceError:
             return None
         if solver.system.distance(x, guess) > STRAYED * min(s - p.s, q.s - s) + LEAST:
+            return None
+        if broken(x) > max(broken(p.kept.x), broken(q.kept.x)):  # it is on a branch of less symmetry
             return None
         slope.scale(1.0 / solver.system.norm(slope))
         try:

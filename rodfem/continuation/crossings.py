@@ -67,6 +67,7 @@ class Crossing:
     vectors: np.ndarray  # (k, m), of H
     before: int  # the index on either side
     after: int
+    rest: int  # the index at it, but for these
     piece: tuple[Node, Node]
     width: float  # distance of the first from the last of them
 
@@ -159,12 +160,13 @@ class Zeros:
 
 
 def _passed(a: Node, b: Node, groups: list[list[float]]) -> list[Crossing]:
-    """Crossings at the roots of the cubic, in ``groups``."""
-    out, after, h = list[Crossing](), a.index, b.s - a.s
-    for group in groups:
-        own, rates = _passing(a, b, group)
-        before, after = after, after - int(np.sign(rates).sum())
-        out.append(Crossing(a.s + float(np.mean(group)) * h, own, before, after, (a, b), (group[-1] - group[0]) * h))
+    """Crossings at the roots of the cubic, in ``groups``; the index on either side of each is that of the cubic."""
+    between = [a.far + negative(at(a, b, (p[-1] + q[0]) / 2)) for p, q in pairwise(groups)]
+    sides, out, h = pairwise([a.index, *between, a.far + negative(b.H)]), list[Crossing](), b.s - a.s
+    for group, (before, after) in zip(groups, sides, strict=False):
+        own, others, _ = _passing(a, b, group)
+        rest, s = a.far + int((others < 0).sum()), a.s + float(np.mean(group)) * h
+        out.append(Crossing(s, own, before, after, rest, (a, b), (group[-1] - group[0]) * h))
     return out
 
 
@@ -186,7 +188,7 @@ def _division(
 
 def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
     """Whether no other eigenvalue passes zero than those of a ``group``, which are fast enough to pass it once."""
-    own, rates = _passing(a, b, group)
+    own, _, rates = _passing(a, b, group)
     if abs(rates).min() <= SAFE * np.linalg.norm(own.T @ off @ own, 2):
         return False
     values, vectors = np.linalg.eigh([at(a, b, t) for t in PLACES])
@@ -195,12 +197,13 @@ def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
     return bool(((abs(values) <= doubt).sum(axis=1) <= allowed).all())
 
 
-def _passing(a: Node, b: Node, group: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Vectors (k, m) of the eigenvalues that pass zero in a ``group``, and their rates (m,) in t."""
-    t = float(np.mean(group))
+def _passing(a: Node, b: Node, group: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vectors (k, m) of the eigenvalues that pass zero in a ``group``, all others, and the rates (m,) of these in t."""
+    t, m = float(np.mean(group)), len(group)
     values, vectors = np.linalg.eigh(at(a, b, t))
-    own = vectors[:, np.argsort(abs(values))[: len(group)]]
-    return own, np.linalg.eigvalsh(own.T @ at(a, b, t, 1) @ own)
+    order = np.argsort(abs(values))
+    own = vectors[:, order[:m]]
+    return own, values[order[m:]], np.linalg.eigvalsh(own.T @ at(a, b, t, 1) @ own)
 
 
 def together(a: Node, b: Node, found: np.ndarray, tolerance: float) -> list[list[float]]:

@@ -87,8 +87,8 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     order = np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0))
     before, after, count = crossing.before, crossing.after, crossing.vectors.shape[1]
     near = [i for i in order[count:] if abs(values[i]) < 0.01 * piece.solver.inertia.scale]
-    modes, negative = _modes(piece, reduced, own[:, [*order[:count], *near]]), before - (count + before - after) // 2
-    return Candidate(x, slope, modes, count, before, after, negative, q.s - p.s, width=crossing.width)
+    modes = _modes(piece, reduced, own[:, [*order[:count], *near]])
+    return Candidate(x, slope, modes, count, before, after, crossing.rest, q.s - p.s, width=crossing.width)
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:

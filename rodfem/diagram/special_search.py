@@ -112,9 +112,7 @@ class SpecialSearch:
 
     def _regular(self, point: Point) -> bool:
         """Whether no more eigenvalues are zero than all along, to working accuracy."""
-        if point.zero <= min(p.zero for p in self._open):
-            return True
-        self._prepare(point)
+        self._prepare(self._open[0])
         return self._reduced(point).zero <= min(self._reduced(p).zero for p in self._open)
 
     def _shown(self, *, ended: bool = False) -> list[SpecialPoint]:

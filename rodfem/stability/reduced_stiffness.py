@@ -199,15 +199,23 @@ class Condensation:
         return far, _symmetric(-G), np.stack([w.array_r for w in modes], axis=1)
 
     def _rate(self, x: PETSc.Vec, tangent: PETSc.Vec, H: np.ndarray, W: np.ndarray) -> np.ndarray:
-        """``W^t S' W`` along a tangent by a difference from ``W^t S W = H``, with the phase conditions of ``x``."""
+        """``W^t S' W`` along a tangent by a difference from ``W^t S W = H``, with the phase conditions of ``x``.
+
+        A soft eigenvalue may change less than round-off of that: its difference is wider, and central.
+        """
         system, inertia = self.system, self.inertia
         system.set_phase(x)
-        ahead = x + tangent * AHEAD
+        behind, length = x, AHEAD
+        if abs(np.linalg.eigvalsh(H)).min() < SOFT * inertia.scale:
+            behind, length = x - tangent * DIFFERENCE, 2 * DIFFERENCE
+            inertia.moved(behind)
+            H = inertia.sum(W.T @ inertia.times(W))
+        ahead = behind + tangent * length
         inertia.moved(ahead)
-        out = (inertia.sum(W.T @ inertia.times(W)) - H) / AHEAD
+        out = (inertia.sum(W.T @ inertia.times(W)) - H) / length
         phase = system.phase
         if phase.rows:
-            rates = (system.at(ahead).generators - system.at(x).generators) / AHEAD
+            rates = (system.at(ahead).generators - system.at(behind).generators) / length
             for i, weights in phase.broken.items():
                 rate = system.generators.vector(weights @ rates).array_r
                 own = np.arange(*inertia.metric.getOwnershipRange()) == system.drifts[i]

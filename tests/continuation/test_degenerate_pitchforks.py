@@ -109,7 +109,6 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("scene", "load", "change"),
     [pytest.param(*x, marks=pytest.mark.alone, id=x[0].__name__) for x in CASES],

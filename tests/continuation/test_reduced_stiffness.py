@@ -112,6 +112,17 @@ def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
         assert len(misses) == (sign > 0)
 
 
+def test_an_eigenvalue_that_touches_zero_has_one_index() -> None:
+    """``(t - c)^2``, at which a state between may be, to round-off: none is negative on either side, nor at it."""
+    for c in np.linspace(0.2, 0.8, 61):
+
+        def node(a: Node | None, b: Node | None, s: float, c=c) -> Node:
+            return Node(s, np.array([[(s - c) ** 2]]), np.array([[2 * (s - c)]]), 0)
+
+        found = Zeros(node, 1e-12).between(node(None, None, 0.0), node(None, None, 1.0), np.zeros((1, 1)))
+        assert {index for x in found for index in (x.before, x.after, x.rest)} <= {0}
+
+
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize("other", [1.0, -0.1])
 def test_a_pair_that_the_cubic_does_not_have(known: bool, other: float) -> None:
