@@ -236,7 +236,7 @@ class Equations:
         v = strain(scene.free_strains, self.components(f.v, len(scene.free_strains)))
         k = wrap(curvature(f.q, f.q.dx(0)))
         r = self.fields.formulation.position(self, c, lambda field: field, None)
-        slope = {} if r is None else {"dr": wrap(r.dx(0))}
+        slope = {} if r is None else {"dr": wrap(r.dx(0)), "tangent": wrap(ufl.dot(rotation(f.q), v))}
         return place(f.q, rotation(f.q), c.s, r, v=v, k=k, length=scene.length, **slope)
 
     def site(self, part: Part, f: Any, variations: Any, along: Place) -> tuple[Site, Any]:

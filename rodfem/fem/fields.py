@@ -218,6 +218,11 @@ class Fields:
             for block in (b for b in self.blocks if b.continuous):
                 at_end = self.dofs[block.name][same_place(self.coordinates(block.degree), s, self.scene.length)]
                 found.append(at_end[:, np.broadcast_to(end.clamps(block, c), block.size)].ravel())
+        for block in (b for b in self.blocks if b.spare):
+            ends, x = self.all_vertices(), self.coordinates(block.degree)
+            a, b = ends[len(ends) // 2 - 1 :][:2]
+            middle = a + (b - a) * np.sort(compat.nodes(block.degree))[1]
+            found.append(self.dofs[block.name][same_place(x, middle, self.scene.length)].ravel())
         return np.unique(np.concatenate(found))
 
     def out_of_plane(self, normal: int | None) -> dict[str, np.ndarray]:
@@ -334,6 +339,11 @@ class Fields:
         """Arclengths of the nodes of a field of that degree in each local cell, (cells, degree + 1)."""
         a, b = self.vertices[:, :1], self.vertices[:, 1:]
         return a + (b - a) * compat.nodes(degree)
+
+    @property
+    def surfaces(self) -> list[str]:
+        """Names of the multipliers of surfaces."""
+        return [b.name for b in self.blocks if b.turning]
 
     def constraints(self) -> int:
         """Number of constraint equations: free multipliers, fields and scalars (drift scalars not counted)."""

@@ -14,6 +14,9 @@ With ``V`` the potential energy of rod and loads the support of an end does the 
 force ``dV/dr``, a moment ``dV/dtheta``.  Multipliers of hinges and guides act for the support, and are left out of
 ``V``.  These are rows of the discrete equations that are not solved, because the end is held: they are as accurate as
 those that are.  Loads at the end, springs there too, are part of ``V``.
+
+On a surface (:mod:`rodfem.problem.surface`) the residual has the multiplier of ``r' = R v`` for the force, to which
+that of the surface is added; what the surface does to an end of the rod is part of the reaction there.
 """
 
 from __future__ import annotations
@@ -137,11 +140,12 @@ class Resultants:
 
     def _table(self, x: PETSc.Vec) -> np.ndarray:
         """All fields at the nodes of the polynomials of each element from left to right, (elements, nodes, 4, 3)."""
-        values = self.shape.system.at(x).evaluate(self._evaluate)
-        whole = self.shape.from_left(values.reshape(len(values), -1, len(NAMES), 3))
-        for i, ends in enumerate(self.ends(x)):
+        values = self.shape.smooth(self.shape.system.at(x)).evaluate(self._evaluate)
+        whole = self.shape.from_left(values.reshape(len(values), len(self.nodes), -1, 3))
+        force, moment = self.ends(x)
+        for i, ends in enumerate((force + whole[:, [0, -1], 4:].sum(axis=2), moment)):
             whole[:, [0, -1], 2 + i] = np.where(np.isfinite(ends), ends, whole[:, [0, -1], 2 + i])
-        return whole
+        return whole[:, :, : len(NAMES)]
 
     def ends(self, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
         """Contact force and moment at both ends of each element by its residual, (elements, 2, 3); nan: not known.
@@ -149,7 +153,8 @@ class Resultants:
         Of a planar rod the components in the plane and about its normal are; without a centreline no force is.
         """
         system, pieces, order = self.shape.system, self._pieces, self.shape.order[[0, -1]]
-        fields, state, outwards = system.fields, system.at(x), np.array([-1.0, 1.0])[:, None]
+        fields, state = system.fields, self.shape.smooth(system.at(x))
+        outwards = np.array([-1.0, 1.0])[:, None]
         system.equations.take(state.line)
         local = state.local[pieces.dofs]
         residual = pieces.vectors(system.equations.residual, local, 1)[0]
@@ -178,8 +183,13 @@ class Resultants:
         force = ufl.as_vector(fields.formulation.contact_force(e))
         if "dr" in vars(along):
             force += ufl.diff(density, along.dr)
-        force, moment = ufl.dot(ufl.transpose(along.R), force), ufl.diff(density, along.k)
-        return [vector[i] for vector in (along.v, along.k, force, moment) for i in range(3)]
+        vectors, turned = [along.v, along.k, force, ufl.diff(density, along.k)], ufl.transpose(along.R)
+        if fields.surfaces:  # the part that no residual has
+            vectors.append(-ufl.diff(density, along.tangent))
+            vectors[2] += vectors[4]
+            vectors[4] = ufl.dot(turned, vectors[4])
+        vectors[2] = ufl.dot(turned, vectors[2])
+        return [vector[i] for vector in vectors for i in range(3)]
 
 
 class Reaction(NamedTuple):
@@ -203,7 +213,11 @@ def reactions(resultants: Resultants, x: PETSc.Vec) -> Reactions:
     s = np.array(scene.interval)
     ends = resultants.on_elements(x, s, np.array([[0, len(starts) - 1]]))
     contact = np.array([[-1.0], [1.0]]) * np.stack([ends.force_in_space, ends.moment_in_space])  # (2, side, 3)
+    surface = np.zeros((2, 3))
+    if resultants.shape.system.fields.surfaces:
+        surface = contact[0] - [[-1.0], [1.0]] * ends.in_space(resultants.ends(x)[0][[0, -1], [0, 1]])
     left, right = (_of_support(resultants, x, i, contact[:, i]) for i in range(2))
+    left, right = (r._replace(force=r.force + own) for r, own in zip((left, right), surface, strict=True))
     places = np.array(sorted({a.s for a in scene.attachments if scene.is_inside(a.s)}))
     after = np.searchsorted(starts, places - SAME_PLACE * scene.length)
     below, above = (resultants.on_elements(x, places, after[None] - back) for back in (1, 0))
@@ -224,7 +238,8 @@ def _of_support(resultants: Resultants, x: PETSc.Vec, side: int, contact: np.nda
     def summed(mine: Any) -> Any:
         return shape.gather(np.asarray(mine)[None]).sum(axis=0)
 
-    state, local, (force, moment) = system.at(x), system.at(x).local.copy(), contact.copy()
+    state, (force, moment) = shape.smooth(system.at(x)), contact.copy()
+    local = state.local.copy()
     for unknown, copies in zip(fields.unknown_scalars, fields.copies.T, strict=False):
         if unknown.group.name in {"m" + LETTERS[side], "f" + LETTERS[side]}:  # moments of a hinge, forces of a guide
             local[copies] = 0.0

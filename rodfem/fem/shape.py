@@ -112,10 +112,36 @@ class Shape:
         for block in f.blocks:
             values = state.local[self._natural[block.name]]
             out[block.name] = self.joined(values) if block.continuous else self.from_left(values)
+        smooth = self.smooth(state)
+        for name in f.surfaces:
+            mean = state.scalars.get(name.replace("u", "h"), 0.0) / system.scene.length
+            out[name.replace("u", "p")] = mean - self._slope(smooth.local[self._natural[name]])
         r, chord = f.formulation.nodal(self, state)
         out["r"] = r + f.formulation.offset(f, state, out["s"], chord)
         out["q"] = f.turning.quaternion(out[f.turning.name])
         return out | dict(zip(system.scalars, [*state.scalars.values(), *state.drifts.tolist()], strict=True))
+
+    def smooth(self, state: NodalValues) -> NodalValues:
+        """A state whose multipliers of surfaces are extrapolated to the ends of the rod.
+
+        There they have couples of the surface, over the weight of the node, or are unknown at a clamp.
+        """
+        f, local, k = self.system.fields, state.local.copy(), len(self.nodes) - 1
+        for name in f.surfaces:
+            for end, (side, own) in zip(self.system.scene.interval, ((0, slice(1, None)), (k, slice(k))), strict=True):
+                cell = np.flatnonzero(np.isclose(self.s[:, side], end))
+                rows = self._natural[name][cell, :, 0]
+                basis = np.linalg.solve(np.vander(self.nodes[own]).T, np.vander(self.nodes[[side]], k)[0])
+                local[rows[:, side]] = local[rows[:, own]] @ basis
+        return NodalValues(state.equations, local, state.line) if f.surfaces else state
+
+    def _slope(self, values: np.ndarray) -> np.ndarray:
+        """Derivative along the rod of nodal values (cells, nodes, 1) in natural order, (m, 1); a mean at vertices."""
+        k, powers = len(self.nodes) - 1, np.linalg.inv(np.vander(self.nodes, increasing=True))
+        slopes = np.vander(self.nodes, k, increasing=True) * np.arange(1, k + 1) @ powers[1:]
+        inside = self.from_left(np.einsum("pn,cni->cpi", slopes, values) / self.size[:, None, None])
+        inside[1:, 0] = inside[:-1, -1] = (inside[1:, 0] + inside[:-1, -1]) / 2
+        return unique(inside)
 
     def restore(self, sample: dict[str, Any]) -> PETSc.Vec:
         """State vector of a :meth:`sample`, taken with the same formulation but any number of elements and degree."""

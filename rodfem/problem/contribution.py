@@ -66,7 +66,10 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Block:
-    """One field; ``along`` says whether it is the multiplier of a constraint all along the rod."""
+    """One field; ``along`` says whether it is the multiplier of a constraint all along the rod.
+
+    That of a ``turning`` one is of rotations alone; if it is ``spare``, that of one node follows from the others.
+    """
 
     name: str
     size: int
@@ -74,6 +77,8 @@ class Block:
     continuous: bool
     multiplier: bool
     along: bool = False
+    turning: bool = False
+    spare: bool = False
 
 
 @dataclass(frozen=True)
@@ -276,5 +281,9 @@ def at(s: float, of: OfPlace) -> Constraint:
 
 
 def everywhere(of: OfPlace, *, strain: bool) -> Constraint:
-    """Constrain ``of(x, c) = 0`` all along the rod; ``strain`` says whether it is one of strains or of positions."""
+    """Constrain ``of(x, c) = 0`` all along the rod; ``strain`` says whether it is one of strains or of positions.
+
+    A function of ``x.r`` is a surface, which acts on the rod by ``-p1`` times its gradient, a force per length: states
+    have ``p1`` (:mod:`rodfem.problem.surface`).
+    """
     return Everywhere(of, nodal=not yes_or_no("strain", strain))

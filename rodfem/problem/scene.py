@@ -37,6 +37,7 @@ from rodfem.problem.functions import (
     role_field,
     watched,
 )
+from rodfem.problem.surface import acting
 from rodfem.problem.table import Table, tables_of
 from rodfem.problem.trials import check_function, symbols
 from rodfem.problem.units import Units, units_of
@@ -392,7 +393,7 @@ class Scene(Contribution, metaclass=Stated):
         out = [Part(self, 0, None), *(Part(end, i, self.interval[i]) for i, end in enumerate(self.sides))]
         out += [Part(x, i, x.s) for i, x in enumerate(self.attachments)]
         for i, x in enumerate(self.constraints):
-            out.append(Part(x, sum(y.letter == x.letter for y in self.constraints[:i]), x.s))
+            out.append(Part(acting(x, self), sum(y.letter == x.letter for y in self.constraints[:i]), x.s))
         return out
 
     @cached_property

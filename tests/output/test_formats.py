@@ -66,6 +66,13 @@ def guided() -> Scene:
     return replace(scenes()["euler"], ends=(spring, page()["guided"]), name="guided")
 
 
+def on_a_plane() -> Scene:
+    """On a plane across e2, along which both ends slide."""
+    kept, push = rodfem.everywhere(lambda x, c: x.r[1], strain=False), page()["push"]
+    ends = rodfem.sliding((0.0, None, 0.0)), rodfem.sliding((0.0, None, None), force=push)
+    return replace(scenes()["euler"], ends=ends, constraints=(kept,), name="plane")
+
+
 def loose() -> Scene:
     """Free to turn about its left end, but for a spring of stiffness 1e-10."""
     joint = replace(rodfem.pinned(), energy=lambda x, c: page()["loads"].rotational_spring(x.q, 1e-10))
@@ -86,6 +93,7 @@ RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "held": (held, MESH, Plan((0.0, 0.2), events=(FAR,), **QUICK)),
     "guided": (guided, MESH, Plan((0.0, 0.2), **QUICK)),
     "sprung": (sprung, MESH, Plan((0.0, 0.2), **QUICK)),
+    "plane": (on_a_plane, MESH, Plan((0.0, 0.2), **QUICK)),
     "loose": (loose, MESH, Plan((0.0, 0.2), **QUICK)),
 }
 

@@ -1,0 +1,98 @@
+"""Rods on a surface: the force of the surface, and that and the moment in the rod, against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+
+import rodfem
+from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped, everywhere, free, hinged, pinned, sliding
+from rodfem.forms.energy import bending_and_twist
+
+R, RADIUS, PRESSURE = 0.8, 0.01, 10.0
+LOW = (-RADIUS, 0.0, 0.0)
+
+
+def push(c: Any) -> tuple[float, float, Any]:
+    return (0.0, 0.0, -c.F)
+
+
+TUBE = Scene(
+    name="tube",
+    interval=(0.0, 1.0),
+    rod="unshearable and inextensible",
+    energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
+    parameters={"F": Parameter(0.0)},
+    load="F",
+    ends=(pinned(LOW), pinned((*LOW[:2], None), force=push)),
+    distributed=lambda c: (-PRESSURE, 0.0, 0.0),
+    constraints=(
+        everywhere(lambda x, c: (x.r[0] ** 2 + x.r[1] ** 2 - RADIUS**2) / (2 * RADIUS), strain=False),
+    ),
+    ordinate=Ordinate("y", s=0.5, of=lambda r, q: r[1]),
+    span=(0.0, 66.0),
+)  # fmt: skip
+AXIS = (1.0, 0.0, 0.0)
+ENDS = {
+    "sliding": (sliding((*LOW[:2], 0.0)), sliding((None, None, None), force=push)),
+    "free across": (sliding((None, 0.0, 0.0)), sliding((None, None, None), force=push)),
+    "clamped": (clamped(LOW), sliding((*LOW[:2], None), force=push)),
+    "pinned": TUBE.ends,
+    "hinged": (hinged(AXIS, LOW), hinged(AXIS, (*LOW[:2], None), force=push)),
+    "free": (clamped(LOW), free(force=push)),
+}
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_a_straight_rod_presses_by_its_weight(ends: str) -> None:
+    """On the lowest line, or the highest one, of a tube: whatever holds its ends no shear force is in it."""
+    tube, across = replace(TUBE, ends=ENDS[ends], span=(0.0, 1.0)), 1.0 if ends == "free across" else 0.0
+    moved = everywhere(lambda x, c: ((x.r[0] + across * RADIUS) ** 2 + x.r[1] ** 2 - RADIUS**2) / 0.02, strain=False)
+    diagram = rodfem.trace(replace(tube, constraints=(moved,)), Discretization("pointwise", 4, 3), Plan(depth=0))
+    point = diagram[0].points[0]
+    pressure = diagram.solvers[0].shape.sample(point.x)["p1"][:, 0]
+    assert np.allclose(abs(pressure), PRESSURE, rtol=1e-9)
+    assert abs(point.force_in_space[:, 0]).max() < 1e-9
+    assert not diagram.warnings
+
+
+def test_a_rod_pulled_over_a_sphere() -> None:
+    """It has the curvature of the sphere to its free end, where the sphere holds it by a couple ``B / R``.
+
+    That moves along the sphere with the end: it does the work of a force ``B / R^2`` against the pull.
+    """
+
+    def arc(s: Any) -> np.ndarray:
+        return np.stack([np.cos(s / R / 2), 0 * s, np.sin(s / R / 2), 0 * s], axis=1)
+
+    def height(x: Any, c: Any) -> Any:
+        return ufl.sqrt((x.r[0] - R) ** 2 + x.r[1] ** 2 + x.r[2] ** 2) - R
+
+    tangent = np.sin(1 / R), 0.0, np.cos(1 / R)
+    sphere = replace(
+        TUBE, start=arc, distributed=None, span=(2.0, 3.0),
+        ends=(clamped(), free(force=lambda c: tuple(c.F * t for t in tangent))),
+        constraints=(everywhere(height, strain=False),),
+    )  # fmt: skip
+    diagram = rodfem.trace(sphere, Discretization("pointwise", 4, 6), Plan(depth=0))
+    point = diagram[0].points[-1]
+    tension = 3.0 - 1 / R**2
+    assert np.allclose(diagram.solvers[0].shape.sample(point.x)["p1"], -tension / R, rtol=1e-6)
+    assert np.allclose(point.force, (0.0, 0.0, tension), atol=1e-7)
+    assert np.allclose(point.moment, (0.0, 1 / R, 0.0), atol=1e-7)
+    assert np.allclose(point.reactions.left.force, (0.0, 0.0, -tension), atol=1e-7)
+    assert np.allclose(point.reactions.right.force, -np.multiply(tangent, 1 / R**2), atol=1e-7)
+
+
+@pytest.mark.parametrize("ends", ("pinned", "hinged"))
+def test_a_rod_in_a_horizontal_tube(ends: str) -> None:
+    """Dawson & Paslay, J. Pet. Technol. 36 (1984) 1734-1738: (n pi)^2 + 1000 / (n pi)^2 is least for n = 2."""
+    tube = replace(TUBE, ends=ENDS[ends])
+    diagram = rodfem.trace(tube, Discretization("pointwise", 6, 6), Plan(depth=0))
+    (found,) = diagram.special("branch point")
+    assert found.point.load == pytest.approx(64.80871351494, abs=1e-9)
+    assert found.error_estimate < 1e-8
