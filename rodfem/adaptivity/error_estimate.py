@@ -24,7 +24,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -39,6 +40,7 @@ from rodfem.continuation.singular import SingularSystem, load_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.newton import correct
+from rodfem.fem.resultants import NAMES
 from rodfem.fem.shape import Shape, Transfer, halved, richer_system
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
@@ -61,6 +63,32 @@ def bound(value: complex, richer: complex, left: float, rho: float, about: float
     """
     change = abs(richer - value)
     return change + rho / (1 - rho) * max(change, about) + left
+
+
+def derived(
+    solvers: tuple[BranchSolver, BranchSolver], states: tuple[PETSc.Vec, PETSc.Vec, PETSc.Vec], rho: float
+) -> dict[str, np.ndarray]:
+    """Bounds of the errors of what follows from a state, by name: see :meth:`BranchSolver.derived`; collective.
+
+    ``states`` are that on the first mesh, on the richer one, and a change of this one that its location leaves open.  A
+    component of a vector may agree on two meshes by accident, and is bounded by the largest one.  The bar of a profile
+    is that of its largest error along the rod.
+    """
+    (coarse, richer), (x, again, open_to) = solvers, states
+    s, units = coarse.shape.sample(x)["s"], coarse.units
+    acting = np.array([[units.force], [units.moment]])
+    sizes: dict[str, Any] = {"reactions": acting, "r": units.length, "strain": 1.0, "curvature": 1 / units.length}
+    sizes |= {"force": units.force, "moment": units.moment, "spectrum": units.omega2}
+    before, out = coarse.derived(x, s, coarse.modes), dict[str, np.ndarray]()
+    after, last = (richer.derived(y, s, coarse.modes) for y in (again, again + open_to))
+    for name, value in after.items():
+        change, left = abs(value - before[name]), STEADY * abs(last[name] - value)
+        left = left + ROUND_OFF * np.maximum(abs(value), sizes.get(name, units.energy))
+        if name in ("r", *NAMES):
+            change, left = change.max(), left.max()
+        about = change.max(axis=-1, keepdims=True) if change.ndim > 1 else change
+        out[name] = change + rho / (1 - rho) * about + left
+    return out
 
 
 class OrdinateBound:
@@ -103,7 +131,8 @@ class Again:
     """A point computed again on a richer mesh, its load and ordinate uncertain by ``load_left`` and ``ordinate_left``.
 
     ``ordinate_error`` bounds the error of the first ordinate, ``rho`` is the part of the first errors that is left, and
-    ``changed`` the relative change of the strains of the state or of its null vector, the larger one.
+    ``changed`` the relative change of the strains of the state or of its null vector, the larger one.  ``last`` is a
+    change of ``x`` that its location leaves open.
     """
 
     x: PETSc.Vec
@@ -114,6 +143,7 @@ class Again:
     ordinate_error: float
     rho: float
     changed: float
+    last: PETSc.Vec
 
     @property
     def resolved(self) -> bool:
@@ -176,6 +206,7 @@ class Enriched:
         load_error, special.ordinate_error = again.errors(point)
         special.resolved = again.resolved
         special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
+        special.bounds = cache(partial(derived, (self.coarse, self.solver), (point.x, again.x, again.last), again.rho))
 
     def again(self, point: Point, *, fixed_load: bool) -> Again:
         """Solve for a point on the richer mesh, at its load, once, or across its tangent; or ConvergenceError."""
@@ -199,14 +230,14 @@ class Enriched:
             )
         units = system.scene.units
         load, ordinate = system.scalar(x), self.solver.shape.ordinate(x)
-        x = stepped(self.solver, x, row)
+        before, x = x, stepped(self.solver, x, row)
         last = system.scalar(x), self.solver.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
         changed = self.indicator.changed(first, x, state=True)
         rho = self.rho([point.x], [x])
         ordinate_error = self._ordinate(point.x, x, float(left[1]), rho)
-        return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed)
+        return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed, x - before)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
         """Set the uncertainty of a law of the first mesh: that of the rod's law, infinite without another."""
@@ -231,7 +262,7 @@ class Enriched:
         changed = self.indicator.changed(x, found, state=True)
         rho = max(self.rho([point.x], [found]), LEFT)
         ordinate_error = self._ordinate(point.x, found, left, rho)
-        return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed)
+        return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed, tangent * along)
 
     def _located(self, special: SpecialPoint) -> Again:
         """The fold or branch point on the richer mesh, and its ordinate: the same singular system."""
@@ -255,7 +286,7 @@ class Enriched:
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(modes[0], sharp, state=False))
         self.origins.append((special, Origin(found.x, found.load, ordinate, load_left, left), rho))
         ordinate_error = self._ordinate(point.x, found.x, left, rho)
-        return Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed)
+        return Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed, found.last)
 
 
 def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:

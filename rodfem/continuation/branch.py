@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -13,7 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.kinds import BRANCH_POINT, NUMBER, Kind
-from rodfem.errors import SMALLER_STEPS, InputError, many
+from rodfem.errors import SMALLER_STEPS, ConvergenceError, InputError, many
 from rodfem.libraries import optional
 from rodfem.problem.arguments import SHORT
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, SoftMode, index_range, is_stable, stability
@@ -161,7 +161,10 @@ class Point:
 
     @cached_property
     def reactions(self) -> Reactions:
-        """Forces and moments of the supports and of what is attached: ``point.reactions.left.force``; collective."""
+        """Forces and moments of the supports and of what is attached: ``point.reactions.left.force``; collective.
+
+        A special point has bounds of their errors: ``special.errors["reactions"]``.
+        """
         return self._solver.reactions(self.x)
 
     def backwards(self, total: float) -> Point:
@@ -250,6 +253,20 @@ class SpecialPoint:
     unfolding: float = float("nan")  #: size of the unfolding parameters: round-off, unless there is an imperfection
     cluster: Cluster | None = None  #: the eigenvalues that collide
     event: Event | Level | None = None  #: the event that happens here, of those that the plan asks for
+    bounds: Callable[[], dict[str, np.ndarray]] = dict  #: computes :attr:`errors`, once
+
+    @property
+    def errors(self) -> dict[str, np.ndarray]:
+        """Bounds of the errors of what follows from the state, by name; empty without one; collective.
+
+        ``energy``, ``potential``, ``conjugate``; ``reactions`` (k, 2, 3), force and moment of the left and the right
+        support and of attachments; ``spectrum`` (k,), where it was asked for; the largest one along the rod of ``r``,
+        ``strain``, ``curvature``, ``force`` and ``moment``.
+        """
+        try:
+            return self.bounds()
+        except ConvergenceError:
+            return {}
 
     def __repr__(self) -> str:
         """Kind, load and change of the index."""
@@ -432,6 +449,7 @@ def merge_doubles(branch: Branch) -> None:
         apart, ordinates = abs(p.point.load - q.point.load), abs(p.point.ordinate - q.point.ordinate)
         q.error_estimate = max(q.error_estimate, apart + p.error_estimate)
         q.ordinate_error = max(q.ordinate_error, ordinates + p.ordinate_error)
+        q.bounds = dict  # of one of them alone
         q.null_vectors = p.null_vectors + q.null_vectors
         q.negative_before = p.negative_before
         q.point.zero += p.multiplicity

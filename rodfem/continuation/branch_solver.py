@@ -30,7 +30,7 @@ from rodfem.continuation.natural_shape import natural_shape, sampled, uniform_tu
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.checks import Convexity
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
-from rodfem.fem.resultants import Reactions, Resultants, reactions
+from rodfem.fem.resultants import NAMES, Reactions, Resultants, reactions
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import LOAD, Energies, NodalValues
 from rodfem.fem.system import System
@@ -285,6 +285,19 @@ class BranchSolver:
     def reactions(self, x: PETSc.Vec) -> Reactions:
         """Reactions of supports and attachments at the equilibrium ``x``."""
         return reactions(self.resultants, x)
+
+    def derived(self, x: PETSc.Vec, s: np.ndarray, modes: int = 0) -> dict[str, np.ndarray]:
+        """Numbers that follow from an equilibrium, by name: energies, reactions, left-most eigenvalues and profiles.
+
+        ``reactions`` has force and moment, in space, of the left and right support and of attachments, (k, 2, 3).
+        Profiles (m, 3) are those at arclengths ``s``.
+        """
+        profile = self.resultants.profile(x, s)
+        out = {name: np.array(value) for name, value in self.energies(x)._asdict().items()}
+        out["reactions"] = self.reactions(x).all
+        if modes:
+            out["spectrum"] = np.array((self.spectrum or SymmetricSolver(self.inertia)).at(x).leftmost(modes).values)
+        return out | {name: getattr(profile, name) for name in ("r", *NAMES)}
 
     def energies(self, x: PETSc.Vec) -> Energies:
         """Stored and potential energy of the equilibrium ``x``, and what the load does work on."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint, Unexplained
@@ -136,6 +137,8 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[B
     point = points[entry["row"]]
     solver = solvers[point.mesh]
     special = SpecialPoint(KINDS[entry["kind"]], point, **special_values(entry))
+    bars = {name: np.array(bar, dtype=float) for name, bar in (entry.get("errors") or {}).items()}
+    special.bounds = lambda: bars
     if solver.conservative and special.kind.singular and entry["multiplicity"]:
         special.null_vectors = solver.inertia.modes_near_zero(point.x, entry["multiplicity"])
     return special

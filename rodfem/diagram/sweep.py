@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from math import ceil
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import OrdinateBound, bound
+from rodfem.adaptivity.error_estimate import OrdinateBound, bound, derived
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
@@ -357,6 +358,7 @@ class SweepErrors:
         x = at_load(self.richer, guess, point.load)
         left = round_off(point.ordinate, self.units.ordinate)
         of_ordinate = of_load = self.ordinate(point.x, x, left, rho)
+        moved = x
         if s.cluster is not None:
             measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._cluster(s.cluster)
             if s.kind == FLUTTER:
@@ -366,15 +368,16 @@ class SweepErrors:
                 load, left = zero_near(Mean(measured, cluster, zeros), point.load, self.units.load)
                 left = max(left, s.located_to)
             of_load = max(bound(point.load, load, left, rho), s.located_to)
-            of_ordinate += self._moved(x, point.load, of_load)
+            moved = self._moved(x, point.load, of_load)
+            of_ordinate += abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))
         s.error_estimate, s.ordinate_error = of_load, of_ordinate  # none of them where one is not estimated
+        s.bounds = cache(partial(derived, (self.solver, self.richer), (point.x, x, moved - x), rho))
 
-    def _moved(self, x: PETSc.Vec, load: float, bar: float) -> float:
-        """Change of the ordinate from ``x``, at a load, on over the ``bar`` of that, up to half of the range."""
+    def _moved(self, x: PETSc.Vec, load: float, bar: float) -> PETSc.Vec:
+        """State from ``x``, at a load, on over the ``bar`` of that, up to half of the range."""
         low, high = sorted(self.span)
         step = min(bar, (high - low) / 2) * (1.0 if load < (low + high) / 2 else -1.0)
-        moved = at_load(self.richer, x, load + step)
-        return abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))
+        return at_load(self.richer, x, load + step)
 
     def _cluster(self, cluster: Cluster) -> Cluster:
         """A cluster on the richer discretisation."""

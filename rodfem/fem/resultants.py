@@ -206,6 +206,11 @@ class Reactions(NamedTuple):
     right: Reaction
     attached: tuple[Reaction, ...]
 
+    @property
+    def all(self) -> np.ndarray:
+        """Force and moment of each, (k, 2, 3), in this order."""
+        return np.array([self.left, self.right, *self.attached])
+
 
 def reactions(resultants: Resultants, x: PETSc.Vec) -> Reactions:
     """All reactions at the equilibrium ``x``; collective."""
@@ -219,6 +224,8 @@ def reactions(resultants: Resultants, x: PETSc.Vec) -> Reactions:
     left, right = (_of_support(resultants, x, i, contact[:, i]) for i in range(2))
     left, right = (r._replace(force=r.force + own) for r, own in zip((left, right), surface, strict=True))
     places = np.array(sorted({a.s for a in scene.attachments if scene.is_inside(a.s)}))
+    if not len(places):
+        return Reactions(left, right, ())
     after = np.searchsorted(starts, places - SAME_PLACE * scene.length)
     below, above = (resultants.on_elements(x, places, after[None] - back) for back in (1, 0))
     jumps = (below.force_in_space - above.force_in_space, below.moment_in_space - above.moment_in_space)

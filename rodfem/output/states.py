@@ -23,6 +23,7 @@ from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.libraries import optional
 from rodfem.modes.modes import load_modes, rows_with_modes
+from rodfem.output.table import reactions_by_name
 from rodfem.output.words import row_of
 from rodfem.problem.quaternions import directors
 from rodfem.stability.soft_mode import is_stable, stability
@@ -235,7 +236,9 @@ def to_csv(folder: Path, target: Path) -> list[Path]:
     rows, special = list[dict[str, Any]](), list[dict[str, Any]]()
     for branch in data["branches"]:
         about = {"branch": branch["name"]}
-        rows += [about | {"row": row} | row_of(branch, row) for row in range(len(branch["columns"]["load"]))]
+        for row in range(len(branch["columns"]["load"])):
+            numbers = row_of(branch, row)
+            rows.append(about | {"row": row} | numbers | reactions_by_name(numbers.pop("reactions", ())))
         special += [about | one for one in branch["special"]]
     contents = {target / "rows.csv": _table(rows), target / "special.csv": _table(special)}
     write_whole(contents)

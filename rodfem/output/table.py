@@ -35,6 +35,8 @@ def plain(value: Any) -> Any:
     """What JSON can hold: numbers that are not finite become null."""
     if value is None or isinstance(value, (int, str, list, dict)):
         return value
+    if np.ndim(value):
+        return [plain(each) for each in value]
     return float(value) if np.isfinite(value) else None
 
 
@@ -53,11 +55,13 @@ OF_POINT: dict[str, Source] = {
     "soft": partial(_soft, "name"),
     "soft_value": partial(_soft, "value"),
     "soft_uncertainty": partial(_soft, "uncertainty"),
+    "reactions": lambda point: [] if point.solver is None else plain(point.reactions.all),
     "unstable": lambda point: point.negative if point.omega2 else None,
 }
 OF_SPECIAL: dict[str, Source] = {
     **{name: attrgetter(f"point.{name}") for name in ("load", "ordinate", "energy", "zero")},
     "kind": lambda special: str(special.kind),
+    "errors": lambda special: {name: plain(bar) for name, bar in special.errors.items()} or None,
     "meets": lambda special: list(special.connects_to) if special.connects_to else None,
     "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
 }
@@ -117,6 +121,17 @@ def branch_data(branch: Branch) -> dict[str, Any]:
         "singular_start": branch.singular_start,
         "image": branch.image,
         "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
+    }
+
+
+def reactions_by_name(values: Sequence[Any]) -> dict[str, Any]:
+    """Components of the ``reactions`` of a row, as the page and tables of other programs have them."""
+    places = ["left end", "right end", *(f"attachment {i}" for i in range(1, len(values) - 1))]
+    return {
+        f"reaction {what} e{axis}, {place}": component
+        for place, pair in zip(places, values, strict=False)
+        for what, vector in zip(("force", "moment"), pair, strict=True)
+        for axis, component in zip("₁₂₃", vector, strict=True)
     }
 
 

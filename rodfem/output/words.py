@@ -16,7 +16,7 @@ from rodfem.continuation.branch import ORDINATE, PITCHFORK, VERTICAL_BRANCH
 from rodfem.continuation.kinds import FLUTTER, KINDS
 from rodfem.errors import many
 from rodfem.output.pieces import is_solved
-from rodfem.output.table import soft_modes
+from rodfem.output.table import reactions_by_name, soft_modes
 from rodfem.stability import soft_mode
 from rodfem.stability.soft_mode import ONE_SIDE, index_range, on_kink, stability
 from rodfem.tolerances import NEGLIGIBLE, unit
@@ -178,8 +178,17 @@ def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, st
     for special in branch["special"]:
         here = {name: text for name in READ if (text := _read(special, name, None))}
         given = {name: text + GIVEN for name, text in _given(branch, special).items()}
-        found[special["row"]] = here | given
+        found[special["row"]] = _derived(special, branch) | here | given
     return found
+
+
+def _derived(special: Data, branch: Data) -> dict[str, str]:
+    """Energies and reactions of a special point with their bars."""
+    row, bars = row_of(branch, special["row"]), special.get("errors") or {}
+    pairs: dict[str, Any] = {name: (row.get(name), bars.get(name)) for name in ("energy", "potential", "conjugate")}
+    known, errors = (reactions_by_name(x.get("reactions") or ()) for x in (row, bars))
+    pairs |= {name: (known.get(name), bar) for name, bar in errors.items()}
+    return {n: number(x, bar, special.get("resolved")) for n, (x, bar) in pairs.items() if None not in (x, bar)}
 
 
 def _reading(row: Data, natural: Mapping[str, float]) -> dict[str, str]:

@@ -112,7 +112,7 @@ def payload_of(folder: Path) -> dict[str, Any]:
     unfit = f"The files in {folder} do not belong together ({{}}): run the scene again."
     with STATES.opened(folder / "states.h5", ("branches",), unfit) as file:
         about, rods = _about(data, folder), rods_of(data, Loaded(file["branches"]), folder)
-        names = [name for name in rods["branches"][0]["ordinates"] if name.startswith(("end force", "end moment"))]
+        names = [name for name in rods["branches"][0]["ordinates"] if name.startswith("reaction")]
         about["ordinates"] += [{"key": name, "name": name, "label": name} for name in names]
         return about | rods
 

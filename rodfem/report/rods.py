@@ -22,6 +22,7 @@ from rodfem.output.plot_modes import GROWTH, drawn_size
 from rodfem.output.render import axes_of, thickness
 from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
+from rodfem.output.table import reactions_by_name
 from rodfem.output.words import eigenvalue_in_words
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting
@@ -48,32 +49,25 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
         here, group = shapes[branch["name"]], groups[branch["name"]]
         shown = branch_data(branch, here, colour, data)
-        shown["ordinates"] |= end_forces(here, group) if group.get(SUPPORTS) else {}
+        shown["ordinates"] |= _reactions(branch["columns"].get("reactions") or [])
         shown |= _drawn(here, group, stage, shelf) | profiles_data(group, states)
         shown |= _moving(branch, here, group, folder / "modes.h5", stage)
         traced = is_traced(branch, data["branches"])
         branches.append(shown | {"image": "" if traced else branch.get("image", "")})
-    _clear_ends(branches, data["natural"])
+    _clear_reactions(branches, data["natural"])
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
 
 
-def end_forces(shapes: Shapes, group: Any) -> dict[str, list[float | None]]:
-    """Forces and moments on both ends of a rod in all rows, in space: of supports, with the loads that act there."""
-    found = [profiles_of(group, row) for row in range(len(group["load"]))]
-    turns = [directors(shapes.q[:, end]) for end in (0, -1)]
-    out: dict[str, list[float | None]] = {}
-    for symbol, words in (("n", "end force"), ("m", "end moment")):
-        for end, side, sign in ((0, "left", -1.0), (-1, "right", 1.0)):
-            at_end = np.array([one.fields[symbol].reshape(-1, 3)[end] for one in found])
-            in_space = sign * np.einsum("pij,pj->pi", turns[end], at_end)
-            out |= {f"{words} e{'₁₂₃'[i]}, {side} end": plain(in_space[:, i]) for i in range(3)}
-    return out
+def _reactions(column: Sequence[Any]) -> dict[str, list[float | None]]:
+    """Forces and moments of supports and attachments in all rows, by their names."""
+    rows = list(map(reactions_by_name, column))
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
-def _clear_ends(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
-    """Leave out forces and moments on ends that vanish in all rows, to round-off."""
-    for name in [name for name in branches[0]["ordinates"] if name.startswith(("end force", "end moment"))]:
-        size = natural.get("force" if name.startswith("end force") else "moment", 1.0)
+def _clear_reactions(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
+    """Leave out those that vanish in all rows, to round-off."""
+    for name in [name for name in branches[0]["ordinates"] if name.startswith("reaction")]:
+        size = natural.get("force" if name.startswith("reaction force") else "moment", 1.0)
         if all(abs(x or 0.0) < ZERO * size for branch in branches for x in branch["ordinates"][name]):
             for branch in branches:
                 del branch["ordinates"][name]

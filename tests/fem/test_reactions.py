@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from math import pi
+import csv
+import json
+from math import cos, pi, sin
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import ufl
+from scipy.special import ellipe, ellipk
 
 import rodfem
 from rodfem import Attachment, Discretization, Ordinate, Parameter, Plan, Scene, clamped, elastic, free, hinged, pinned
 from rodfem.forms.energy import bending_and_twist, hemitropic
+from rodfem.output.states import to_csv
 
 pytestmark = pytest.mark.alone
 TIP = (0.15, 0.1, 0.9)
@@ -169,6 +174,53 @@ def test_the_moment_at_a_clamp_of_a_boundary_layer() -> None:
         assert point.moment[0, 1] == pytest.approx(-point.reactions.left.moment[1], rel=1e-12)
         errors.append(abs(point.moment[0, 1] / right - 1))
     assert errors[0] < 0.035 and errors[1] < 0.002  # 0.19 and 0.023 by the curvature there
+
+
+def test_the_moment_at_a_clamp_is_within_its_bar_in_memory_and_in_files(tmp_path: Path) -> None:
+    """The mesh that resolves the ordinate of the cable bounds the error of the moment, too; right as above."""
+    plan = Plan(at=(170.0,), span=(170.0, 170.0 + 1e-3), depth=0)
+    diagram = rodfem.trace(cable(), Discretization(elements=96), plan)
+    (special,) = [s for s in diagram[0].special if s.kind == "user"]
+    moment, bar = -special.point.reactions.left.moment[1], special.errors["reactions"][0, 1, 1]
+    assert special.resolved and abs(moment + 18267.15072958902) < bar < 1e-5 * abs(moment)
+    diagram.save(tmp_path)
+    entry = json.loads((tmp_path / "diagram.json").read_text())["branches"][0]
+    row = entry["special"][0]["row"]
+    assert entry["special"][0]["errors"]["reactions"][0][1][1] == bar
+    assert entry["columns"]["reactions"][row][0][1][1] == -moment
+    again = rodfem.load(tmp_path, cable())[0].special[0]
+    assert again.errors["reactions"][0, 1, 1] == bar
+    assert -again.point.reactions.left.moment[1] == pytest.approx(moment, rel=1e-9)
+    to_csv(tmp_path, tmp_path)
+    lines = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
+    assert float(lines[row]["reaction moment e₂, left end"]) == -moment
+
+
+@pytest.mark.parametrize("elements", [2, 4])
+def test_what_follows_from_a_state_is_within_its_bar(elements: int) -> None:
+    """The elastica of 20 degrees at its tip, by elliptic integrals: energy, and the moment at the clamp."""
+    modulus = sin(pi / 18)  # of half the angle of the tip
+    load = float(ellipk(modulus**2)) ** 2
+    scene = Scene(
+        "elastica",
+        (0.0, 1.0),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 0.8)),
+        {"P": Parameter(load)},
+        "P",
+        (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        (load, load + 0.1),
+        planar="e2",
+        start=lambda s: np.stack([np.cos(0.17 * np.sin(s)), 0 * s, np.sin(0.17 * np.sin(s)), 0 * s], axis=1),
+    )
+    diagram = rodfem.trace(scene, Discretization(elements=elements, degree=3), Plan(at=(load,), depth=0))
+    special = next(s for s in diagram[0].special if s.kind == "user")
+    moment = 2 * modulus * load**0.5
+    energy = load * (2 * float(ellipe(modulus**2)) / load**0.5 - 1 - cos(pi / 9))
+    found, bars = special.point, special.errors
+    assert abs(abs(found.reactions.left.moment[1]) - moment) < bars["reactions"][0, 1, 1] < 1e-2
+    assert abs(found.energy - energy) < bars["energy"] < 1e-2
 
 
 def test_profiles_of_a_helix() -> None:

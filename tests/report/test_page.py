@@ -84,13 +84,16 @@ def test_every_kind_of_run_has_a_page(results: Path, name: str) -> None:
     assert dict(data["origin"])["command"] and "dolfinx" in dict(data["origin"])["versions"]
 
 
-def test_forces_on_ends_are_ordinates(results: Path) -> None:
-    """A column under the thrust P: its foot, and the load at its head, push with P along the axis."""
+def test_reactions_are_ordinates_with_bars(results: Path) -> None:
+    """A column under the thrust P: its foot pushes with P along the axis, the load at its head is no support's."""
     branches = payload_of(results / "pinned")["branches"]
     for branch in branches:
-        for side, sign in (("left", 1.0), ("right", -1.0)):
-            found = branch["ordinates"][f"end force e₃, {side} end"]
-            assert found == pytest.approx([sign * load for load in branch["load"]], rel=1e-6, abs=1e-9)
+        found = branch["ordinates"]["reaction force e₃, left end"]
+        assert found == pytest.approx(branch["load"], rel=1e-6, abs=1e-9)
+        assert "reaction force e₃, right end" not in branch["ordinates"]
+        for special in branch["special"]:
+            bar = branch["readings"][special["row"]]["reaction force e₃, left end"]
+            assert re.fullmatch(r"[\d.]+ \(\de-\d+\)", bar)
 
 
 def test_the_page_needs_no_network_and_runs_no_text(results: Path) -> None:
