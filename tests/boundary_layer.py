@@ -7,9 +7,8 @@ of a pendulum), and shortens the rod by ``2 (1 - cos(ANGLE/2)) / sqrt(T)``; the 
 
 from math import cos, pi, sin
 
+from rodfem import Ordinate, Parameter, Scene, clamped, sliding
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.ends import clamped, sliding
-from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 ANGLE = pi / 3
 

@@ -4,8 +4,6 @@ Lengths, bending stiffness and mass per length are one unless a scene says other
 parameters, so that scenes that differ in numbers only share their compiled forms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, hypot, pi, sin
 from typing import Any

@@ -8,8 +8,6 @@ rotation theta = theta_1 + i theta_2 of its cross-sections across the axis, its 
 for all theta that vanish at the clamps and have int theta ds = 0, so that the ends stay opposite each other.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import eigh, null_space

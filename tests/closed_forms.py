@@ -1,7 +1,5 @@
 """Closed forms for the cord and for the rod under a follower load."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fixtures; every test is collective: all ranks run all tests in the same order."""
 
-from __future__ import annotations
-
 import gc
 from collections import Counter
 from collections.abc import Iterator
@@ -17,9 +15,11 @@ gc.disable()  # destroying PETSc objects is collective: it must not happen on on
 
 @pytest.hookimpl(tryfirst=True)  # before pytest selects by marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test marked ``few(number)`` the values beyond so many that are not ``long`` are ``long``, too."""
+    """Mark values beyond ``few(number)``, none of them ``long``, as such, and as ``alone`` all without ``ranks``."""
     met: Counter[tuple[Path, str]] = Counter()
     for item in items:
+        if not item.get_closest_marker("ranks"):
+            item.add_marker(pytest.mark.alone)
         few, name = item.get_closest_marker("few"), getattr(item, "originalname", item.name)
         if few and not item.get_closest_marker("long"):
             met[item.path, name] += 1

@@ -1,7 +1,5 @@
 """The other demos' scenes with any constants, explored once for each discretisation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
@@ -12,11 +10,7 @@ from typing import Any
 import numpy as np
 from rows import verify
 
-from rodfem.continuation.branch import Branch, Point
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
-from rodfem.problem.scene import Scene
+from rodfem import Branch, Discretization, Plan, Point, Scene, trace
 
 FUNCTIONS = {"cord": "cord", "ruler": "ruler", "ring": "ring", "follower": "pushed_rod"}
 """Functions that state the demos' scenes."""

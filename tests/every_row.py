@@ -5,8 +5,6 @@ same factors, the spectrum by SLEPc, and the paper's reduction to the null space
 takes some minutes, and prints a line a scene.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every demo, classical problem and scene of the documentation, as they are recorded in ``tests/golden``."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import cache
@@ -17,11 +15,8 @@ from literature import test_classics
 from problem import test_docs
 
 import rodfem
-from rodfem.continuation.branch import SpecialPoint
+from rodfem import Discretization, Plan, Scene, SpecialPoint
 from rodfem.continuation.kinds import FLUTTER
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
-from rodfem.problem.scene import Scene
 
 DEMOS: dict[str, Callable[[], Scene]] = {
     "hemitropic": hemitropic_cases.scene,

@@ -1,7 +1,5 @@
 """Rods that several tests share: the hemitropic demo with any constants, each discretisation of it set up once."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 from dataclasses import replace
@@ -12,15 +10,9 @@ from types import ModuleType
 
 from rows import verify
 
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem import Branch, Discretization, Observer, Plan, Point, Scene, Solver, SpecialPoint, StepControl
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.follow import StepControl
-from rodfem.continuation.observer import Observer
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
-from rodfem.fem.fields import Discretization
-from rodfem.problem.scene import Scene
 
 DEMO = Path(__file__).parents[1] / "demos" / "hemitropic.py"
 SPAN = (0.0, 0.95)

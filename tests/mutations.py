@@ -5,8 +5,6 @@ those of ``make test``, or, where they pass, those marked ``long``, which is sai
 ``tests/house/test_mutations.py`` checks that every fault still has its place in the code.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

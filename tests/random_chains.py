@@ -1,7 +1,5 @@
 """Random matrices whose graph is a chain of cells with a border, dense."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc

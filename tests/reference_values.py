@@ -4,8 +4,6 @@ Residuals are below 1e-12; no finite element code had a part in it.  Loads of fo
 end where the stretch vanishes solve the boundary value problem together with the condition that defines them.
 """
 
-from __future__ import annotations
-
 FIRST = {  # load: (ordinate, energy), the branch from the first buckling load; constants (-3, 1, 1, 3)
     0.2: (0.980883718529, 0.974313936697),
     0.5: (1.729034550256, 2.922530402606),

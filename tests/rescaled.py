@@ -3,8 +3,6 @@
 Parameters keep their values: what they stand for is converted where a scene uses it.  The load has a unit of its own.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Every row of a diagram against counts at its own state, and the chain of indices along every branch."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from rodfem.continuation.branch import Branch

@@ -3,8 +3,6 @@
 Derivatives with respect to what is shot for are exact, by complex steps. No finite element has a part in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf

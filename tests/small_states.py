@@ -1,7 +1,5 @@
 """Equilibria on small discretisations, each computed once: on the first branch, and buckled along its lowest mode."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -10,13 +8,11 @@ import hemitropic_cases
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem import Discretization, Scene, Solver
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.diagram.solver import Solver
-from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import ReducedPencil
-from rodfem.problem.scene import Scene
 
 
 def scene(name: str) -> Scene:

@@ -5,8 +5,6 @@ and counted states are those of Python's classes.  Rows and special points are r
 number of rows is what one of them costs.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """An accuracy asked for: true errors stay below it at every row and special point, at less cost than uniform meshes."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path
@@ -21,18 +19,11 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from rodfem.app.run import run
-from rodfem.continuation.branch import Branch
+from rodfem import Branch, Diagram, InputError, Plan, Scene, Solver, clamped, free, run, trace
 from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
-from rodfem.diagram.diagram import Diagram, trace
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
-from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.files import load_state
-from rodfem.problem.ends import clamped, free
-from rodfem.problem.scene import Scene
 
 ACCURACIES = pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-10])
 CORD = {"fold": 7.8065554232, "shortening": 0.5793314271, "points": (49.34802200544679, 8.063525384097708)}
@@ -56,7 +47,6 @@ def claimed(branches: list[Branch]) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @ACCURACIES
 def test_cord(accuracy: float) -> None:
     found = explored(demo_cases.scene("cord"), accuracy, at=(40.0,))
@@ -67,7 +57,6 @@ def test_cord(accuracy: float) -> None:
     assert claimed(found.branches) <= accuracy
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [1e-8, *(pytest.param(a, marks=pytest.mark.long) for a in (1e-4, 1e-6, 1e-10))])
 def test_hemitropic(accuracy: float) -> None:
     found = explored(hemitropic_cases.scene(), accuracy, at=(0.5,))
@@ -82,7 +71,6 @@ def test_hemitropic(accuracy: float) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-9])
 def test_every_row_of_an_elastica(accuracy: float) -> None:
     """Deflection of the tip of a column: ``2 k / sqrt(P)`` with ``K(k) = sqrt(P)``, all along the buckled branch."""
@@ -108,7 +96,6 @@ def pulled(accuracy: float) -> Diagram:
 
 @pytest.mark.long
 @ACCURACIES
-@pytest.mark.alone
 def test_every_row_of_a_taut_rod(accuracy: float) -> None:
     """Boundary layers that become thirty times thinner on the way, down to a thousandth of the rod."""
     found = pulled(accuracy)
@@ -119,7 +106,6 @@ def test_every_row_of_a_taut_rod(accuracy: float) -> None:
     assert len({p.mesh for p in branch.points}) > 2
 
 
-@pytest.mark.alone
 def test_a_graded_mesh_beats_uniform_ones() -> None:
     """Equal elements with eight times the unknowns err more at the end of the branch of the taut rod."""
     found = pulled(1e-6)
@@ -134,6 +120,7 @@ def test_a_graded_mesh_beats_uniform_ones() -> None:
     assert 1000 * errors[0] < errors[1]
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_what_was_used_where(folder: Path) -> None:
     """Files name the mesh of each row; rows of all meshes are read back, on another mesh too."""
@@ -158,7 +145,6 @@ def test_what_was_used_where(folder: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_elements_beside_an_accuracy() -> None:
     """They are not used; of a mesh that was had before nothing is, and vertices are the first."""
     scene = classics.column("euler", classics.SUPPORTS["clamped-free"], (0.0, 1.0))
@@ -174,7 +160,6 @@ def test_elements_beside_an_accuracy() -> None:
     assert kept.solvers[0].system.fields.discretization == graded and not kept.notes
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [0.0, -1e-6, 1e-20, 1.0, float("nan"), float("inf")])
 def test_bad_accuracy(accuracy: float) -> None:
     scene = hemitropic_cases.scene()
@@ -183,7 +168,6 @@ def test_bad_accuracy(accuracy: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_accuracy_of_a_sweep_of_a_soft_notch() -> None:
     """Coarse meshes do not see it: the first refinement changes less than the second.  By 200 Hermite elements."""
     softness = lambda s: 0.9 * ufl.exp(-(((s - 0.31) / 0.03) ** 2))  # noqa: E731
@@ -199,7 +183,6 @@ def test_accuracy_of_a_sweep_of_a_soft_notch() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize(("accuracy", "number"), [(1e-3, 6), (1e-6, 12)])
 def test_accuracy_of_a_sweep(accuracy: float, number: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """All frequencies, and the flutter load, against the frequency equation of Beck's column (good to 1e-7)."""
@@ -218,7 +201,6 @@ def test_accuracy_of_a_sweep(accuracy: float, number: int, tmp_path: Path, capfd
             assert np.nanmin(np.abs(np.array(planes) - mu)) < accuracy * abs(mu)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("words", [("--elements", "8"), ("--degree=6",), ("--elem", "8")])
 def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:
@@ -229,7 +211,6 @@ def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixtur
 
 
 @pytest.mark.few(2)
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("vertices", "words"),
     [((0.0, 0.5), "2 vertices"), ((0.0, 0.7, 0.5, 1.0), "ascend"), ((0.0, 0.2, 0.5, 0.9), "begin and end at 0 and 1")],

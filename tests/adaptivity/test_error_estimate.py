@@ -1,7 +1,5 @@
 """Error bars are bounds: of special points, of local laws, of what is printed; against closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from io import StringIO
@@ -20,14 +18,12 @@ from scipy.integrate import OdeSolution, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, Solver, clamped, free, trace
+from rodfem import Branch, Diagram, Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, free, trace
 from rodfem.adaptivity import error_estimate
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
-from rodfem.errors import InputError
 from rodfem.fem.newton import correct
 from rodfem.output.words import number
 
@@ -64,6 +60,7 @@ def tip(P: float) -> float:
     return float(2 * sqrt(brentq(lambda m: ellipk(m) - sqrt(P), 0.0, 1 - 1e-12, xtol=1e-16) / P))
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize(
     "mesh",
@@ -93,7 +90,6 @@ def bent(P: float) -> OdeSolution:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("mesh", "place"), [pytest.param((1, 4), 0.102, marks=pytest.mark.alone), ((2, 3), 0.078), ((2, 5), 0.622)]
 )
@@ -108,7 +104,6 @@ def test_deflection_inside_of_an_element(mesh: tuple[int, int], place: float) ->
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])
 def test_deep_arch_to_an_accuracy(accuracy: float) -> None:
     (branch,) = explored(classics.deep_arch(), accuracy)
@@ -125,6 +120,7 @@ def coarse(accuracy: float | None) -> Diagram:
     return trace(hemitropic_cases.scene(), mesh, Plan((0.0, 0.55), (0.5,), 1, accuracy=accuracy))
 
 
+@pytest.mark.ranks
 def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
     """At 0.5 two meshes agree by accident in the ordinate, not in the strains: its bar is a tenth of its error."""
     diagram = coarse(None)
@@ -141,7 +137,6 @@ def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_an_accuracy_is_not_reached_by_accident() -> None:
     """Points that agree on two meshes to the accuracy asked for, and are not resolved, are computed on a finer one."""
     (s,) = coarse(1e-2).special("user", "branch 1")
@@ -149,7 +144,6 @@ def test_an_accuracy_is_not_reached_by_accident() -> None:
     assert abs(s.point.ordinate - reference_values.FIRST[0.5][0]) <= s.ordinate_error <= 1e-2 * s.point.ordinate
 
 
-@pytest.mark.alone
 def test_straight_rod_is_resolved_by_any_mesh() -> None:
     """It has no strains but constant ones; its null vector, a quarter of a cosine, has."""
     for mesh, buckling in (((1, 1), False), ((4, 1), True)):
@@ -182,7 +176,6 @@ LAWS = {
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("mesh", [(4, 3), (4, 5), (8, 6)])
 @pytest.mark.parametrize("name", LAWS)
 def test_coefficient_of_a_pitchfork(name: str, mesh: tuple[int, int]) -> None:
@@ -201,7 +194,6 @@ def test_coefficient_of_a_pitchfork(name: str, mesh: tuple[int, int]) -> None:
 # --- what is printed ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.alone
 def test_printed_bars_hold() -> None:
     """Digits that are left out count: the bar printed is one of the number printed."""
     rng = np.random.default_rng(5)
@@ -210,6 +202,7 @@ def test_printed_bars_hold() -> None:
         assert abs(float(shown) - value) + error <= float(bar[:-1]) * (1 + 1e-9) <= 3 * error
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is stopped a thousandth of the way to the state at another load: one more step takes that back."""
@@ -232,7 +225,6 @@ def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_ordinate_of_a_branch_point_beside_a_soft_mode() -> None:
     """A nearly round column (1e-8) buckles; where it is straight its mode may turn by 1e-9, and 3e-10 are measured."""
     scene = wider.scene(14, 454)[0]
@@ -244,7 +236,6 @@ def test_ordinate_of_a_branch_point_beside_a_soft_mode() -> None:
     assert max(bars) < 1e-8
 
 
-@pytest.mark.alone
 def test_round_off_that_two_meshes_have_alike_has_no_bar() -> None:
     """Haringx' column with stretch 2e13 times as stiff as bending: its load is right to 2e-10, which no bar told."""
     scene = classics.shearable("flexible", 1e13, 2e13)
@@ -257,6 +248,7 @@ def test_round_off_that_two_meshes_have_alike_has_no_bar() -> None:
         trace(scene, plan=Plan(depth=0, accuracy=1e-6))
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_a_bar_is_no_less_than_the_location_and_a_law_of_another_kind_has_none() -> None:
     """Of Euler's column, whose mesh leaves no error, with a location that is said to be poor."""

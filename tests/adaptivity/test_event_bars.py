@@ -1,7 +1,5 @@
 """Error bars of events that are sums over nodes hold, against shooting."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -14,6 +12,8 @@ from scipy.optimize import brentq, root
 import rodfem
 from rodfem import Diagram, Discretization, Event, Ordinate, Plan, Scene, clamped, pinned
 from rodfem.forms.energy import bending_and_twist
+
+pytestmark = pytest.mark.ranks
 
 Curve = Callable[[float], np.ndarray]
 MESHES = [(5, 3), *(pytest.param(mesh, marks=pytest.mark.alone) for mesh in [(8, 6), (3, 4), (7, 2)])]

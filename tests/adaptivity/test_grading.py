@@ -1,7 +1,5 @@
 """Decay of Legendre coefficients, from which meshes are chosen, for a function whose best approximation is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.polynomial import legendre
@@ -21,7 +19,6 @@ def coefficients(phase: float, number: int) -> np.ndarray:
     return np.cos(WAVES * s + phase) * WEIGHTS @ polynomials
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("phase", [0.0, 0.3, np.pi / 2 - 1e-5, np.pi / 2 - 1e-8, np.pi / 2])
 def test_the_indicator_is_that_of_the_part_that_is_missed(phase: float) -> None:
     """Of a wave that is even or odd about the middle of an element, exactly or but for round-off, too."""

@@ -1,7 +1,5 @@
 """The end at which a rod is pressed to no length: its load in closed form, and each state that leads there once."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 
@@ -13,8 +11,6 @@ from rodfem import Discretization, Plan, StepControl, elastic, pinned, trace
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 
 def stretched(v: Any, k: Any, c: Any) -> Any:

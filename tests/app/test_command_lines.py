@@ -1,7 +1,5 @@
 """Command lines with mistakes: status 2 and one sentence, before a folder is made or anything is computed."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shlex
@@ -63,6 +61,7 @@ ON_RANKS = (*AFTER_SET_UP, "--output /etc/passwd/x")
 """What ranks find together, or in what they share."""
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @pytest.mark.parametrize(
     "line", [pytest.param(x, marks=pytest.mark.short if x in ON_RANKS else pytest.mark.alone) for x in LINES]
@@ -90,7 +89,6 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
         assert out == err == ""
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("main", "line", "words"),
     [
@@ -103,7 +101,6 @@ def test_programs_that_draw(main, line: str, words: str) -> None:
         main(shlex.split(line))
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("program", "line", "words"),
     [

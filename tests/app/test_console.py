@@ -1,7 +1,5 @@
 """The program ``rodfem``: its commands, and mistakes in calling it."""
 
-from __future__ import annotations
-
 import re
 from importlib import metadata
 from pathlib import Path
@@ -13,8 +11,6 @@ import rodfem
 from rodfem.app import console
 
 HOME = Path(__file__).parents[2]
-
-pytestmark = pytest.mark.alone
 
 
 def test_every_command_is_listed_and_has_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,5 @@
 """Demos are lessons: they run, trace, and end with their number; with options they are ``rodfem run``."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import subprocess
@@ -26,6 +24,7 @@ def path_of(name: str) -> Path:
     return HOME / "demos" / f"{name}.py"
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize(
     "name", ["ruler", *(pytest.param(n, marks=pytest.mark.alone) for n in LESSONS if n != "ruler")]
 )
@@ -46,7 +45,6 @@ def test_a_demo_ends_with_its_number(
     assert saved["scene"] == name and len(saved["branches"]) >= 1
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("name", LESSONS)
 def test_a_demo_is_a_lesson(name: str) -> None:
     text = path_of(name).read_text()
@@ -61,7 +59,6 @@ def test_a_demo_is_a_lesson(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_a_demo_with_options_is_the_command(folder: Path) -> None:
     words = ["--turns", "3", "--elements", "0"]
     ends = [
@@ -72,6 +69,5 @@ def test_a_demo_with_options_is_the_command(folder: Path) -> None:
     assert ends[0].returncode == 2 and ends[0].stderr.count("\n") == 1 and "elements" in ends[0].stderr
 
 
-@pytest.mark.alone
 def test_a_file_that_is_imported_runs_no_lesson() -> None:
     assert not script.lesson("cord")

@@ -3,8 +3,6 @@
 ``tests/diagram/test_golden.py`` has those of the five demos.  Here a whole run does all that a run can.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -17,9 +15,8 @@ from golden_cases import numbers
 from mpi4py import MPI
 
 import rodfem
-from rodfem import libraries
+from rodfem import SetupError, libraries
 from rodfem.app.console import main
-from rodfem.errors import SetupError
 
 COMM = MPI.COMM_WORLD
 HOME = Path(__file__).parents[2]
@@ -28,6 +25,7 @@ RECORDED = {b["name"]: b["special"] for b in numbers()["demo hemitropic"]}
 pytestmark = pytest.mark.versions
 
 
+@pytest.mark.ranks
 def test_a_run_with_all_that_it_can_do(folder: Path) -> None:
     """Special points, loci, a search, modes and the page."""
     words = ["--locus", "A", "-3.02", "-2.98", "--at", "0.5", "--search", "2", "--modes", "2"]
@@ -55,7 +53,6 @@ def test_a_run_with_all_that_it_can_do(folder: Path) -> None:
 # --- what must not be installed, what must be there -----------------------------------------------------------------
 
 
-@pytest.mark.alone
 def test_wrong_builds_are_refused_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(libraries, "find_spec", lambda name: name)
 
@@ -67,7 +64,6 @@ def test_wrong_builds_are_refused_in_one_sentence(monkeypatch: pytest.MonkeyPatc
         libraries._load()
 
 
-@pytest.mark.alone
 def test_every_package_that_computes_loads_the_libraries_first() -> None:
     """PyPI's PETSc finds no MPI otherwise."""
     uses = re.compile(r"^(?:from|import) (?:basix|dolfinx|ffcx|petsc4py|slepc4py)\b", flags=re.MULTILINE)
@@ -76,7 +72,6 @@ def test_every_package_that_computes_loads_the_libraries_first() -> None:
         assert not files or "from rodfem import libraries" in package.read_text(), files
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("given", ["", "no-such-compiler"])
 def test_without_a_compiler(given: str, folder: Path) -> None:
     """One sentence, before anything is compiled; what the cache has is not compiled."""

@@ -1,7 +1,5 @@
 """Many rods: shared among ranks, kept in files, and taken up again."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +9,12 @@ import pytest
 from demo_cases import scene
 from mpi4py import MPI
 
-from rodfem.app.many import many
-from rodfem.errors import InputError, SceneError
-from rodfem.problem.scene import Scene
+from rodfem import InputError, Scene, SceneError, many
 
 COMM = MPI.COMM_WORLD
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @pytest.mark.short
 def test_shared_kept_and_taken_up_again(folder: Path) -> None:
@@ -44,7 +41,6 @@ def test_shared_kept_and_taken_up_again(folder: Path) -> None:
     assert COMM.allreduce(len(done)) == 2  # the one that was cut off, the one that has changed
 
 
-@pytest.mark.alone
 def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
     """It is refused on every rank, and not written over."""
     rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0)]

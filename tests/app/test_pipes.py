@@ -1,7 +1,5 @@
 """A reader that leaves, as ``head`` does: the program ends there, without a word."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -17,7 +15,6 @@ LINES = "    for _ in range(100_000): print('a line')\n"
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("kind", PROGRAMS)
 def test_a_reader_that_leaves_ends_the_program_quietly(tmp_path: Path, kind: str) -> None:
     program = tmp_path / "mine.py"

@@ -1,7 +1,5 @@
 """The rod of a file, with its constants as options: ``rodfem run FILE.py``."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 import sysconfig
@@ -16,8 +14,6 @@ from rodfem.app import console
 from rodfem.app.main import Statement, mesh_of, rod_of
 from rodfem.app.persons_file import load
 from rodfem.errors import InputError
-
-pytestmark = pytest.mark.alone
 
 SCENE = """
 from rodfem.forms.energy import bending_and_twist

@@ -1,7 +1,5 @@
 """Words of the terminal, of diagram.json and of the documentation say what is computed, and what is left out."""
 
-from __future__ import annotations
-
 import io
 import json
 import re
@@ -20,14 +18,8 @@ from hemitropic_cases import run_demo
 from mpi4py import MPI
 
 import rodfem
-from rodfem.app.run import run
+from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, run
 from rodfem.app.terminal import Report
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
-from rodfem.problem.ends import clamped, free
-from rodfem.problem.scene import Ordinate, Scene
-
-pytestmark = pytest.mark.alone
 
 HOME = Path(__file__).parents[2]
 FIRST = MPI.COMM_WORLD.rank == 0

@@ -1,7 +1,5 @@
 """Several threads, as those of a notebook or a server: their work is done one after another."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from math import pi
 
@@ -22,7 +20,6 @@ def first_load(stiffness: float) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_three_threads_at_once() -> None:
     stiffnesses = [1.0, 1.1, 1.2]
     with ThreadPoolExecutor(3) as threads:

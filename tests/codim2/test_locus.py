@@ -1,7 +1,5 @@
 """Loci in the plane of two parameters against closed forms, and against shooting where the state depends on both."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace
@@ -24,24 +22,15 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from shooting_solver import Problem, Rod
 
-from rodfem.app.run import run
+from rodfem import Branch, Discretization, InputError, Locus, Plan, SpecialPoint, StepControl, run, trace
 from rodfem.codim2.follow import STEPS, locus
-from rodfem.codim2.locus import Locus
-from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.follow import StepControl
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
-from rodfem.errors import InputError
-from rodfem.fem.fields import Discretization
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_locus import _about, draw_locus, stable_region
 from rodfem.problem.ends import clamped, free, pinned
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 from rodfem.report.branches import loci_of
-
-pytestmark = pytest.mark.alone
 
 PLANE = ((0.01, 0.9), (-3.1, 1.0))
 WIDE = StepControl(first=0.05, largest=0.15)
@@ -110,7 +99,6 @@ def test_fold_of_the_cord_by_shooting() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_each_special_point_has_its_locus_where_loads_are_small(tmp_path: Path) -> None:
     """Of a DNA molecule in metres and newtons: Euler's loads about either axis, pi^2/4 B/L^2, as the thickness grows.
 
@@ -289,7 +277,6 @@ def test_no_locus_of_an_end() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_what_is_zero_all_along_is_not_counted() -> None:
     """A straight rod spins freely about its axis, whatever a foundation does to it across: ``P = pi^2 + k/pi^2``."""
     scene = classics.column(
@@ -307,7 +294,6 @@ def test_what_is_zero_all_along_is_not_counted() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_a_locus_that_bends_sharply_is_followed() -> None:
     """``P = 2 + sin(400 b)``: beyond a bend the polynomial through the last points has another tangent."""
     potential = lambda u, f2, c: (2 + ufl.sin(400 * c.b) - c.P) * u * u / 2 + u**4 / 4 + f2 / 2  # noqa: E731

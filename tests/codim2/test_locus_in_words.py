@@ -1,7 +1,5 @@
 """What a locus says of itself, and what it leaves as it was."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -17,8 +15,6 @@ from rodfem.forms.energy import bending_and_twist
 from rodfem.output.files import save_json
 from rodfem.output.plot_locus import in_words, stable_region
 from rodfem.report.branches import _readings
-
-pytestmark = pytest.mark.alone
 
 MESH = Discretization("auto", 4, 6)
 

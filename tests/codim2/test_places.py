@@ -1,7 +1,5 @@
 """Where along a locus it turns, or ends: within bars of closed forms, in 30 digits, that are not too wide."""
 
-from __future__ import annotations
-
 from functools import cache
 from math import pi
 
@@ -11,12 +9,9 @@ import pytest
 import rescaled
 from hard.two_freedoms import scene
 
-from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Scene, clamped, free, trace
-from rodfem.codim2.locus import Locus
+from rodfem import Diagram, Discretization, Locus, Ordinate, Parameter, Plan, Scene, clamped, free, trace
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 TURNS_IN_LOAD, TURNS_IN_SHARE, DIVERGES = (
     (16.052461577163431, 0.5),

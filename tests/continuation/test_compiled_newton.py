@@ -1,19 +1,14 @@
 """The compiled iteration and factors along the rod beside PETSc's matrices and MUMPS."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from golden_cases import cases, single_branches
 
-from rodfem import Discretization, Plan, trace
+from rodfem import Discretization, InputError, Plan, Solver, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram.solver import Solver
-from rodfem.errors import InputError
 from rodfem.fem.fields import PETSC
 from rodfem.fem.newton import OnPlane
 
-pytestmark = pytest.mark.alone
 SAME = 1e-9
 """Difference of loads and ordinates, relative to numbers greater than one, of two ways to the same state."""
 LOOSE = 1e-6

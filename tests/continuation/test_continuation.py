@@ -1,7 +1,5 @@
 """Following branches: exact loads, either direction, restarts from files, and the work of the ends."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import pi
 from pathlib import Path
@@ -16,17 +14,14 @@ from hard.writhing import clamped_rod
 from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
 
 import rodfem
-from rodfem import Branch, Discretization, Plan, Point, trace
+from rodfem import Branch, Discretization, IndexStepControl, InputError, Plan, Point, SceneError, StepControl, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.continuation.follow import IndexStepControl, StepControl
-from rodfem.errors import InputError, SceneError
 from rodfem.output.files import load_state, save_states
 
 AT = (0.05, 0.5, 0.9)
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.versions
 def test_user_points_and_ends_lie_at_their_loads_exactly() -> None:
     straight, first, second = explored(at=AT)
@@ -39,7 +34,6 @@ def test_user_points_and_ends_lie_at_their_loads_exactly() -> None:
     assert straight.points[-1].load == first.points[-1].load == 0.95
 
 
-@pytest.mark.alone
 def test_decreasing_load() -> None:
     """The same special points as with increasing load, met the other way round."""
     straight, *buckled = explored("reduced", 12, 6, span=(0.5, 0.05), at=(0.2,))
@@ -59,7 +53,6 @@ def test_decreasing_load() -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("start", [0.0, 0.01, 0.07 / 3, 0.05, 0.1])
 def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
     """Where the points of a branch lie must not matter, and 1/12 of the rod at degree 6 is exact for this purpose."""
@@ -68,7 +61,6 @@ def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
         assert abs(s.point.load - exact) <= 3 * s.located_to
 
 
-@pytest.mark.alone
 def test_special_points_do_not_depend_on_the_steps() -> None:
     coarse = explored("reduced", 12, 6, span=(0.0, 0.6), steps=StepControl(first=0.05, largest=0.25, aim=2e-2))
     found = [s.point.load for b in coarse for s in b.special if s.kind in ("branch point", "fold")]
@@ -78,6 +70,7 @@ def test_special_points_do_not_depend_on_the_steps() -> None:
     assert max(len(b.points) for b in coarse) < 20
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 def test_newton_converges_quadratically() -> None:
     """The size of a correction is the square of the one before: the Jacobian is the derivative of the equations."""
@@ -99,7 +92,6 @@ def test_newton_converges_quadratically() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:
     """A saved state starts Newton's method on other elements of another degree, and it lands on the exact state."""
@@ -117,6 +109,7 @@ def test_restart_on_another_discretisation(formulation: str, folder: Path) -> No
     assert other.shape.ordinate(y) == pytest.approx(reference_values.FIRST[0.5][0], abs=1e-10)
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_restart_from_what_is_not_there(folder: Path) -> None:
     branch = explored(at=AT)[0]
@@ -130,7 +123,6 @@ def test_restart_from_what_is_not_there(folder: Path) -> None:
         load_state(path, "straight", 0, follower("pointwise"))
 
 
-@pytest.mark.alone
 def test_steps_that_bound_the_change_of_the_index() -> None:
     """Euler's loads of a pinned column of nearly equal stiffnesses, ``pi^2`` and ``1.0001 pi^2``: a row between."""
     rod = classics.column(
@@ -155,6 +147,7 @@ def _rows(branch: Branch) -> list[Point]:
     return [p for p in branch.points if id(p) not in special]
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("factors", ["chain", "petsc"])
 @pytest.mark.parametrize("mesh", [(4, 3), pytest.param((8, 4), marks=pytest.mark.alone)])
@@ -172,7 +165,6 @@ def test_an_equilibrium_is_a_first_state_that_stays(mesh: tuple[int, int], facto
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_singular_equations_are_told_in_a_sentence() -> None:
     """Two meshes of degree 1 on which the equations are exactly singular: no division by the size of nothing."""
     with pytest.raises(SceneError, match="Constraints depend on one another"):
@@ -184,7 +176,6 @@ def test_singular_equations_are_told_in_a_sentence() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["auto", "pointwise"])
 def test_no_part_along_an_orbit_is_handed_on(formulation: str) -> None:
     """The loop of a turned rod: 350 rows, each of which may turn about the axis.

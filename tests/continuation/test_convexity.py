@@ -1,7 +1,5 @@
 """Branches, sweeps and loci end where the stored energy is not convex any more: beyond, an index means nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -9,9 +7,8 @@ import pytest
 import ufl
 from classics import column
 
-from rodfem import Discretization, Inertia, Plan, Scene, Solver, StepControl, clamped, free, trace
+from rodfem import Discretization, Inertia, Plan, Scene, SceneError, Solver, StepControl, clamped, free, trace
 from rodfem.continuation.arc import lost_between
-from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.functions import Constants
 
@@ -34,6 +31,7 @@ def rod(energy: Energy, span: tuple[float, float] = (0.0, 2.0), **given: Any) ->
     return column("rod", given.pop("ends", (clamped(), free())), span, energy=energy, **given)
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize("energy", [coupled, pytest.param(softening, marks=pytest.mark.alone)])
 def test_a_stiffness_that_the_load_takes_away(energy: Energy) -> None:
@@ -48,7 +46,6 @@ def test_a_stiffness_that_the_load_takes_away(energy: Energy) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_a_search_where_it_is_lost() -> None:
     """Equilibria that a search finds there begin no branch."""
     diagram = trace(rod(softening), MESH, Plan(at=(1.5,), depth=0, tries=4, error_bars=False))
@@ -61,6 +58,7 @@ def narrow(x: Any, width: float) -> Energy:
     return lambda v, k, c: bending_and_twist(k, (x(c) ** 2 - width**2, 2.0, 1.0))
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("width", [0.02, pytest.param(0.003, marks=pytest.mark.alone)])
 def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
@@ -70,7 +68,6 @@ def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("beside", [1e-3, 1e-9])
 def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
     """What little stiffness there is left at one end of a step is no unit for that in the step."""
@@ -88,7 +85,6 @@ def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_convexity_lost_between_the_places_of_the_quadrature(width: float = 1e-2) -> None:
     """Twisting stiffness ``(s - 0.37)^2 + (P - 1)^2 - width^2``: negative within a width of 0.37, where P is near 1."""
 
@@ -102,7 +98,6 @@ def test_convexity_lost_between_the_places_of_the_quadrature(width: float = 1e-2
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_a_step_and_a_kink_inside_an_element_are_convex() -> None:
     """A parabola through a step has lower values than the step."""
     for stiffness in (
@@ -114,6 +109,7 @@ def test_a_step_and_a_kink_inside_an_element_are_convex() -> None:
         assert branch.ended == "end of range"
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("width", [0.1, pytest.param(0.01, marks=pytest.mark.alone)])
 def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) -> None:
@@ -131,7 +127,6 @@ def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) 
     assert branch.points[-1].load < 10 * e - 11 * width * (e - 0.3) / ((e - 0.3) ** 2 + width**2) ** 0.5 + 1e-6
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("energy", "until"),
     [
@@ -155,6 +150,7 @@ def test_a_sweep(energy: Energy, until: float) -> None:
     assert until - 0.61 < branch.points[-1].load < until
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_convexity_lost_in_the_step_to_zero_stretch(loss: float = 3.99) -> None:
     """A thrust squeezes a rod of ``EA = 4`` to nothing at 4; before that its twisting stiffness vanishes."""

@@ -4,8 +4,6 @@ The branch of the rod with ``V = -P f2/2 + eps f2^2/4 + f2^3/6``, where ``f2 = 2
 end, is ``P = f/sin f - 1 + eps f2 + f2^2``: in f it begins with ``(eps + 1/6) f^2``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, sin
 from typing import Any
@@ -39,6 +37,7 @@ def on_one_rank(*given: Any) -> list[Any]:
     return [pytest.param(*one if isinstance(one, tuple) else (one,), marks=pytest.mark.alone) for one in given]
 
 
+@pytest.mark.ranks
 @pytest.mark.few(4)
 @pytest.mark.parametrize("beside", [-1e-3, *on_one_rank(-1e-2, -2e-4)])
 def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
@@ -62,6 +61,7 @@ def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     assert {(p.negative, p.slope < 0) for p in rows} == {(1, True), (0, False)} and len(rows) > 12
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("beside", "kind"),
@@ -76,7 +76,6 @@ def test_the_sign_of_the_coefficient_names_the_pitchfork(beside: float, kind: st
     assert ("turns back in a fold" in special.note) == (beside < 0)
 
 
-@pytest.mark.alone
 def test_a_coefficient_that_is_not_told_from_zero() -> None:
     diagram = pitchfork(0.0)
     (special,) = diagram.special(BRANCH_POINT)

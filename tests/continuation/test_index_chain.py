@@ -1,7 +1,5 @@
 """The index of each row is that of its own state, and from row to row it changes by what the special points say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, pi, sin, sqrt
 
@@ -34,8 +32,6 @@ from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.diagram import explorer
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.table import branch_data
-
-pytestmark = pytest.mark.alone
 
 EULER = pi**2 / 4
 """Buckling load of the clamped-free column."""

@@ -1,14 +1,10 @@
 """Kinds of special points: names with what tables, files and pictures know of them, in one place."""
 
-from __future__ import annotations
-
 import ast
 import copy
 import json
 import re
 from pathlib import Path
-
-import pytest
 
 from rodfem.continuation.kinds import BRANCH_POINT, END, FOLD, KINDS, USER, Kind
 from rodfem.output.plot_diagram import MARKERS
@@ -17,8 +13,6 @@ from rodfem.output.plot_locus import LINES
 HOME = Path(__file__).parents[2]
 NEUTRAL = {"user", "event", "end"}
 """Words that mean other things elsewhere."""
-
-pytestmark = pytest.mark.alone
 
 
 def test_a_kind_is_its_name() -> None:

@@ -4,8 +4,6 @@ Of the pinned elastica with the end slope A (Euler): ``P = pi^2 (1 + A^2/8 + ...
 ``A^2/4 + ...``, its middle moves by ``A/pi + ...`` across and by ``A^2/8 + ...`` along.
 """
 
-from __future__ import annotations
-
 from math import pi
 from typing import Any
 
@@ -37,6 +35,7 @@ def on_one_rank(*given: Any) -> list[Any]:
     return [pytest.param(*one, marks=pytest.mark.alone) for one in given]
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("span", [(8.0, 11.0), *on_one_rank(((9.8, 9.9),))])
 @pytest.mark.parametrize("eps", [0.01, *on_one_rank((1.0,), (1e-3,))])
@@ -48,7 +47,6 @@ def test_shortening_and_part_of_a_slope(eps: float, span: tuple[float, float]) -
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("span", [(8.0, 11.0), (9.8, 9.9)])
 def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> None:
     """Up to ``x = 4 eps^2``, round-off, eps = 1e-6 gives the law: it is ``pi^2/2 x``, uncertain by ``4 eps/A`` of it.
@@ -62,7 +60,6 @@ def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> N
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("part", [1.0, 1e-3])
 def test_transcritical_point(part: float) -> None:
     """``8 beta/pi^3`` is the slope in the middle's displacement, of which the ordinate has a part."""
@@ -72,7 +69,6 @@ def test_transcritical_point(part: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_size_of_a_displacement_and_what_is_added_to_it() -> None:
     """``pi^4/8 x^2`` in the size, also beside a shortening; beside a displacement it differs on the two sides."""
     for of in (lambda r, q: abs(r[0]), lambda r, q: abs(r[0]) + 0.5 - r[2], lambda r, q: abs(r[0] + 0.5 - r[2])):

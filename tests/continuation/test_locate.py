@@ -1,7 +1,5 @@
 """Zeros of interpolants, against polynomials whose zeros are known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import atan, cos, exp, log
 
@@ -13,8 +11,6 @@ from numpy.polynomial.polynomial import polyfromroots
 from rodfem.continuation.eigenvalue_curves import in_doubt, locate_flutter, real_root
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured
-
-pytestmark = pytest.mark.alone
 
 NODES = 6
 """Of a series."""

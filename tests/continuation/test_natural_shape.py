@@ -1,7 +1,5 @@
 """Where a rod begins without a start of its own: at rest if that fits its ends, or turned as they are."""
 
-from __future__ import annotations
-
 from math import cos, sin
 from typing import Any
 
@@ -13,7 +11,6 @@ from demo_cases import scene
 from rodfem import Attachment, Ordinate, Parameter, Scene, Solver, clamped, free, pinned, sliding
 from rodfem.continuation.natural_shape import natural_shape
 
-pytestmark = pytest.mark.alone
 HALF, LENGTH = 0.6, 1.0
 RADIUS = LENGTH / (2 * HALF)
 

@@ -4,8 +4,6 @@ A cantilever of equal bending stiffnesses with a quartic potential at its tip: t
 on the circle of directions, and branches leave where that is extremal.
 """
 
-from __future__ import annotations
-
 from math import degrees
 from typing import Any
 
@@ -14,6 +12,8 @@ import pytest
 
 from rodfem import Discretization, End, Ordinate, Plan, Scene, clamped, trace
 from rodfem.forms.energy import bending_and_twist
+
+pytestmark = pytest.mark.ranks
 
 FORMS = {
     "square": ((5.0, 0.0, 0.0, 0.0, 5.0), 90),  # by symmetry one branch stands for those at right angles, too

@@ -1,7 +1,5 @@
 """The reduced stiffness matrix, against dense linear algebra; its crossings, against matrices whose zeros are known."""
 
-from __future__ import annotations
-
 from math import acos, cos, pi, sin
 
 import numpy as np
@@ -15,8 +13,6 @@ from rodfem.continuation.arc import Piece
 from rodfem.continuation.crossings import Node, Zeros, fourth, roots
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.reduced_stiffness import Condensation, negative
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.parametrize("load", [20.0, np.pi**2, np.pi**2 + 1e-9])

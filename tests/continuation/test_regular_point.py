@@ -1,7 +1,5 @@
 """One symmetric factorisation a point against two shifts, LU factors, and what the theory says."""
 
-from __future__ import annotations
-
 import demo_cases
 import hemitropic_cases
 import numpy as np
@@ -23,6 +21,7 @@ def demo(name: str, formulation: str) -> tuple[BranchSolver, list[Branch]]:
     return found.follower, found.branches
 
 
+@pytest.mark.ranks
 @pytest.mark.few(3)
 @pytest.mark.parametrize("formulation", ["reduced", pytest.param("pointwise", marks=pytest.mark.alone)])
 @pytest.mark.parametrize("name", ["hemitropic", *(pytest.param(x, marks=pytest.mark.alone) for x in ("cord", "ruler"))])
@@ -36,7 +35,6 @@ def test_index_is_that_of_two_shifts_at_every_point(name: str, formulation: str)
                 assert (index.negative, index.zero) == (point.negative, point.zero), (branch.name, point.load)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("name", BENT)
 def test_tangent_is_that_of_lu_factors(name: str) -> None:
     follower, branches = demo(name, "reduced")
@@ -51,7 +49,6 @@ def test_tangent_is_that_of_lu_factors(name: str) -> None:
     assert image.norm() < 1e-9 * system.matrix.norm()
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("name", ["hemitropic", "cord"])
 def test_near_singular_states_are_left_to_others(name: str) -> None:
     follower, branches = demo(name, "reduced")
@@ -66,6 +63,7 @@ def test_near_singular_states_are_left_to_others(name: str) -> None:
         assert abs(found.nearest(1)[0][0]) < NEAR * follower.inertia.scale
 
 
+@pytest.mark.ranks
 def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
     """Straight cord in tension: S is singular at 49.348 only, and its eigenvalues are smooth in between."""
     follower, branches = demo("cord", "reduced")
@@ -85,6 +83,7 @@ def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
     assert np.median(seen) < 1.5
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
     """In whatever order rows are asked for, the phase conditions are those that are found anew."""

@@ -1,7 +1,5 @@
 """What is no equilibrium is never a point of a branch: states that are spoilt after Newton's method has ended."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -12,11 +10,9 @@ from classics import column, euler
 from golden_cases import cases
 from petsc4py import PETSc
 
-from rodfem import Discretization, Plan, Solver, StepControl, clamped, free, trace
-from rodfem.continuation.branch import Point
+from rodfem import ConvergenceError, Discretization, Plan, Point, Solver, StepControl, clamped, free, trace
 from rodfem.continuation.branch_solver import BranchSolver, Step
 from rodfem.continuation.follow import UNEXPLAINED, defect, require_equilibrium
-from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 
 SMALL = 1e-6
@@ -46,7 +42,6 @@ def spoilt(system: System, x: PETSc.Vec, field: str) -> PETSc.Vec:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_mutations_are_caught(formulation: str) -> None:
     solver, point = bent(formulation)
@@ -71,7 +66,6 @@ def test_mutations_are_caught(formulation: str) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("steps", [StepControl(), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
 def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
     """States of another branch at nearly the same load, farther than a step away, in place of the last row."""
@@ -92,7 +86,6 @@ def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
     assert len(told) > 30 and all(told)
 
 
-@pytest.mark.alone
 def test_a_step_that_has_jumped_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
     """From the straight branch beyond the load 2 to the buckled one, with the tangent of the straight one."""
     scene, mesh, plan = cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False)
@@ -116,7 +109,6 @@ def test_a_step_that_has_jumped_is_halved(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 def test_a_violation_ends_the_branch_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     step: Callable[..., Step] = BranchSolver.step
     where = 5.0

@@ -1,7 +1,5 @@
 """Branch points that an imperfection takes apart, against the elastica in closed form."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 from typing import Any
@@ -31,8 +29,6 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.singular import SingularSystem
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 EULER = pi**2 / 4
 
@@ -239,7 +235,6 @@ def stiff(strains: float) -> Scene:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_stiff_strains_do_not_hide_the_load() -> None:
     """The fold of an arch of DaDeppo & Schmidt is one however stiff its strains are, and at 8.97.
 

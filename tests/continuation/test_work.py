@@ -1,7 +1,5 @@
 """Potential energies and what loads do work on: closed forms, the work of the load from row to row, and folds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,11 +10,9 @@ from golden_cases import cases
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from rodfem import Discretization, Ordinate, Plan, Solver, StepControl, trace
-from rodfem.continuation.branch import Branch, Point
+from rodfem import Branch, Discretization, Ordinate, Plan, Point, Solver, StepControl, trace
 from rodfem.continuation.kinds import FOLD
 
-alone = pytest.mark.alone
 WITH_FOLDS = [
     *("demo hemitropic", "demo ring", "docs hinge"),
     *("classic foundation", "classic tip spring", "classic pressed arch"),
@@ -30,6 +26,7 @@ def rows(branch: Branch) -> list[Point]:
     return [p for p in branch.points if id(p) not in special][1 if branch.parent else 0 :]
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("mesh", MESHES)
 def test_conjugate_of_a_distance_is_the_thrust(mesh: Discretization) -> None:
@@ -42,7 +39,6 @@ def test_conjugate_of_a_distance_is_the_thrust(mesh: Discretization) -> None:
 
 
 @pytest.mark.few(1)
-@alone
 @pytest.mark.parametrize("mesh", MESHES)
 def test_dead_load_does_work_on_its_point(mesh: Discretization) -> None:
     """A column pushed down its axis by ``P``: ``V = W + P r3`` and ``c = -r3`` at its tip."""
@@ -56,7 +52,6 @@ def test_dead_load_does_work_on_its_point(mesh: Discretization) -> None:
 
 
 @pytest.mark.few(1)
-@alone
 @pytest.mark.parametrize("name", WITH_FOLDS)
 def test_stability_is_exchanged_at_folds_as_their_side_says(name: str) -> None:
     """The eigenvalue that vanishes at a fold changes by ``lam'' c'`` (Maddocks 1987).
@@ -78,7 +73,6 @@ def test_stability_is_exchanged_at_folds_as_their_side_says(name: str) -> None:
 
 
 @pytest.mark.few(1)
-@alone
 @pytest.mark.parametrize("steps", [StepControl(), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
 @pytest.mark.parametrize("mesh", MESHES, ids=["8 P6", "24 P1"])
 def test_energy_changes_by_the_work_of_the_load(mesh: Discretization, steps: StepControl) -> None:

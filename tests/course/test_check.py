@@ -1,7 +1,5 @@
 """The program that judges a student's program."""
 
-from __future__ import annotations
-
 import sys
 from math import pi
 from pathlib import Path
@@ -14,8 +12,6 @@ from lesson.answer import Answer
 from lesson.answers import answers
 from lesson.pictures import axes, show
 from rodfem.errors import InputError
-
-pytestmark = pytest.mark.alone
 
 EULER = Answer("load", pi**2 / 4, "exact pi^2/4", 1e-4, "Look at the clamp.", ((pi**2, "Those are pinned ends."),))
 

@@ -1,7 +1,5 @@
 """Lessons and solutions of the course run, quickly, and end with the right numbers."""
 
-from __future__ import annotations
-
 import ast
 import re
 import runpy
@@ -43,7 +41,6 @@ def pace() -> float:
     return max(1.0, (time.process_time() - start) / MILLION)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_ends_with_its_number(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
@@ -60,7 +57,6 @@ def test_a_lesson_ends_with_its_number(path: Path, folder: Path, monkeypatch: py
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
 def test_a_solution_is_right(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
@@ -68,7 +64,6 @@ def test_a_solution_is_right(path: Path, folder: Path, monkeypatch: pytest.Monke
     assert right, sentence
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_has_its_sections(path: Path) -> None:
     text = path.read_text()
@@ -82,12 +77,10 @@ def test_a_lesson_has_its_sections(path: Path) -> None:
     assert 2 <= len(asked) <= 4 and "*After it you can*" in text and "*Time:*" in text
 
 
-@pytest.mark.alone
 def test_every_question_has_its_program() -> None:
     assert sorted(map(question, LESSONS + SOLUTIONS)) == sorted(answers())
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_is_a_notebook(path: Path) -> None:
     jupytext = pytest.importorskip("jupytext")
@@ -96,6 +89,5 @@ def test_a_lesson_is_a_notebook(path: Path) -> None:
     assert notebook.cells[0].source.startswith("# ")
 
 
-@pytest.mark.alone
 def test_the_page_lists_all_lessons() -> None:
     assert re.findall(r"\]\((\d\d_\w+\.py)\)", (COURSE / "README.md").read_text()) == [p.name for p in LESSONS]

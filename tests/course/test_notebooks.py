@@ -1,7 +1,5 @@
 """The lessons as notebooks: each runs to its end, and the first cell installs rodfem where it is missing."""
 
-from __future__ import annotations
-
 import os
 import runpy
 import subprocess
@@ -18,7 +16,6 @@ OURS = find_spec("dolfinx_solver") is not None
 """Whether the libraries are PyPI's, as in a hosted notebook; Debian's matplotlib does not draw in a new kernel."""
 
 pytestmark = [
-    pytest.mark.alone,
     pytest.mark.versions,
     pytest.mark.skipif(not (OURS and all(map(find_spec, NEEDED))), reason='needs pip install ".[pip,notebooks]"'),
 ]

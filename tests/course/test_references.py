@@ -1,7 +1,5 @@
 """Right answers of the course whose numbers are not written as closed forms, computed once more."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import acos, pi, sqrt
 
@@ -16,8 +14,6 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import ellipk, jv
 
 from lesson.answers import answers
-
-pytestmark = pytest.mark.alone
 
 
 def shot(slopes: Callable[[float, np.ndarray], list[float]], start: list[float]) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Deflation against what exploring finds, and against integration of the rod's initial value problem."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 from math import pi
@@ -14,17 +12,11 @@ from demo_cases import Found, explored, scene
 from rescaled import DNA, rescaled
 from shooting_solver import Problem, Rod
 
-from rodfem import pinned, trace
-from rodfem.continuation.branch import Branch, Point
+from rodfem import Branch, Discretization, InputError, Observer, Plan, Point, Solver, pinned, trace
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.observer import Observer
 from rodfem.deflation.search import NEW, Deflation, equilibria_at, turned_state
 from rodfem.deflation.symmetries import Orbit, mirrors
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
-from rodfem.errors import InputError
-from rodfem.fem.fields import Discretization
 from rodfem.tolerances import APART
 
 K0 = 3 * pi
@@ -54,7 +46,6 @@ def force(follower: BranchSolver, x: object) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_cord() -> None:
     """From the straight state alone: all that exploring finds, and whatever else is found is an equilibrium."""
     found = cord()
@@ -78,7 +69,6 @@ def test_cord() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_hemitropic() -> None:
     """A circle of states counts as one, and the states are those of the branches."""
     follower = hemitropic_cases.follower()
@@ -98,7 +88,6 @@ def test_hemitropic() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_ring_in_its_plane() -> None:
     """Moved, turned, or run around along itself it is the same ring: a circle, and beyond 3 the pressed one."""
     follower = Solver(classics.pressed_ring(), Discretization("auto", 12, 6)).equilibria
@@ -122,7 +111,6 @@ def both_ways(point: Point) -> list[Branch]:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_ruler() -> None:
     """Both ways of falling to the side count as one; it is the start of the branch that leaves the plane."""
     found = ruler()
@@ -149,7 +137,6 @@ def test_ruler() -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("planar", [None, "e1"])
 def test_a_column_that_hangs(planar: str | None) -> None:
     """Between pins, one of which slides: turned over, what pressed the column pulls it straight, at any load."""
@@ -161,12 +148,12 @@ def test_a_column_that_hangs(planar: str | None) -> None:
     assert hangs.energy == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.alone
 def test_known_state_at_another_load() -> None:
     with pytest.raises(InputError, match=r"not 6\.5"):
         Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("units", [(1.0, 1.0), DNA[:2]], ids=["1", "DNA"])
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
@@ -184,6 +171,7 @@ def test_mirrors_are_those_of_the_equations(formulation: str, units: tuple[float
                 assert force(follower, image) == pytest.approx(force(follower, x), rel=1e-12)
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
     """Twelve tries of a coil, in three systems of units far from its own."""
@@ -199,6 +187,7 @@ def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
     assert counts[0] == counts[1] == counts[2]
 
 
+@pytest.mark.ranks
 def test_step_is_newtons_for_the_deflated_equations() -> None:
     """The rescaled step ``d`` solves ``G'(x) d = -G(x)``, with ``G'`` by differences, next to points and to circles."""
     for follower, load in ((ruler().follower, 6.0), (hemitropic_cases.follower(), 0.35)):
@@ -231,6 +220,7 @@ def test_step_is_newtons_for_the_deflated_equations() -> None:
         assert slope.norm() < 1e-5 * value.norm()
 
 
+@pytest.mark.ranks
 def test_guesses_do_not_depend_on_ranks() -> None:
     system = ruler().follower.system
     straight = ruler().follower.start(1.0)
@@ -242,7 +232,6 @@ def test_guesses_do_not_depend_on_ranks() -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("planar", ["e2", None])
 def test_quaternions_of_opposite_signs_are_one_rotation(planar: str | None) -> None:
     """And so are angles a turn apart: of a rod between hinges no state has the shape and rotations of another."""
@@ -256,7 +245,6 @@ def test_quaternions_of_opposite_signs_are_one_rotation(planar: str | None) -> N
         assert abs(one["r"] - other["r"]).max() > 1e-6 or turned.min() < 1 - 1e-9
 
 
-@pytest.mark.alone
 def test_states_of_the_mesh_alone_are_not_offered_as_stable() -> None:
     """An elastica at twenty times its critical load on two linear elements: the richer mesh has other strains."""
     rod, mesh = (

@@ -1,7 +1,5 @@
 """All frequencies of the mesh, at every load: against QZ on the full pencil, and where the first ones do not tell."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -18,8 +16,6 @@ from rodfem.diagram.equilibria import at_load
 from rodfem.forms.energy import bending_and_twist
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-
-pytestmark = pytest.mark.alone
 
 BECK = 20.0509536189738
 SCENES: dict[str, Callable[[], Scene]] = {name: cases()[name] for name in NOT_CONSERVATIVE} | {

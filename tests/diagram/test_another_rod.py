@@ -1,7 +1,5 @@
 """Files of another rod: what no number of a scene tells, its equations do; and the plan of a diagram that is read."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,6 +37,7 @@ def crooked(e: float) -> Scene:
     return column("crooked", (clamped(), free(lambda c: (e * c.P * (6.0 - c.P), 0.0, -c.P))), (0.0, 6.0))
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize(
     ("rod", "other"),
     [(loaded(), loaded(mass=1.1)), (loaded(), loaded(tip=0.1)), (crooked(0.05), crooked(0.0))],
@@ -51,7 +50,6 @@ def test_another_rod_has_another_fingerprint(rod: Scene, other: Scene) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.usefixtures("few_loads")
 def test_a_diagram_that_is_read_keeps_its_plan(folder: Path) -> None:
     """Depth, loads asked for, and what else a file holds; of steps and events it says that it has them not."""

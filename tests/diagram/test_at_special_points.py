@@ -4,8 +4,6 @@ A richer mesh has its special points at other loads: there its state at the load
 the special point, whose eigenvalue at a fold is as large as the square root of the difference of loads.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
@@ -14,8 +12,6 @@ from classics import pressed_ring
 
 from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, pinned, trace
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 MESH = Discretization("auto", 4, 4)
 ROUND_OFF = 1e-8

@@ -1,7 +1,5 @@
 """Branches that close, that go back to shorter steps however often, and that have an image by a symmetry."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi, sqrt
 from types import SimpleNamespace
@@ -12,14 +10,11 @@ import pytest
 from problem.test_docs import scenes
 
 import rodfem
-from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, trace
-from rodfem.continuation.observer import Observer
+from rodfem import Discretization, Observer, Ordinate, Plan, Ring, Scene, StepControl, trace
 from rodfem.deflation.symmetries import Mirror
 from rodfem.diagram.special_search import PARTS, SHORTER, SpecialSearch, Unresolved
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_diagram import figure_of
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.long

@@ -4,8 +4,6 @@ Beck's column in space is two columns, one for each plane: all loads of the seco
 its stiffness B2.  What the load does may be any function of a parameter, so that flutter comes and goes where we like.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
@@ -20,10 +18,7 @@ from hemitropic_cases import specials
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
-from rodfem import Diagram, Plan, clamped, free
-from rodfem.diagram.diagram import trace
-from rodfem.fem.fields import Discretization
-from rodfem.problem.scene import Scene
+from rodfem import Diagram, Discretization, Plan, Scene, clamped, free, trace
 
 BECK = float(double(20.0, 120.0)[0])
 MESH = Discretization("pointwise", 4, 6)
@@ -33,6 +28,7 @@ SHARE = 0.4
 """Of a thrust, which follows the tip: the column diverges, comes back, and flutters."""
 
 
+@pytest.mark.ranks
 def test_the_load_of_beck() -> None:
     assert pytest.approx(20.0509536189738, abs=1e-11) == BECK
 
@@ -95,7 +91,6 @@ def humped(strong: float, top: float, curvature: float, span: tuple[float, float
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("span", [(4.0, 6.0), (6.0, 4.0)])
 @pytest.mark.parametrize(
     ("top", "curvature"),
@@ -114,7 +109,6 @@ def test_flutter_and_its_reverse_in_a_step(top: float, curvature: float, span: t
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("top", [-1e-2, -1e-8])
 def test_frequencies_that_nearly_meet(top: float) -> None:
     diagram = in_steps(0.1, humped(10.0, top, 1.0, (4.0, 6.0)), None)
@@ -139,7 +133,6 @@ FLUTTERS = float(
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("span", [(4.5, 18.0), (18.0, 4.5)])
 @pytest.mark.parametrize(
     "strong",

@@ -1,7 +1,5 @@
 """Diagrams from Python: traced without files or output, asked, saved and read again."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +10,8 @@ import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Diagram, Discretization, InputError, Observer, Parameter, Plan
+from rodfem import Branch, Diagram, Discretization, InputError, Observer, Parameter, Plan
 from rodfem.app import console
-from rodfem.continuation.branch import Branch
 
 MESH = Discretization("reduced", 8, 6)
 SHORT = Plan((60.0, 30.0), depth=1)
@@ -25,7 +22,6 @@ def diagram() -> Diagram:
     return rodfem.trace(demo_cases.scene("cord"), MESH, SHORT)
 
 
-@pytest.mark.alone
 def test_nothing_is_printed_and_no_file_is_written(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -36,6 +32,7 @@ def test_nothing_is_printed_and_no_file_is_written(
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.ranks
 def test_branches_and_special_points(diagram: Diagram) -> None:
     assert [b.name for b in diagram] == ["straight", "branch 1", "branch 2"][: len(diagram)]
     assert diagram["straight"] is diagram[0]
@@ -51,6 +48,7 @@ def test_branches_and_special_points(diagram: Diagram) -> None:
     assert f"<td>{end.point.load:.10g}</td>" in diagram._repr_html_()
 
 
+@pytest.mark.ranks
 def test_states_at_a_load(diagram: Diagram) -> None:
     """Each is at that very load, with the index that another method finds there."""
     found = diagram.at(40.0)
@@ -67,7 +65,6 @@ def test_states_at_a_load(diagram: Diagram) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
     saved = diagram.save(folder / "cord")
     assert sorted(p.name for p in saved.iterdir()) == ["diagram.json", "states.h5"]
@@ -89,7 +86,6 @@ def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
     saved = diagram.save(folder / "cord")
     with pytest.raises(InputError, match=r"holds the scene 'cord' with the load lam, not 'hemitropic' with lam: give"):
@@ -104,7 +100,6 @@ def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
         rodfem.load(folder, diagram.scene)
 
 
-@pytest.mark.alone
 def test_what_a_run_warns_of_is_saved_and_in_its_words(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of a first state that is critical, and of an event that is zero all along: live, loaded, and from the shell."""
     rod, critical = demo_cases.scene("cord"), 49.348022005446796
@@ -129,7 +124,6 @@ def test_what_a_run_warns_of_is_saved_and_in_its_words(folder: Path, capsys: pyt
     assert rodfem.load(folder / "cord", rod).warnings == []
 
 
-@pytest.mark.alone
 def test_one_solver(diagram: Diagram) -> None:
     """States that a solver computes one by one are those of the diagram."""
     solver = rodfem.Solver(diagram.scene, MESH)
@@ -143,6 +137,7 @@ def test_one_solver(diagram: Diagram) -> None:
         solver.modes(near, 0)
 
 
+@pytest.mark.ranks
 def test_an_interrupt_loses_no_branch() -> None:
     """What had been traced comes with the error, and can be asked."""
 

@@ -1,7 +1,5 @@
 """Events: zeros of a number of the state along a branch are special points with error bars."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -18,8 +16,6 @@ from rodfem import Discretization, Event, InputError, Level, Plan, clamped, slid
 from rodfem.continuation import arc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 
 def AXIS(c: Any) -> tuple[float, float, None]:

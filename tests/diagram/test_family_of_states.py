@@ -1,7 +1,5 @@
 """Rods that may turn freely, families of states at each load; sweeps of masses that depend on the load."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from math import cos, pi, sin
@@ -12,8 +10,7 @@ import pytest
 import ufl
 from classics import SUPPORTS, column
 
-from rodfem import Discretization, End, Inertia, Ordinate, Plan, Ring, Scene, clamped, free, pinned, trace
-from rodfem.diagram.diagram import Diagram
+from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Ring, Scene, clamped, free, pinned, trace
 
 
 def swept(turned: float, second: float) -> Diagram:
@@ -33,7 +30,6 @@ def swept(turned: float, second: float) -> Diagram:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.usefixtures("few_loads")
 def test_loads_of_one_state_of_a_family_are_said_to_be_that() -> None:
     """By what angle the strip is turned decides at which load it flutters; on alike springs it does not."""
@@ -59,6 +55,7 @@ def slender(mass: Callable[[Any], Any]) -> Inertia:
     return Inertia(rho_A=mass, rho_I=lambda c: (0.0, 0.0, 0.0))
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_a_sweep_ends_before_a_negative_mass() -> None:
     """It is from 0.39 to 0.41, and a row of the sweep is there."""
@@ -68,6 +65,7 @@ def test_a_sweep_ends_before_a_negative_mass() -> None:
     assert branch.points[-1].load == pytest.approx(0.35)
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("mass", "spectrum", "words"),
@@ -93,6 +91,7 @@ def wound(s: np.ndarray, torsion: float) -> np.ndarray:
     return np.concatenate([np.cos(angle)[:, None], np.sin(angle)[:, None] * axis], axis=1)
 
 
+@pytest.mark.ranks
 def test_helices_of_one_turn_of_a_family_at_each_load() -> None:
     """Between clamps a turn apart a helix of ``C = 3 B`` nutates once a turn: ``k^2 + t^2 (C/B - 2)^2 = (2 pi)^2``.
 
@@ -137,12 +136,14 @@ def half_turn(ends: Any) -> Diagram:
     return found
 
 
+@pytest.mark.ranks
 def test_a_closed_strip_may_slide_between_its_clamps() -> None:
     """Any place of it may be the clamped one: no symmetry of the scene, as the clamps stay where they are."""
     found = half_turn((clamped(), clamped(rotation=(0.0, 0.0, 0.0, -1.0))))
     assert "1 eigenvalue stays zero that no symmetry of the scene explains (rotation about e3 with" in found.notes[0]
 
 
+@pytest.mark.ranks
 def test_a_ring_with_half_a_turn_slides_along_itself() -> None:
     """Its section looks alike after half a turn: rotations and that motion are its four zero eigenvalues."""
     found = half_turn(Ring(turn=pi))
@@ -150,6 +151,7 @@ def test_a_ring_with_half_a_turn_slides_along_itself() -> None:
     assert found.notes == ["closed rod: linking number 0.5, twist 0.4986, writhe 0.0014"]
 
 
+@pytest.mark.ranks
 def test_one_branch_of_a_circle_of_states_that_no_symmetry_explains() -> None:
     """A rod that bends alike in all directions while it does not twist: guided, it buckles at ``4 pi^2`` in any."""
     guided = End(position=(0.0, 0.0, None), rotation=(1.0, 0.0, 0.0, 0.0), force=lambda c: (0.0, 0.0, -c.P))

@@ -1,7 +1,5 @@
 """First states: their name, which is true, one on all meshes, and a column in units far from one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,12 +13,9 @@ import pytest
 import ufl
 from classics import circle
 
-from rodfem import Discretization, InputError, Ordinate, Plan, Ring, Scene, Solver, clamped, free, pinned, trace
-from rodfem.continuation.branch import Branch
+from rodfem import Branch, Discretization, InputError, Ordinate, Plan, Ring, Scene, Solver, clamped, free, pinned, trace
 from rodfem.diagram.explorer import Explorer
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 MESH = Discretization("auto", 6, 4)
 

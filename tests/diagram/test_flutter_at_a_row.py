@@ -1,7 +1,5 @@
 """Frequencies that meet at a load of the sweep itself, to round-off: found once, with the numbers on both sides."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from math import nextafter
@@ -11,8 +9,6 @@ import pytest
 
 from rodfem import Diagram, Discretization, Plan, trace
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, USER
-
-pytestmark = pytest.mark.alone
 
 MESH = Discretization("auto", 4, 6)
 BECK = 20.0509536189738

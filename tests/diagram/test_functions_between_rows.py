@@ -1,7 +1,5 @@
 """What functions of a scene do between rows, at other parameters, or at some states alone: found, or said."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 from typing import Any
 
@@ -10,11 +8,9 @@ import pytest
 import ufl
 from classics import column
 
-from rodfem import Diagram, Discretization, Plan, clamped, free, trace
+from rodfem import Diagram, Discretization, Plan, Scene, clamped, free, trace
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.scene import Scene
 
-pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 6)
 EULER = pi**2 / 4
 

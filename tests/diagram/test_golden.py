@@ -3,8 +3,6 @@
 The record guards the numbers while the code changes its shape.  It is no oracle: the other tests have those.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -32,7 +30,6 @@ NOISE = 1.05
 """Factor by which work may differ where libraries and processors round differently."""
 
 
-@pytest.mark.alone
 def test_all_cases_are_recorded() -> None:
     assert list(NUMBERS) == list(cases())
     scenes = {name: scene() for name, scene in cases().items()}
@@ -54,6 +51,7 @@ def marked(name: str) -> Any:
     return pytest.param(name, marks=[*marks, pytest.mark.versions] if name.removeprefix("demo ") in DEMOS else marks)
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize("name", [marked(name) for name in NUMBERS])
 def test_nothing_has_changed(name: str) -> None:
     """Bars, which nobody compares, are computed of varied cases: of the others they would take half of the time.
@@ -78,7 +76,6 @@ def test_nothing_has_changed(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize(
     "name",
     ["demo hemitropic", "demo ring", *(pytest.param(f"demo {x}", marks=pytest.mark.long) for x in ("cord", "ruler"))],

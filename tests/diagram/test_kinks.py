@@ -1,7 +1,5 @@
 """Kinks of an energy in the state: no error bar where one is inside of the rod, no index where the state is on one."""
 
-from __future__ import annotations
-
 from io import StringIO
 from math import cos, isnan, sin, sqrt
 from pathlib import Path
@@ -15,9 +13,8 @@ from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from rodfem import Diagram, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free, load, trace
+from rodfem import Diagram, Discretization, Inertia, Locus, Ordinate, Parameter, Plan, Scene, clamped, free, load, trace
 from rodfem.app.terminal import Report
-from rodfem.codim2.locus import Locus
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.pieces import pieces_of, typical_state
 from rodfem.output.words import words_of
@@ -34,6 +31,7 @@ def one_sided() -> Diagram:
     return trace(rod, Discretization(elements=3, degree=4), Plan(depth=0, at=(6.0,)))
 
 
+@pytest.mark.ranks
 def test_a_spring_at_the_tip_on_one_side() -> None:
     """The column is on the kink at all loads; to the free side it falls at 2 pi^2/4: it was called stable to 15."""
     found = one_sided()
@@ -43,7 +41,6 @@ def test_a_spring_at_the_tip_on_one_side() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_the_reason_is_the_kink_wherever_one_reads_it(tmp_path: Path) -> None:
     """No eigenvalue is near zero at P = 6: the least one is that of a load 9 or 1 below a critical one."""
     found = one_sided()
@@ -70,7 +67,6 @@ def test_the_reason_is_the_kink_wherever_one_reads_it(tmp_path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
-@pytest.mark.alone
 def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
     soft = lambda k: ufl.conditional(ufl.lt(abs(k), 1.0), 0.5 * k**2, 0.1 * k**2 + 0.8 * abs(k) - 0.4)  # noqa: E731
     rod = column(
@@ -135,7 +131,6 @@ def lateral(threshold: float) -> Diagram:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_loci_and_modes_have_no_bar_beyond_a_kink(tmp_path: Path) -> None:
     for threshold, kink in ((10.0, False), (0.2, True)):
         found = lateral(threshold)

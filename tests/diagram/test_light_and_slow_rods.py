@@ -5,8 +5,6 @@ for a mass of one: it is positive up to ``tan a = a``, P = 20.190728556, and pas
 critical: the statics of a cantilever under a follower load is regular at every load (Beck 1952).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, hypot, pi, sin, sqrt
 from typing import Any
@@ -34,8 +32,6 @@ from rodfem.codim2.follow import NEAREST
 from rodfem.continuation.kinds import END
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 POLE = 20.190728556
 

@@ -1,7 +1,5 @@
 """A load asked for that is an end of the range: its states are known once, and branches found there end there."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise
 from math import hypot
@@ -13,8 +11,6 @@ from scipy.optimize import brentq
 
 from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, pinned, trace
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 LEAN = 0.05
 HIGH = 6.0

@@ -1,7 +1,5 @@
 """Equilibria of a sweep on one path, and at a load that one iteration does not reach."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,12 +10,9 @@ import ufl
 from hard.paths import MESH, imperfect
 from hard.two_freedoms import scene as two_freedoms
 
-from rodfem import Attachment, Discretization, Inertia, Parameter, Plan, Scene, Solver, trace
+from rodfem import Attachment, ConvergenceError, Discretization, Inertia, Parameter, Plan, Scene, Solver, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.equilibria import at_load
-from rodfem.errors import ConvergenceError
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.long

@@ -1,7 +1,5 @@
 """Scenes that differ in constants alone share their equations, and have the diagrams of scenes of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -12,10 +10,8 @@ from classics import SUPPORTS, column
 from demo_cases import module
 
 import rodfem
-from rodfem import Diagram, Discretization, Inertia, Plan, Scene, Solver, clamped, free
-from rodfem.errors import SceneError
+from rodfem import Diagram, Discretization, Inertia, Plan, Scene, SceneError, Solver, clamped, free
 
-pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 4)
 Statement = Callable[..., Scene]
 

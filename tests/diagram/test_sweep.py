@@ -1,7 +1,5 @@
 """Sweeps of frequencies: which eigenvalue goes on from which, flutter at the start of a range, the picture."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from io import StringIO
 
@@ -12,17 +10,11 @@ from closed_forms import column, double, flutter
 from hemitropic_cases import specials
 from scipy.optimize import brentq
 
-from rodfem import Inertia, Ordinate, Plan, compat, free
+from rodfem import Branch, Discretization, End, Inertia, Ordinate, Plan, Scene, Solver, compat, free, trace
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import Branch
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.fields import Discretization
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_frequencies import curves, ranges_of
-from rodfem.problem.ends import End
-from rodfem.problem.scene import Scene
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 PILE = 64
@@ -37,6 +29,7 @@ def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tup
     return diagram[0], diagram.data, out.getvalue()
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("span", "loads"),
@@ -60,7 +53,6 @@ def test_flutter_at_any_torque(span: tuple[float, float], loads: int, monkeypatc
     assert all(p.negative > 0 for p in branch.points if p.load != 0.0)
 
 
-@pytest.mark.alone
 def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
     """The strong plane's frequency passes between those of the weak one, each a curve of one motion: Beck's column."""
     branch, data, _ = swept(classics.partly_following(1.0, (0.0, 25.0)), monkeypatch)
@@ -80,7 +72,6 @@ def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thrust that follows in part: one plane diverges, holds again and flutters, before the other one diverges."""
     share, strong = 0.45, 3.0
@@ -101,7 +92,6 @@ TURNING = brentq(lambda x: np.tan(x) - np.tanh(x), 3.8, 4.0)
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize(("length", "stiffness"), [(1.0, 1.0), (1e-3, 7e-13), (1e-3, 3e-5), (1e4, 1e9)])
 def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
     length: float, stiffness: float, monkeypatch: pytest.MonkeyPatch
@@ -131,6 +121,7 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
     assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,7 +138,6 @@ def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytes
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("twisting", [1e-3, 1e-4])
 @pytest.mark.usefixtures("few_loads")
 def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
@@ -173,7 +163,6 @@ def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
     assert (state.negative, state.stable) == (2, False)
 
 
-@pytest.mark.alone
 def test_what_petsc_keeps_of_matrices_is_destroyed(monkeypatch: pytest.MonkeyPatch) -> None:
     """PETSc keeps what is destroyed until all ranks clean up: 39 kB a state here, unless they do."""
     solver, cleaned = Solver(classics.beck(), Discretization("pointwise", 4, 6)).equilibria, list[int]()

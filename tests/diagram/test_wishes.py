@@ -1,7 +1,5 @@
 """A notebook's lines: what a person types first, each of which does what it says; tables, and the page."""
 
-from __future__ import annotations
-
 import pydoc
 from pathlib import Path
 
@@ -14,8 +12,6 @@ from hemitropic_cases import scene
 import rodfem
 from rodfem import Diagram, InputError, Plan, Scene
 from rodfem.app import console
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Compiled assembly against dolfinx's own, of every scene."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from dolfinx import fem
@@ -9,15 +7,13 @@ from golden_cases import cases, distinct
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import Discretization, compat
-from rodfem.diagram.solver import Solver
+from rodfem import Discretization, Solver, compat
 
 EXACT = 1e-14
 """Relative difference of sums that are added up in another order."""
 
 
 @pytest.mark.few(2)
-@pytest.mark.alone
 @pytest.mark.parametrize("name", distinct())
 def test_forms_of_every_scene(name: str) -> None:
     """Energy, equations, Jacobian with and without the load, and kinetic metric, at bent states of a graded mesh."""

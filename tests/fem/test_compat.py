@@ -1,7 +1,5 @@
 """What the bridge to dolfinx promises, whatever its release."""
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 
@@ -13,10 +11,8 @@ from hemitropic_cases import follower, run_demo, scene
 from mpi4py import MPI
 from numpy.polynomial import legendre
 
-from rodfem import compat
-from rodfem.errors import SetupError
+from rodfem import Discretization, SetupError, compat
 from rodfem.fem import form_compiler
-from rodfem.fem.fields import Discretization
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 
@@ -33,13 +29,11 @@ def lobatto(degree: int) -> np.ndarray:
     return (np.array([-1.0, *np.sort(inner), 1.0]) + 1) / 2
 
 
-@pytest.mark.alone
 @DEGREES
 def test_nodes_are_those_of_lobatto(degree: int) -> None:
     np.testing.assert_allclose(np.sort(compat.nodes(degree)), lobatto(degree), rtol=0, atol=1e-14)
 
 
-@pytest.mark.alone
 @DEGREES
 def test_basis_is_nodal_and_reproduces_polynomials(degree: int) -> None:
     x = np.linspace(0, 1, 17)
@@ -49,6 +43,7 @@ def test_basis_is_nodal_and_reproduces_polynomials(degree: int) -> None:
     np.testing.assert_allclose(basis @ compat.nodes(degree) ** degree, x**degree, rtol=0, atol=1e-13)
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_fields_have_the_nodes_of_their_elements() -> None:
     """A linear function of arclength, set at what ``coordinates`` says are the nodes, has the slope one everywhere."""
@@ -62,6 +57,7 @@ def test_fields_have_the_nodes_of_their_elements() -> None:
     assert COMM.allreduce(error) < 1e-20
 
 
+@pytest.mark.ranks
 def test_lobatto_quadrature_collocates() -> None:
     """With the rule of the unit-norm constraint the mass matrix is diagonal, and holds that rule's weights."""
     degree, elements, length = 4, 5, 3.0
@@ -85,6 +81,7 @@ def test_lobatto_quadrature_collocates() -> None:
     )  # zeros first, of the constants
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_a_second_system_compiles_nothing() -> None:
     """Otherwise every run would compile again what is in the cache, and say so."""
@@ -96,7 +93,6 @@ def test_a_second_system_compiles_nothing() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_forms_are_compiled_beside_this_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All that the cache lacks, in two modules; begun ahead, they are found there; and what fails says why."""
     monkeypatch.setattr(compat, "C_COMPILER", {KEYWORD: {"cache_dir": str(folder)}})
@@ -121,7 +117,6 @@ def test_forms_are_compiled_beside_this_process(folder: Path, monkeypatch: pytes
         form_compiler.compile_forms([x**4 * ufl.dx])
 
 
-@pytest.mark.alone
 def test_options_in_the_current_folder_change_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Files that FFCx and dolfinx read would change what is compiled, and one that is no JSON would end the run."""
     monkeypatch.chdir(folder)
@@ -139,6 +134,7 @@ def test_options_in_the_current_folder_change_nothing(folder: Path, monkeypatch:
     assert (said, len(compat._OPTION_FILES)) == ([], 2)
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_complex_petsc_gives_one_sentence(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
@@ -154,6 +150,7 @@ def test_complex_petsc_gives_one_sentence(
         assert (out, err.count("\n"), err[:7]) == ("", 1, "error: ")
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_least_stretch_is_that_of_all_elements() -> None:
     """Of equal waves, which elements have at other places between their samples; on whatever number of ranks."""

@@ -1,7 +1,5 @@
 """A ring under a dead radial load: what depends on the arclength is no symmetry, and what is claimed is verified."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import pi
@@ -80,6 +78,7 @@ def circle_at(found: BranchSolver, p: float) -> Any:
     return x
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     "p", [pytest.param(0.5, marks=pytest.mark.alone), 4.5, pytest.param(9.5, marks=pytest.mark.alone)]
@@ -97,7 +96,6 @@ def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) 
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_special_points_of_the_circle() -> None:
     """It buckles in its plane at n^2, on top of the rotation."""
     plan = Plan((0.3, 9.5), depth=0, steps=StepControl(first=0.05, largest=0.15), error_bars=False)
@@ -121,6 +119,7 @@ LOADS: list[tuple[Callable[[Any], Any] | None, Any, list[str]]] = [
 ]
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize(("load", "potential", "motions"), LOADS)
 def test_symmetries_of_a_loaded_ring(load: Any, potential: Any, motions: list[str]) -> None:
@@ -133,7 +132,6 @@ def test_symmetries_of_a_loaded_ring(load: Any, potential: Any, motions: list[st
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_a_false_symmetry_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rotation of the ring is none: claimed, it is dropped at the first state, and said to be."""
     found = rodfem.fem.system.find_symmetries

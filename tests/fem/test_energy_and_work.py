@@ -1,14 +1,11 @@
 """The reported energy is the potential of the discrete equations: it changes by the work of what moves the ends."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from classics import bow
 
 from rodfem import Discretization, Solver
 
-pytestmark = pytest.mark.alone
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 

@@ -1,7 +1,5 @@
 """Numbers in the functions of a scene are values of its compiled forms, not part of their text."""
 
-from __future__ import annotations
-
 from math import pi
 from typing import Any
 
@@ -11,12 +9,9 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from rodfem import Discretization, Ordinate, Plan, Scene, Solver, clamped, compat, free, trace
+from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, Solver, clamped, compat, free, trace
 from rodfem.fem import form_compiler
 from rodfem.fem.equations import with_constants
-from rodfem.problem.scene import Parameter
-
-pytestmark = pytest.mark.alone
 
 COMM = MPI.COMM_WORLD
 

@@ -1,7 +1,5 @@
 """The registry of formulations: what is in it is offered, checked and chosen by name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import classics
@@ -9,12 +7,9 @@ import demo_cases as demos
 import pytest
 from problem.test_remedies import parser
 
-from rodfem.errors import InputError
+from rodfem import InputError, Scene
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.fem.formulations import AUTO, FORMULATIONS, Formulation, names
-from rodfem.problem.scene import Scene
-
-pytestmark = pytest.mark.alone
 
 HOME = Path(__file__).parents[2]
 

@@ -1,7 +1,5 @@
 """Rods that nothing keeps from turning about their axis, under moments without a potential."""
 
-from __future__ import annotations
-
 from functools import cache
 from math import pi
 from typing import Any
@@ -41,6 +39,7 @@ def straight(found: BranchSolver, load: float) -> Any:
 KINDS = pytest.mark.parametrize("kind", ["moment", "follower_moment"])
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @KINDS
 def test_symmetries_without_a_potential(kind: str) -> None:
@@ -48,6 +47,7 @@ def test_symmetries_without_a_potential(kind: str) -> None:
     assert names == {"rotation about e3", "turning of the cross-sections about d3"}
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @KINDS
 @pytest.mark.parametrize("method", ["shift-invert", "reduction", "dense"])
@@ -61,7 +61,6 @@ def test_frequencies_beside_the_free_motion(kind: str, method: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @KINDS
 def test_greenhill_between_pins(kind: str) -> None:
     """The straight rod diverges at M = 2 pi (Greenhill 1883)."""
@@ -73,7 +72,6 @@ def test_greenhill_between_pins(kind: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @KINDS
 def test_a_motion_that_a_load_drives(kind: str) -> None:
     """A moment at one end that nothing balances turns the rod for ever."""

@@ -1,7 +1,5 @@
 """Rods that are symmetric but for little, or for what is round-off next to a stiff strain; rings along themselves."""
 
-from __future__ import annotations
-
 from math import pi
 from typing import Any
 
@@ -10,9 +8,8 @@ import ufl
 from classics import SUPPORTS, column
 from hard.published import pressed
 
-from rodfem import Discretization, End, Ordinate, Plan, Scene, Solver, free, hinged, pinned, trace
+from rodfem import Discretization, End, Ordinate, Plan, Scene, SceneError, Solver, free, hinged, pinned, trace
 from rodfem.continuation.kinds import BRANCH_POINT
-from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 
 
@@ -28,6 +25,7 @@ def hinge(bending: float, spring: float) -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize("bending", [*(pytest.param(b, marks=pytest.mark.alone) for b in (1.0, 1e6, 1e12)), 1e9])
 def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
@@ -36,6 +34,7 @@ def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
     assert system.symmetries == []
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize("bending", [1.0, 1e9])
 def test_a_rotation_that_springs_allow_is_one(bending: float) -> None:
@@ -49,7 +48,6 @@ def test_a_rotation_that_springs_allow_is_one(bending: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_it_is_undecided_where_the_spring_is_round_off() -> None:
     (branch,) = trace(hinge(1e10, 0.5), Discretization(elements=3, degree=4), Plan(depth=0))
     assert not any(point.stable for point in branch.points if point.load > 1.0)
@@ -63,7 +61,6 @@ CURVATURE, LEAST = 4e-9, 3e-5
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
     """A round rod on pins, with a curvature that a stiff twist hides: its lowest eigenvalues are 1 - P/pi^2.
 
@@ -81,6 +78,7 @@ def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
     assert {(point.negative, point.zero) for point in rows} == {(0, 1)}
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_a_pendulum_beside_a_stiff_twist_falls() -> None:
     """A rod on a ball joint, pulled and then pushed at its tip by a small force w: both rotations have mu = w.
@@ -99,7 +97,6 @@ def test_a_pendulum_beside_a_stiff_twist_falls() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_a_ring_that_is_bent_a_little_moves_along_itself() -> None:
     """Translations apart, a circle has its rotation in the plane alone, which is its motion along itself, too.
 
@@ -116,6 +113,7 @@ def test_a_ring_that_is_bent_a_little_moves_along_itself() -> None:
     assert drifts == {0.0: circle, 1e-8: circle, 3e-5: circle + 1, 1e-4: circle + 1, 1e-2: circle + 1}
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_the_derivative_of_tanh_of_large_numbers() -> None:
     """UFL has it as 2 cosh(x) / (cosh(2 x) + 1), which overflows, where tanh(x) is one."""

@@ -1,7 +1,5 @@
 """Functions that the rule of the elements does not integrate: said, and right on the mesh that is asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from math import isfinite, isnan, pi, sqrt, tan
@@ -18,7 +16,6 @@ from scipy.optimize import brentq
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, trace
 from rodfem.fem.checks import QuadratureCheck
 
-pytestmark = pytest.mark.alone
 STEEP, WIDTH = 0.786, 1e-3
 NOT = "does not integrate the equations about s = "
 

@@ -1,7 +1,5 @@
 """Reactions and profiles against statics and a shooting solution: forces and moments of the whole rod balance."""
 
-from __future__ import annotations
-
 import csv
 import json
 from math import cos, pi, sin
@@ -18,7 +16,6 @@ from rodfem import Attachment, Discretization, Ordinate, Parameter, Plan, Scene,
 from rodfem.forms.energy import bending_and_twist, hemitropic
 from rodfem.output.states import to_csv
 
-pytestmark = pytest.mark.alone
 TIP = (0.15, 0.1, 0.9)
 FORCE = (0.4, -0.3, 0.2)
 

@@ -1,7 +1,5 @@
 """Contact forces and moments against statics: balances of which the stored energy knows nothing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,14 +8,11 @@ import pytest
 from problem.test_docs import scenes
 
 import rodfem
-from rodfem.diagram.solver import Solver
-from rodfem.fem.fields import Discretization
+from rodfem import Discretization, Parameter, Scene, Solver
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.states import Profiles
 from rodfem.problem.quaternions import directors
-from rodfem.problem.scene import Parameter, Scene
 
-pytestmark = pytest.mark.alone
 ELEMENTS, DEGREE, LOAD = 6, 5, 2.0
 FORCE = (0.6 * LOAD, 0.8 * LOAD, -LOAD)
 BOWED = Scene(

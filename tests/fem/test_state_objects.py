@@ -1,7 +1,5 @@
 """A state owns its numbers: no other state, load or parameter that is evaluated meanwhile changes them."""
 
-from __future__ import annotations
-
 import ast
 from dataclasses import replace
 from math import pi
@@ -11,13 +9,11 @@ import numpy as np
 import pytest
 from small_states import plain
 
+from rodfem import Discretization, Ordinate, Parameter, Scene, clamped
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.fem.fields import Discretization
 from rodfem.fem.state import State, line
 from rodfem.fem.system import System
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.ends import clamped
-from rodfem.problem.scene import Ordinate, Parameter, Scene
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -33,6 +29,7 @@ def numbers(state: State) -> np.ndarray:
     return np.concatenate([out.array_r, image.array_r, [state.energy(), state.load], state.turned.ravel()])
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("name", ["cord", "ruler", "hemitropic"])
@@ -49,6 +46,7 @@ def test_numbers_stay_when_another_state_is_evaluated(name: str) -> None:
         state.local[0] = 1.0
 
 
+@pytest.mark.ranks
 def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
     system, x = plain("hemitropic", "reduced", 4, 3, 0.2)
     x = x.copy()
@@ -64,6 +62,7 @@ def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
     np.testing.assert_array_equal(system.at(x).generators, generators)
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.versions
 @pytest.mark.short
@@ -99,7 +98,6 @@ def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> 
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_only_states_write_where_forms_read() -> None:
     """``fields.u`` is named by the equations, in UFL, and by the state; frozen objects are completed by themselves."""
     for path in sorted(SOURCES.rglob("*.py")):
@@ -112,6 +110,7 @@ def test_only_states_write_where_forms_read() -> None:
         assert ast.unparse(tree).count("object.__setattr__") == allowed, where
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @pytest.mark.short
 def test_stale_factors_refuse() -> None:
@@ -135,6 +134,7 @@ def test_stale_factors_refuse() -> None:
     assert again.nearest(1)[0] == pytest.approx(values, rel=1e-3)
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_a_stale_pencil_refuses() -> None:
     """Its eigenvalues and its mass are those of another state; the name of a motion is its own."""

@@ -1,7 +1,5 @@
 """Continuous symmetries that are found from the equations, first equilibria far from the start, and linking numbers."""
 
-from __future__ import annotations
-
 from math import hypot, pi, sqrt
 
 import numpy as np
@@ -11,16 +9,12 @@ from demo_cases import scene
 from hemitropic_cases import DEFAULT
 from hemitropic_cases import scene as hemitropic
 
+from rodfem import Discretization, End, Plan, Ring, Solver, clamped, free, pinned, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
-from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import relax
 from rodfem.fem.shape import link
 from rodfem.fem.system import FEW, System
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.ends import End, Ring, clamped, free, pinned
 from rodfem.problem.functions import Constants
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
@@ -90,6 +84,7 @@ CASES = [
 ]
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize(("rod", "reduced", "pointwise"), CASES)
 def test_number_of_symmetries(rod: Scene, reduced: int, pointwise: int) -> None:
@@ -98,7 +93,6 @@ def test_number_of_symmetries(rod: Scene, reduced: int, pointwise: int) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize(("rod", "expected"), [(scene("cord"), 0), (hemitropic(DEFAULT), 1), (scene("ruler"), 0)])
 def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
     """Those of many unknowns are sought with few elements."""
@@ -107,6 +101,7 @@ def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
     assert len(system.symmetries) == expected
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_generators_are_null_vectors(formulation: str) -> None:
@@ -128,7 +123,6 @@ def test_generators_are_null_vectors(formulation: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_round_rods_that_shear() -> None:
     """A ring of round sections, stiff in shear, buckles where Michell's does; the number of its zeros is that one's.
 
@@ -144,7 +138,6 @@ def test_round_rods_that_shear() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_first_equilibrium_far_from_the_start() -> None:
     """A coiled rod let go from straight: Newton's method alone does not get there, going downhill does."""
     coiled = Scene(
@@ -167,7 +160,6 @@ def test_first_equilibrium_far_from_the_start() -> None:
     assert solver.energy(x) > 5
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("turns", [-1, 0, 3])
 def test_link_of_a_twisted_circle(turns: int) -> None:
     s = np.linspace(0, 2 * np.pi, 97)
@@ -180,6 +172,7 @@ def test_link_of_a_twisted_circle(turns: int) -> None:
     assert (Tw, Wr) == pytest.approx((turns, 0.0), abs=1e-4)
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("second", "number"), [(1.2, 0), (1.01, 0), (1.0, 1)])
 @pytest.mark.parametrize("twisting", [pytest.param(1.0, marks=pytest.mark.alone), 1e7])

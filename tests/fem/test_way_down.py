@@ -1,7 +1,5 @@
 """The way down from a saddle: what a damped step does along itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hard.fuzz import wider
@@ -12,6 +10,8 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import displaced_saddle
 from rodfem.fem.newton import along, linear_step
 from rodfem.stability.pencil import Blocks
+
+pytestmark = pytest.mark.ranks
 
 
 @pytest.fixture(scope="module")

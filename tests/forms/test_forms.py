@@ -1,7 +1,5 @@
 """Rotations, strains, energy and symmetry in pure UFL, against scipy's rotations and exact curves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from rodfem.forms.symmetry import cross, left, right
 from rodfem.problem import quaternions
 from rodfem.problem.quaternions import CONJUGATE, directors, of_vector
 
-pytestmark = [pytest.mark.alone, pytest.mark.versions]
+pytestmark = pytest.mark.versions
 
 Q = np.array([0.9, -0.3, 0.5, 0.2]) * 1.7  # of no particular length
 P = np.array([0.1, 0.7, -0.4, 0.6])

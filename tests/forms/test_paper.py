@@ -1,7 +1,5 @@
 """The second variation by hand against UFL's: pointwise, on a finite element space, and as elements shrink."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -26,8 +24,6 @@ from rodfem.forms.loads import follower_work
 from rodfem.forms.rotation import product, rotation
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.stability.pencil import Blocks
-
-pytestmark = pytest.mark.alone
 
 STATES = [
     ("cord", "reduced", 40.0),

@@ -3,8 +3,6 @@
 Work is counted with the error bars that ``tests/diagram/test_golden.py`` computes.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

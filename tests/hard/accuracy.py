@@ -1,7 +1,5 @@
 """An accuracy asked for in place of a mesh, of scenes whose special points are known: ``Plan(accuracy=...)``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Hard by what happens: branch points and folds near each other, at one load, in one step, at the end of a range."""
 
-from __future__ import annotations
-
 from math import erf, inf, log, pi
 from typing import Any
 

@@ -1,17 +1,13 @@
 """A hard case: what makes it hard, what is promised, and what is measured of it against a closed form or a source."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
 
-from rodfem import Diagram, Discretization, Plan, Scene, trace
-from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem import Branch, ConvergenceError, Diagram, Discretization, InputError, Plan, Scene, SpecialPoint, trace
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
-from rodfem.errors import ConvergenceError, InputError
 
 SINGULAR = (FOLD, BRANCH_POINT, IMPERFECT)
 """Kinds of special points at which an eigenvalue vanishes."""

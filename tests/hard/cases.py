@@ -1,7 +1,5 @@
 """All hard cases: what makes each hard, what is promised, where it comes from, and for which values it is measured."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from hard import (

@@ -1,7 +1,5 @@
 """Critical loads of classical problems with closed forms: on coarse and fine meshes, and in other units."""
 
-from __future__ import annotations
-
 from math import inf
 
 from hard.case import Change, Measured, compare, run, said, singular

@@ -1,7 +1,5 @@
 """Long branches and many scenes in one process: time, memory, open files and communicators stay what they are."""
 
-from __future__ import annotations
-
 import gc
 import os
 import time

@@ -1,7 +1,5 @@
 """What runs leave in their folders; programs that are interrupted."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

@@ -14,8 +14,6 @@ is that of a straight heavy rod.  Unlike the weightless rod of :mod:`hard.writhi
 axis: moments and forces at the first clamp are six unknowns.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

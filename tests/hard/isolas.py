@@ -1,7 +1,5 @@
 """Isolas: closed branches that no other branch meets, found by a search and followed around once."""
 
-from __future__ import annotations
-
 from math import inf, sqrt
 from typing import Any
 

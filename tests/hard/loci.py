@@ -1,7 +1,5 @@
 """Hard because a locus may be a curve of something else: of a mean, of the other side of a gap, of round-off."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from math import acos, inf, pi
@@ -13,8 +11,7 @@ from diagram.test_close_critical_loads import BECK
 from hard.case import Measured, run
 from hard.two_freedoms import scene as two_freedoms
 
-from rodfem import Diagram, Discretization, Parameter, StepControl, clamped, free
-from rodfem.codim2.locus import Locus
+from rodfem import Diagram, Discretization, Locus, Parameter, StepControl, clamped, free
 from rodfem.continuation.kinds import CROSSES
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist

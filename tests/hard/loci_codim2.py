@@ -1,7 +1,5 @@
 """Hard because points of codimension two on a locus look alike, hide in one step, or have no solution at them."""
 
-from __future__ import annotations
-
 from math import inf, sqrt
 
 import numpy as np

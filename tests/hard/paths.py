@@ -1,7 +1,5 @@
 """Hard because a sweep may lose its path: before a fold, past an imperfect bifurcation, on an orbit."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from itertools import pairwise

@@ -6,8 +6,6 @@ any width from 1e-3 to 1; now and then two of both planes are one, so that eigen
 direction or in opposite ones, and now and then one is that of a row.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from math import exp, inf, sqrt

@@ -1,7 +1,5 @@
 """Hard cases of the literature, each against its closed form or its published value."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import hypot, inf, pi, sqrt
 from typing import Any

@@ -1,7 +1,5 @@
 """Ranges of the load of any width about, at and beside branch points, in either direction; loads asked for there."""
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np

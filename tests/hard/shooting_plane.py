@@ -8,8 +8,6 @@ The plane is that of e1 and e3; the section at ``s`` has the angle ``a``, with `
     a' = k0 + m/B,    r' = (n.d1/GA) d1 + (1 + n.d3/EA) d3,    n' = -f,    m' = x' n_z - z' n_x.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any

@@ -12,8 +12,6 @@ The index of a rod whose ends are both held is the number of its conjugate point
 is singular (Manning, Rogers & Maddocks 1998, Proc. R. Soc. A 454; Hoffman 2004).  Derivatives are by complex steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -119,7 +117,7 @@ class Branch:
         scale: Sequence[float],
         span: tuple[float, float],
         back: float | None = None,
-    ) -> Branch:
+    ) -> "Branch":
         """Continue from a guess of all unknowns at the load ``span[0]`` until the load leaves ``span``.
 
         Or, if it is given, until the load has turned and comes back to ``back``.

@@ -9,8 +9,6 @@ the angle b of the tip, where no moment acts, the angle t of the clamp is explic
 hysteresis (Dhanakoti 2024, arXiv 2407.07601).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import inf, pi, sqrt
 from typing import Any

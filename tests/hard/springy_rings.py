@@ -10,8 +10,6 @@ Its critical loads are those of a symmetric matrix of Fourier coefficients, whic
 of the n-gon a mode of m waves is double, unless 2 m is a multiple of n.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import classics

@@ -1,7 +1,5 @@
 """Hard by their numbers: stiff against bending, meshes of any size and degree, rotations of many turns."""
 
-from __future__ import annotations
-
 from math import inf, pi, sqrt, tan
 
 import classics

@@ -1,11 +1,7 @@
 """An accuracy asked for is kept, or it is said that it is not, of scenes whose special points are known."""
 
-from __future__ import annotations
-
 import pytest
 from hard.accuracy import at
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.few(2)

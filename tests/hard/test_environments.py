@@ -3,8 +3,6 @@
 Each is either no trouble, or one sentence.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -25,7 +23,6 @@ import rodfem
 from rodfem import compat
 from rodfem.fem import form_compiler
 
-pytestmark = pytest.mark.alone
 RUN = "import sys; from rodfem.app.console import main; main(sys.argv[1:])"
 SMALL = ("--step", "0.15", "--no-figures", "--elements", "4", "--degree", "2", "--depth", "0")
 

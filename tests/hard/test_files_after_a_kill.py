@@ -1,7 +1,5 @@
 """Files of a folder in which a run was killed at any moment, or the disk was full, or another run goes on."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource
@@ -20,10 +18,8 @@ from hemitropic_cases import scene
 from mpi4py import MPI
 
 import rodfem
+from rodfem import Diagram, InputError, load_json
 from rodfem.app.run import Terminal, run
-from rodfem.diagram.diagram import Diagram
-from rodfem.errors import InputError
-from rodfem.output.files import load_json
 from rodfem.output.states import check_run
 from rodfem.whole_files import DRAFTS, LOCK, locked
 
@@ -77,7 +73,6 @@ def saved_by(diagram: Diagram, folder: Path, its: int) -> None:
             os.write(its, b".")
 
 
-@pytest.mark.alone
 def test_a_kill_at_any_moment(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     """Files are those of one run, all that was finished is there, and the next run finds no drafts."""
     earlier, later = diagrams
@@ -130,6 +125,7 @@ def files_of_at_most(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @pytest.mark.short
 def test_a_full_disk(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
@@ -158,6 +154,7 @@ def test_a_full_disk(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
 
 
+@pytest.mark.ranks
 def test_files_of_two_runs(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     for diagram in diagrams:
         diagram.save(folder / diagram.scene.name)
@@ -171,7 +168,6 @@ def test_files_of_two_runs(folder: Path, diagrams: tuple[Diagram, Diagram]) -> N
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_same_input_same_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Byte for byte, but for times, their date among them, and the name of the run."""
     monkeypatch.setattr("rodfem.diagram.diagram.uuid4", lambda: type("name", (), {"hex": "one"}))
@@ -184,6 +180,7 @@ def test_same_input_same_files(folder: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert (folder / "first" / "states.h5").read_bytes() == (folder / "second" / "states.h5").read_bytes()
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_a_second_run_in_a_folder(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     """It is refused on every rank while the first one lives, and goes on when that was killed."""

@@ -1,7 +1,5 @@
 """A few of the random scenes of ``python -m tests.hard.fuzz``, each traced twice and counted densely."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -11,8 +9,6 @@ from hard.fuzz.oracle import Oracle
 from hard.fuzz.scenes import scene
 
 from rodfem import Discretization, Plan, Solver, trace
-
-pytestmark = pytest.mark.alone
 
 SCENES = [
     *((1, 50), (1, 9), (1, 21), (1, 37), (1, 57), (7, 110), (12, 253), (15, 73)),

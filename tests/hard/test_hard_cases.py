@@ -1,7 +1,5 @@
 """Every hard case in small: it is right, or it says what it could not decide, where that is what is promised."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,6 @@ from hard import bifurcations
 from hard.case import Case
 from hard.cases import CASES, SAID
 
-pytestmark = pytest.mark.alone
 CONTRACT = Path(__file__).parents[2] / "docs" / "resolution.md"
 APART = "loci"
 """A group that has a file of its own."""

@@ -1,7 +1,5 @@
 """Every hard case of a locus in small: each row to its uncertainty, and the curve ends where its special point does."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -11,8 +9,6 @@ from hard.cases import CASES
 from hard.test_hard_cases import APART, value_of
 
 from rodfem.codim2.locus import COARSE
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.parametrize(("case", "value"), [value_of(case, value) for case in CASES[APART] for value in case.few])

@@ -1,7 +1,5 @@
 """Programs that are interrupted, or one of their ranks: a sentence, a status, nothing left running or half written."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -20,7 +18,6 @@ HEMITROPIC = ("demos/hemitropic.py", "--no-figures", "--verbose", "--output")
 MAP = ("demos/map.py", "--couplings", "200", "--output")
 LIMIT = 30
 SECOND_BRANCH, ROD = "branch 1 from", "rods"
-pytestmark = pytest.mark.alone
 
 
 @dataclass

@@ -1,7 +1,5 @@
 """Numerical faults, made on purpose at a chosen moment: the branch ends with the reason, the others go on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
@@ -16,14 +14,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import rodfem
+from rodfem import ConvergenceError, Diagram, InputError, Observer, many, run
 from rodfem.adaptivity.error_estimate import Enriched
-from rodfem.app.many import many
-from rodfem.app.run import run
 from rodfem.continuation import branch_solver
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.observer import Observer
-from rodfem.diagram.diagram import Diagram
-from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
@@ -66,6 +60,7 @@ def failing(method: Callable[..., Any], when: Callable[[], bool], fault: Callabl
     return instead
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.versions
 @pytest.mark.parametrize(
@@ -94,6 +89,7 @@ def test_a_branch_ends_and_others_go_on(
     assert on.saved == 3
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 def test_a_step_with_nan_is_retried(whole: Diagram, monkeypatch: pytest.MonkeyPatch) -> None:
     """One correction that gives no numbers costs a smaller step, and changes nothing else."""
@@ -114,7 +110,6 @@ def test_a_step_with_nan_is_retried(whole: Diagram, monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose([load for _, load in found], [load for _, load in expected], rtol=0, atol=1e-9)
 
 
-@pytest.mark.alone
 def test_no_error_is_estimated_where_memory_is_exhausted(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = [0]
 
@@ -130,6 +125,7 @@ def test_no_error_is_estimated_where_memory_is_exhausted(monkeypatch: pytest.Mon
     assert [w for w in diagram.warnings if "Memory is exhausted" in w and w.startswith("No error was estimated at lam")]
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.versions
 @pytest.mark.parametrize(
@@ -157,7 +153,6 @@ def test_a_sweep_keeps_what_it_has(
     assert rodfem.load_json(folder / "diagram.json")["branches"][0]["ended"] == branch.ended
 
 
-@pytest.mark.alone
 def test_many_rods_go_on(folder: Path) -> None:
     rods = [demo_cases.scene("cord", turns=turns) for turns in (1.0, 1.5, 2.0)]
 
@@ -171,6 +166,7 @@ def test_many_rods_go_on(folder: Path) -> None:
     assert found[1]["error"].startswith("Memory is exhausted")
 
 
+@pytest.mark.ranks
 @pytest.mark.short
 @pytest.mark.parametrize("name", ["constant", "number", "ordinate", "discretisation", "plan"])
 def test_ranks_with_different_input(name: str) -> None:
@@ -190,6 +186,7 @@ def test_ranks_with_different_input(name: str) -> None:
         rodfem.trace(stated, mesh, plan)
 
 
+@pytest.mark.ranks
 def test_an_ordinate_that_is_no_number() -> None:
     """It is one in the trial states, and none in those of the branch."""
     rod = scene(span=(0.0, 0.1))

@@ -4,8 +4,6 @@ The thrust on a column is a parabola in a parameter, and at its greatest about a
 critical of the column is known: flutter of Beck's, divergence of one whose thrust follows the tip in part.
 """
 
-from __future__ import annotations
-
 from math import inf, sqrt
 from typing import Any
 

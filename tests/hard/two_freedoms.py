@@ -5,8 +5,6 @@ that nothing bends.  Stretch and twist are uniform, so that the energy is ``u^2/
 two variables, whatever the mesh.  ``U`` is given as ``V - u^2/2 - f^2/2``, where V is what is to be examined.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

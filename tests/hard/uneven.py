@@ -4,8 +4,6 @@ Small deflections of a column follow linear equations ``y' = A(s) y``.  They are
 expansion of fourth order (Iserles & Norsett 1999), which are graded about the place where the column varies.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import reduce
 from math import pi

@@ -10,8 +10,6 @@ Turning the rod in space, and its sections back, changes nothing: the reference 
 not ask for the rotation of the end about its moment, which follows from the others.
 """
 
-from __future__ import annotations
-
 from math import pi, sqrt
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The benchmarks' own arithmetic, and the boundary value problems for other programs."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from types import ModuleType
@@ -18,8 +16,6 @@ from benchmarks.speed.tables import fastest
 from benchmarks.targets import TARGETS
 
 DOCS = Path(__file__).parents[2] / "docs"
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.few(1)

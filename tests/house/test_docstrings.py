@@ -1,7 +1,5 @@
 """Docstrings of the interface name what it takes and raises; pages name files, functions and tests that exist."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator
@@ -16,8 +14,6 @@ MANY = 4
 """Number of parameters from which a docstring describes all of them."""
 OWN = ("__init__", "__post_init__", "__call__")
 """Methods whose parameters the docstring of the class may describe."""
-
-pytestmark = pytest.mark.alone
 
 
 def interface() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef, str]]:

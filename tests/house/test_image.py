@@ -1,19 +1,13 @@
 """``tools/image.py`` agrees with the record itself, and sees a digit, an index and a branch that are others."""
 
-from __future__ import annotations
-
 import copy
 import json
 import runpy
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 image = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "image.py"))
 RECORDED = json.loads(image["RECORD"].read_text())[image["CASE"]]
-
-pytestmark = pytest.mark.alone
 
 
 def test_the_record_agrees_and_other_numbers_are_seen() -> None:

@@ -33,8 +33,6 @@ FORMS = "rodfem.forms"
 MATHEMATICS = ("ufl", FORMS, "__future__", "collections", "dataclasses", "typing")
 """All that the mathematics in ``forms`` may import; ``rodfem.forms.importing`` may import the standard library."""
 
-pytestmark = pytest.mark.alone
-
 
 @cache
 def modules() -> dict[str, ast.Module]:

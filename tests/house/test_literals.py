@@ -1,18 +1,12 @@
 """A small number in the body of a function has a name, or a comment on its line."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 HOME = Path(__file__).parents[2]
 SMALL, FAINT = 1e-2, 1e-5
 """A literal below this has a name; in ``output``, where larger ones are sizes in drawings, below the latter."""
-
-pytestmark = pytest.mark.alone
 
 
 def nameless(source: str, small: float) -> Iterator[tuple[int, float]]:

@@ -1,15 +1,10 @@
 """The faults of ``python -m tests.mutations`` still have their places in the code, and tests that there are."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
-import pytest
 from mutations import FAULTS, planted
 
 HOME = Path(__file__).parents[2]
-
-pytestmark = pytest.mark.alone
 
 
 def test_every_fault_has_a_place() -> None:

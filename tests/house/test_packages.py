@@ -1,7 +1,5 @@
 """What people install: the wheel and the source distribution have what they should, and the wheel works."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -25,8 +23,6 @@ LEFT = shutil.ignore_patterns(
 """What tools leave in a working copy: the patterns of ``.gitignore``, and the repository itself."""
 SUFFIXES = {".py", ".pyi", ".c", ".js", ".css", ".html", ".md", ".typed", ""}
 """Ends of the names of the files of the package; licences of what the report contains have none."""
-
-pytestmark = pytest.mark.alone
 
 
 def tracked() -> set[str]:

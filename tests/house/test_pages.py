@@ -1,7 +1,5 @@
 """Links of the documentation lead somewhere, and those into the code to the line that they name."""
 
-from __future__ import annotations
-
 import re
 import runpy
 from functools import cache
@@ -14,8 +12,6 @@ import rodfem
 HOME = Path(__file__).parents[2]
 links = runpy.run_path(str(HOME / "docs" / "links.py"))
 TARGET = re.compile(r"\]\((?!https?:|mailto:)([^)\s#]*)(?:#([^)\s]+))?\)")
-
-pytestmark = pytest.mark.alone
 
 
 def prose(page: Path) -> str:

@@ -1,19 +1,16 @@
 """The same results on any number of ranks: each rank computes the whole problem once more by itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hemitropic_cases import explored, follower, scene
 from mpi4py import MPI
 
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
+from rodfem import Discretization, Plan, trace
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @pytest.mark.parametrize("formulation", [pytest.param("reduced", marks=pytest.mark.short), "pointwise"])
 def test_ranks_change_nothing(formulation: str) -> None:

@@ -1,7 +1,5 @@
 """Every command of README and docs/running.md, in their order: what a reader types, one after the other."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -29,8 +27,6 @@ HERE = ("run", "info", "convert")
 PATIENCE = 300
 OURS = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_btl": "self,vader"}
 OURS |= {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg", "HWLOC_HIDE_ERRORS": "2", "OMPI_MCA_mpi_yield_when_idle": "1"}
-
-pytestmark = pytest.mark.alone
 
 
 def pages() -> str:

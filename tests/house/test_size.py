@@ -3,8 +3,6 @@
 When a figure has fallen for good, lower the one here.  What is added has to be paid with what is taken out elsewhere.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from functools import cache
@@ -25,8 +23,6 @@ MOST = {
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
 INTERNALS = ("ufl.", "ffcx.")
-
-pytestmark = pytest.mark.alone
 
 
 @cache

@@ -1,7 +1,5 @@
 """What a type checker, ``help`` and the interpreter's start make of the package from outside."""
 
-from __future__ import annotations
-
 import ast
 import pydoc
 import re
@@ -21,8 +19,6 @@ UNUSED = (
     *("scipy.optimize", "scipy.interpolate", "scipy.spatial", "scipy.integrate"),
 )
 """Modules that a run without pictures does not need, each a part of the time that a person waits for it."""
-
-pytestmark = pytest.mark.alone
 
 
 def test_stub_and_lazy_exports_are_the_same() -> None:

@@ -1,7 +1,5 @@
 """The elimination along a chain against dense linear algebra, and against MUMPS on matrices of every scene."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -17,10 +15,8 @@ from small_states import scene as small_scene
 
 import rodfem.linalg
 import rodfem.linalg.chain
-from rodfem import Discretization, Plan, trace
+from rodfem import ConvergenceError, Discretization, InputError, Plan, Solver, trace
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.diagram.solver import Solver
-from rodfem.errors import ConvergenceError, InputError
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Mumps
 
@@ -32,7 +28,6 @@ BACKWARD = 1e-14
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_random_chains(symmetric: bool) -> None:
     rng, tried, delayed = np.random.default_rng(3), 0, 0
@@ -54,7 +49,6 @@ def test_random_chains(symmetric: bool) -> None:
     assert delayed > 100
 
 
-@pytest.mark.alone
 def test_what_cannot_be_factored() -> None:
     """Exactly singular, no number; and a pattern is learnt anew for another matrix."""
     dense = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -67,7 +61,6 @@ def test_what_cannot_be_factored() -> None:
     assert factors.regular and factors.inertia() == (1, 0)
 
 
-@pytest.mark.alone
 def test_an_unknown_package(monkeypatch: pytest.MonkeyPatch) -> None:
     options = PETSc.Options()
     options["rodfem_lu_pc_factor_mat_solver_type"] = "superglue"
@@ -99,7 +92,6 @@ class Both:
 
 
 @pytest.mark.few(12)
-@pytest.mark.alone
 @pytest.mark.parametrize("name", distinct())
 def test_matrices_of_every_scene(name: str) -> None:
     """Second variations at bent states, with shifts on both sides of zero, and bordered Jacobians."""
@@ -124,7 +116,6 @@ def test_matrices_of_every_scene(name: str) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("name", ["cord", "hemitropic", "ruler"])
 def test_beside_special_points(name: str, formulation: str) -> None:
@@ -144,7 +135,6 @@ def test_beside_special_points(name: str, formulation: str) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize(("formulation", "elements", "degree"), [("reduced", 3000, 1), ("reduced", 400, 6)])
 def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) -> None:
     """Couplings to the contact force add up along the rod: a scale by their largest entry would delay them all."""
@@ -158,7 +148,6 @@ def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) ->
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
     compiler = shutil.which("gcc")
     assert compiler is not None
@@ -185,7 +174,6 @@ def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("scene", ["cord", "hemitropic"])
 def test_the_last_resort(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any room for delayed pivots MUMPS makes factors, the diagram is the same, and it says so."""

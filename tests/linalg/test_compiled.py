@@ -1,7 +1,5 @@
 """Compiled modules export no name, and what they keep pointers to lives as long."""
 
-from __future__ import annotations
-
 import gc
 import shutil
 import subprocess
@@ -16,7 +14,7 @@ from hard.test_environments import form
 from rodfem import compat
 from rodfem.linalg import compiled
 
-pytestmark = [pytest.mark.alone, pytest.mark.versions]
+pytestmark = pytest.mark.versions
 NAMES = [str(file.relative_to(compiled.PACKAGE).with_suffix("")) for file in compiled.PACKAGE.rglob("*.c")]
 
 

@@ -1,15 +1,12 @@
 """MUMPS's factors on one rank and on several, against dense linear algebra on the same matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import small_states
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.diagram.solver import Solver
-from rodfem.fem.fields import Discretization
+from rodfem import Discretization, Solver
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Mumps, Sizes

@@ -1,14 +1,10 @@
 """Gram-Schmidt in a metric, against dense linear algebra, for vectors that are nearly dependent."""
 
-from __future__ import annotations
-
 import numpy as np
-import pytest
 from petsc4py import PETSc
 
 from rodfem.linalg.orthogonal import orthonormalize, project_out
 
-pytestmark = pytest.mark.alone
 SIZE = 12
 
 

@@ -1,7 +1,5 @@
 """Classical problems of the stability of rods against closed forms, frequency equations and values from literature."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, pi, sin, sqrt, tan
 from typing import Any
@@ -18,8 +16,6 @@ from shooting_solver import Rod
 
 from rodfem import Discretization, End, Plan, Scene, Solver, clamped, free, trace
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-
-pytestmark = pytest.mark.alone
 
 
 def root(f: Callable[[float], float], a: float, b: float) -> float:

@@ -1,7 +1,5 @@
 """The telephone cord against closed forms for the straight state and for the planar coils, and against shooting."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np
@@ -13,8 +11,6 @@ from scipy.optimize import brentq
 from shooting_solver import Problem, Rod
 
 from rodfem.continuation.branch import Point
-
-pytestmark = pytest.mark.alone
 
 AT = (39.9, 40.0, 40.1)
 K0 = 3 * pi

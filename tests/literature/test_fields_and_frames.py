@@ -1,7 +1,5 @@
 """Rods that rotate, that carry a current, that are bent between forks, and a frame: closed forms and shooting."""
 
-from __future__ import annotations
-
 from math import cos, pi, sin, sqrt
 from typing import Any
 
@@ -31,8 +29,6 @@ from rodfem import (
 )
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 FIRST = Plan(depth=0)
 

@@ -1,7 +1,5 @@
 """The rod under a follower load against the frequency equation of Beck's column, solved in complex arithmetic."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 from functools import cache
@@ -16,15 +14,9 @@ from demo_cases import scene
 from hemitropic_cases import specials
 from mpi4py import MPI
 
-from rodfem import Ordinate, clamped, free
-from rodfem.continuation.branch import Branch
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.solver import Solver
-from rodfem.fem.fields import Discretization
+from rodfem import Branch, Discretization, Ordinate, Solver, clamped, free, trace
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
-
-pytestmark = pytest.mark.alone
 
 DEMO = Path(__file__).parents[2] / "demos" / "follower.py"
 

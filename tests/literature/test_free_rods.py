@@ -1,7 +1,5 @@
 """Rods that nothing holds: rigid motions are their symmetries, and a thrust makes them flutter."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import hypot, pi
 
@@ -30,8 +28,6 @@ from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import RIGID
-
-pytestmark = pytest.mark.alone
 
 ROOTS = [brentq(lambda x: np.cos(x) - 1 / np.cosh(x), (n + 0.4) * pi, (n + 0.6) * pi, xtol=1e-14) for n in (1, 2, 3)]
 FREQUENCIES = np.square(ROOTS)

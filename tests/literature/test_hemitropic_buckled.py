@@ -1,7 +1,5 @@
 """Buckled branches against solutions of the boundary value problem by multiple shooting (see reference_values.py)."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np
@@ -13,17 +11,10 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipk
 
-from rodfem.continuation.branch import Branch
+from rodfem import Branch, Discretization, Ordinate, Plan, Scene, pinned, trace
 from rodfem.continuation.kinds import BRANCH_POINT
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.ends import pinned
-from rodfem.problem.scene import Ordinate, Scene
-
-pytestmark = pytest.mark.alone
 
 AT = (0.2, 0.325, 0.5, 0.7, 0.9)
 RICH = (16, 8)

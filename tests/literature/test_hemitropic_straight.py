@@ -1,7 +1,5 @@
 """Where the straight rod buckles: loads, indices and rates of convergence against the closed form."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import closed_form_hemitropic
@@ -28,12 +26,12 @@ def buckling_points(formulation: str, elements: int, degree: int, constants: Con
 
 
 @pytest.mark.few(3)
-@pytest.mark.alone
 @pytest.mark.parametrize("constants", REFERENCE)
 def test_closed_form(constants: Constants) -> None:
     np.testing.assert_allclose(closed_form_hemitropic.loads(*constants), REFERENCE[constants], rtol=0, atol=1e-14)
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
@@ -46,7 +44,6 @@ def test_loads_of_both_formulations(formulation: str) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize("constants", REFERENCE)
 def test_loads_and_indices(constants: Constants) -> None:
     """Eigenvalues cross zero in pairs, and return where the thrust's destabilising part 10 lam (1 - lam) declines."""
@@ -63,7 +60,6 @@ def test_loads_and_indices(constants: Constants) -> None:
             assert (p.negative, p.zero) == (closed_form_hemitropic.index(p.load, *constants), 0)
 
 
-@pytest.mark.alone
 def test_straight_states() -> None:
     """Stretch 1 - lam, no displacement, and the energy 5 lam^2 per unit length."""
     for p in explored("reduced", 12, 6, depth=0)[0].points:
@@ -73,7 +69,6 @@ def test_straight_states() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("formulation", "degree", "meshes"),
     [

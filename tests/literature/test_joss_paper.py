@@ -1,11 +1,7 @@
 """The journal paper: its sections, its length, its citations, and numbers that a page of the documentation has, too."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
-
-import pytest
 
 HOME = Path(__file__).parents[2]
 TEXT = (HOME / "paper" / "paper.md").read_text().partition("\n---\n")[2]
@@ -13,8 +9,6 @@ SECTIONS = [
     *("Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"),
     *("Availability", "References"),
 ]
-
-pytestmark = pytest.mark.alone
 
 
 def test_sections_and_length() -> None:

@@ -1,7 +1,5 @@
 """More rods against closed forms and equations of their linearised states: rings, strips, torques, tension, signs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import hypot, pi, sqrt
 from typing import Any
@@ -32,8 +30,6 @@ from rodfem import (
 )
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability import METHODS
-
-pytestmark = pytest.mark.alone
 
 FIRST = Plan(depth=0)
 B, C = 1.0, 0.7

@@ -3,8 +3,6 @@
 Linear elements; the constraints ``C`` of the pointwise formulation have multipliers at nodes, as the paper's.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import demo_cases
@@ -19,8 +17,6 @@ from rodfem import Discretization, Plan
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import cayley_shift
 from rodfem.stability.dependence import smallest_singular
-
-pytestmark = pytest.mark.alone
 
 PAGE = (Path(__file__).parents[2] / "docs" / "paper.md").read_text()
 MIDPOINT = [(0.5, 1.0)]

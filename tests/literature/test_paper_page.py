@@ -1,7 +1,5 @@
 """Numbers of docs/paper.md and docs/theory: each is on its page, and right to its last digit."""
 
-from __future__ import annotations
-
 import json
 import re
 from math import pi, sqrt
@@ -22,8 +20,6 @@ from rodfem import Discretization, Plan
 HOME = Path(__file__).parents[2]
 GOLDEN = json.loads((HOME / "tests" / "golden" / "numbers.json").read_text())
 HEMITROPIC = (-3.0, 1.0, 1.0, 3.0)
-
-pytestmark = pytest.mark.alone
 
 
 def special(name: str, branch: str, number: int) -> dict[str, Any]:

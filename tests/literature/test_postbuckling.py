@@ -1,7 +1,5 @@
 """Initial postbuckling (Koiter): coefficients in closed form, what turns back at once, and sides that differ."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 from typing import Any
 
@@ -13,7 +11,6 @@ import rodfem
 from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Ring, Scene, clamped, pinned, sliding
 from rodfem.forms.energy import bending_and_twist
 
-pytestmark = pytest.mark.alone
 ACROSS = Ordinate("middle", s=0.5, of=lambda r, q: float(r[0]))
 PINNED = (pinned(), pinned(ON_AXIS, push))
 ONCE = Plan(depth=1)

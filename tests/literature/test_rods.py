@@ -1,7 +1,5 @@
 """Rods of all kinds against closed forms, transcendental equations and exponentials of constant matrices."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import acos, exp, hypot, pi, sqrt
 from typing import Any
@@ -18,8 +16,6 @@ import rodfem
 from rodfem import Discretization, Inertia, Ordinate, Ring, Scene, at, clamped, free, hinged, pinned, sliding
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist, logarithmic_stretch
-
-pytestmark = pytest.mark.alone
 
 Found = Callable[[float], float]
 MASS = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0))

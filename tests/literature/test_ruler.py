@@ -1,7 +1,5 @@
 """The ruler against shooting: bending in its plane, lateral buckling, and what it does afterwards."""
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np
@@ -12,8 +10,6 @@ from scipy.optimize import newton
 from shooting_solver import Problem, Rod
 
 from rodfem.continuation.branch import Point
-
-pytestmark = pytest.mark.alone
 
 AT = (5.95, 6.0, 6.05)
 STIFFNESS = (1.0, 10.0, 1.0)

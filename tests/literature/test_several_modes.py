@@ -1,7 +1,5 @@
 """Branch points at which several different motions become unstable, by the quartic terms of the energy (Koiter)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import hypot, pi, sin, sqrt
 from typing import Any
@@ -15,8 +13,6 @@ from scipy.special import ellipj, ellipk
 import rodfem
 from rodfem import Attachment, Ordinate, Plan, Scene, pinned
 from rodfem.forms import loads
-
-pytestmark = pytest.mark.alone
 
 S = 0.37
 """Where no mode of interest has a node."""

@@ -1,7 +1,5 @@
 """Rods on a surface: the force of the surface, and that and the moment in the rod, against closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +10,8 @@ import ufl
 import rodfem
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped, everywhere, free, hinged, pinned, sliding
 from rodfem.forms.energy import bending_and_twist
+
+pytestmark = pytest.mark.ranks
 
 R, RADIUS, PRESSURE = 0.8, 0.01, 10.0
 LOW = (-RADIUS, 0.0, 0.0)

@@ -1,7 +1,5 @@
 """The programs of docs/trades and docs/how-to.md assert the numbers of others that they print."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -11,8 +9,6 @@ from rodfem import Diagram
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [DOCS / "how-to.md", *sorted((DOCS / "trades").glob("[a-z]*.md"))]
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -1,7 +1,5 @@
 """A strut between two smooth walls, as barriers that are large, or not defined, far away from it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import pi
 from typing import Any
@@ -12,7 +10,6 @@ import ufl
 from rodfem import Ordinate, Parameter, Plan, Scene, pinned, trace
 from rodfem.forms.energy import bending_and_twist
 
-pytestmark = pytest.mark.alone
 HALF, STEEP, WEAK = 0.05, 0.001, 1e-4
 EXPONENTIAL = pi**2, lambda x, c: STEEP * (ufl.exp((x.r[0] - HALF) / STEEP) + ufl.exp((-x.r[0] - HALF) / STEEP))
 LOGARITHM = pi**2 + 2 * WEAK / (pi * HALF) ** 2, lambda x, c: -WEAK * ufl.ln(1 - (x.r[0] / HALF) ** 2)

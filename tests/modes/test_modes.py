@@ -1,7 +1,5 @@
 """Modes against closed forms, finite differences of the shape and of the energy; files, pictures, the command line."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,17 +16,12 @@ from scipy.spatial.transform import Rotation
 from small_states import buckled, plain
 from small_states import solver as solver_of
 
+from rodfem import ConvergenceError, Discretization, InputError, Scene, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram.solver import Solver
-from rodfem.errors import ConvergenceError, InputError
-from rodfem.fem.fields import Discretization
 from rodfem.modes.finder import ModeFinder, Motions
 from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
 from rodfem.output.plot_modes import FRAMES, RISING, amplitude, draw_modes
-from rodfem.problem.scene import Scene
-
-pytestmark = pytest.mark.alone
 
 FINE = Discretization("reduced", 6, 6)
 METHODS = ("shift-invert", "cayley", "slicing", "reduction")

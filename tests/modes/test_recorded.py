@@ -1,7 +1,5 @@
 """Modes that every run records: closed forms at the states of a diagram, what files hold of them, what they change."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -13,16 +11,12 @@ import pytest
 from modes.test_modes import shape
 
 import rodfem
-from rodfem.diagram.plan import Plan
-from rodfem.errors import ConvergenceError
-from rodfem.fem.fields import Discretization
+from rodfem import ConvergenceError, Discretization, Plan, Scene
 from rodfem.modes.finder import FEWEST, ModeFinder
 from rodfem.modes.modes import Typical, typical_of
-from rodfem.problem.scene import Scene
 from rodfem.ranks import in_words
 from rodfem.report.page import payload_of
 
-pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 6)
 
 

@@ -1,7 +1,5 @@
 """Files for other programs, read again by these programs' own readers."""
 
-from __future__ import annotations
-
 import csv
 import json
 from math import pi
@@ -13,11 +11,8 @@ import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Discretization, Plan
-from rodfem.app.run import run
+from rodfem import Discretization, Plan, run
 from rodfem.output.states import to_csv, to_vtkhdf
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """What a run leaves: diagram.json, states.h5 and a picture, from the command line of the demo."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Files that are corrupt, cut off, foreign or of another version: refused in one sentence by every reader."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable
@@ -16,13 +14,11 @@ import pytest
 from mpi4py import MPI
 
 import rodfem
-from rodfem import Discretization, Plan
+from rodfem import Discretization, InputError, Plan
 from rodfem.app import console
-from rodfem.errors import InputError
 from rodfem.output import plot_modes, render
 from rodfem.whole_files import draft_of, locked
 
-pytestmark = pytest.mark.alone
 SCENE = hemitropic_cases.scene(span=(0.0, 0.1))
 
 

@@ -1,7 +1,5 @@
 """Formats of files: versions are checked, and docs/files.md has the entries that runs write, no more and no fewer."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import defaultdict
@@ -17,24 +15,18 @@ from mpi4py import MPI
 from problem.test_docs import page, scenes
 
 import rodfem
-from rodfem.app.many import many
-from rodfem.app.run import run
+from rodfem import Discretization, InputError, Parameter, Plan, Scene, Solver, many, run
 from rodfem.continuation.branch import Unexplained
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
-from rodfem.errors import InputError
-from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM, FORMATS, LOCUS, MODES, PROGRAM, RESULT, STATES
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output import plot_modes, render
 from rodfem.output.files import load_state
 from rodfem.output.plot_locus import draw_locus
-from rodfem.problem.scene import Parameter, Scene
 
 HOME = Path(__file__).parents[2]
 PAGE = (HOME / "docs" / "files.md").read_text()
 MESH, POINTWISE = Discretization("auto", 4, 6), Discretization("pointwise", 4, 6)
-pytestmark = [pytest.mark.alone, pytest.mark.versions]
+pytestmark = pytest.mark.versions
 
 
 def column() -> Scene:

@@ -1,7 +1,5 @@
 """The glossary has an entry for each word that tables, files and pictures use."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -17,7 +15,6 @@ from rodfem.output.style import LINES as STYLES
 from rodfem.output.table import COLUMNS, ENTRIES, NAMES, PAGE, REMARK, SPECIAL, explanation
 
 HOME = Path(__file__).parents[2]
-pytestmark = pytest.mark.alone
 
 
 def test_every_word_has_an_entry() -> None:

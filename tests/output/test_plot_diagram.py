@@ -1,7 +1,5 @@
 """Diagrams drawn from hand-made dictionaries: what is seen of stability, and of what a branch does not explain."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +24,6 @@ from rodfem.output.plot_diagram import (
 )
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.style import PALETTE
-
-pytestmark = pytest.mark.alone
 
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """What pictures draw: supports, loads and cross-sections as files record them, directions of view, the state chosen."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from math import cos, pi, sin, sqrt
 from pathlib import Path
@@ -14,7 +12,7 @@ import pytest
 import ufl
 from matplotlib.image import imread
 
-from rodfem.errors import InputError
+from rodfem import Attachment, Inertia, InputError, Ordinate, Parameter, Scene, at, everywhere, integral
 from rodfem.file_format import STATES
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
@@ -22,12 +20,10 @@ from rodfem.output.glyphs import SIDES, Look, glyphs_of, profile_of, turn
 from rodfem.output.pieces import typical_state
 from rodfem.output.render import _read, draw_shape_safely, view_of
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
-from rodfem.problem.contribution import Attachment, at, everywhere, integral
 from rodfem.problem.ends import End, clamped, elastic, free, hinged, pinned, sliding
-from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.problem.supports import foundation_of, supports_of, ties_of, write, write_section
 
-pytestmark = [pytest.mark.alone, pytest.mark.versions]
+pytestmark = pytest.mark.versions
 
 E1, E2, E3 = np.eye(3)
 S = np.linspace(0.0, 1.0, 31)

@@ -1,7 +1,5 @@
 """A diagram in sentences: what is known of classical rods, and of diagrams made by hand."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from math import pi
@@ -12,8 +10,6 @@ import golden_cases
 import pytest
 
 from rodfem.output.summary import in_sentences
-
-pytestmark = pytest.mark.alone
 
 
 def branch(name: str, loads: list[float], negative: list[int], **more: Any) -> dict[str, Any]:

@@ -1,19 +1,14 @@
 """A ball on a circle: a column whose tip runs on one buckles at tan k = k (1 - R/v3), k^2 = N v3, N = EA (1 - v3)."""
 
-from __future__ import annotations
-
 from math import pi, tan
 
 import pytest
 from scipy.optimize import brentq
 
 import rodfem
-from rodfem import Ordinate, Scene, circular_guide, clamped
-from rodfem.errors import SceneError
+from rodfem import Ordinate, Scene, SceneError, circular_guide, clamped
 
 EA = 500.0
-
-pytestmark = pytest.mark.alone
 
 
 def column(radius: float, planar: str | None = None) -> Scene:

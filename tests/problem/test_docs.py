@@ -1,7 +1,5 @@
 """What the documentation shows can be stated, and happens."""
 
-from __future__ import annotations
-
 import io
 import json
 import re
@@ -20,15 +18,9 @@ from scipy.optimize import fsolve
 from scipy.special import ellipe, ellipk
 from shooting_solver import Problem, Rod
 
+from rodfem import Branch, Discretization, Plan, Scene, trace
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import Branch
-from rodfem.diagram.diagram import trace
-from rodfem.diagram.plan import Plan
-from rodfem.fem.fields import Discretization
 from rodfem.problem.functions import needs_centreline
-from rodfem.problem.scene import Scene
-
-pytestmark = pytest.mark.alone
 
 PAGE = Path(__file__).parents[2] / "docs" / "rods.md"
 

@@ -1,7 +1,5 @@
 """Mistakes in Python: each is refused in one sentence that names it, before anything is computed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -41,8 +39,6 @@ from rodfem.diagram import solver
 from rodfem.errors import InputError, SceneError
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 NAN, INF, HUGE, TINY = math.nan, math.inf, 1e308, 1e-320
 TIP = free(force=lambda c: (0, 0, -c.P))

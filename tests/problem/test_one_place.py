@@ -1,7 +1,5 @@
 """What acts at an end does not vary along the rod, what acts at one place is one; a mass alone is a slender rod's."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 from typing import Any
 
@@ -24,6 +22,8 @@ from rodfem import (
     trace,
 )
 from rodfem.errors import SceneError
+
+pytestmark = pytest.mark.ranks
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """The rods of docs/real-rods.md in SI units: each number beside its hand calculation, as the page asserts it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -12,8 +10,6 @@ from numpy.polynomial import Chebyshev, Polynomial
 from rodfem import Diagram
 
 PAGE = Path(__file__).parents[2] / "docs" / "real-rods.md"
-
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.long

@@ -1,7 +1,5 @@
 """Remedies name arguments: each exists in Python and has an option of the command line, which is named there."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re
@@ -22,7 +20,7 @@ COMMAND_LINE = ("app/cli.py", "app/main.py", "app/console.py")
 PROGRAMS = (*COMMAND_LINE, "output/plot_modes.py", "output/plot_diagram.py", "output/render.py")
 """Modules that are run themselves, and may know their own options."""
 
-pytestmark = [pytest.mark.alone, pytest.mark.versions]
+pytestmark = pytest.mark.versions
 
 
 def parser() -> Parser:

@@ -1,7 +1,5 @@
 """Bad input ends with one sentence and status 2, before anything is computed."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from math import cos, pi
 from pathlib import Path
@@ -11,18 +9,13 @@ import numpy as np
 import pytest
 import ufl
 
-from rodfem import trace
-from rodfem.app.run import run
-from rodfem.diagram.plan import Plan
-from rodfem.errors import InputError, SceneError
+from rodfem import Attachment, InputError, Plan, SceneError, at, integral, load_json, run, trace
 from rodfem.fem.fields import Discretization, Fields
-from rodfem.output.files import load_json
 from rodfem.problem import contribution, ends
-from rodfem.problem.contribution import Attachment, at, integral
 from rodfem.problem.ends import End, Ring, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
-pytestmark = [pytest.mark.alone, pytest.mark.versions]
+pytestmark = pytest.mark.versions
 
 
 def ordinate(s: float = 0.0) -> Ordinate:

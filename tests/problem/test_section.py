@@ -1,18 +1,14 @@
 """Cross-sections: stiffnesses against integrals, double series and tables that the package does not use."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped, free, section
-from rodfem.errors import InputError
+from rodfem import Discretization, InputError, Ordinate, Parameter, Plan, Scene, clamped, free, section
 
 STEEL = {"E": 210e9, "nu": 0.3, "density": 7850.0}
-pytestmark = pytest.mark.alone
 
 
 @pytest.mark.few(1)

@@ -1,7 +1,5 @@
 """A hinge that slides along any direction: against closed forms, the elastica by shooting, and the plain hinge."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, hypot, radians, sin
 from pathlib import Path
@@ -14,14 +12,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, run, sliding_hinge, trace
+from rodfem import Discretization, End, InputError, Ordinate, Plan, Scene, Solver, clamped, run, sliding_hinge, trace
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import Look
 from rodfem.output.render import _read
 from rodfem.output.style import STEEL
-from rodfem.problem.ends import End
-
-pytestmark = pytest.mark.alone
 
 E2 = (0.0, 1.0, 0.0)
 TAN = 4.493409457909064**2

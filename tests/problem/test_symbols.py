@@ -1,7 +1,5 @@
 """Functions of a scene that take another branch for expressions than for numbers are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -10,11 +8,8 @@ import pytest
 import ufl
 from classics import column
 
-from rodfem import Attachment, Inertia, Ordinate, Scene, clamped, free
-from rodfem.errors import SceneError
+from rodfem import Attachment, Inertia, Ordinate, Scene, SceneError, clamped, free
 from rodfem.forms.energy import bending_and_twist
-
-pytestmark = pytest.mark.alone
 
 OTHER = "as a function of numbers and .* as an expression of its constants"
 SOFT, STIFF = (1.0, 1.0, 1.0), (9.0, 9.0, 9.0)

@@ -1,7 +1,5 @@
 """Tables along the rod and paths of the load, against analytic functions and a boundary value problem."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import hypot, pi
@@ -92,6 +90,7 @@ def found(scene: Scene, mesh: Discretization = MESH, *, sure: bool = True) -> tu
     return special.point.load, special.error_estimate, diagram.warnings
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize(
     ("rows", "pieces", "says"), [(30, 8, 2.578878879037), (1001, 1, 2.577330385411), (10_000, 1, 0)]
 )
@@ -104,6 +103,7 @@ def test_linear_between_rows(rows: int, pieces: int, says: float) -> None:
     assert abs(load - expected) <= error < 1e-9 and not warnings
 
 
+@pytest.mark.ranks
 def test_cubic_splines() -> None:
     """Between 30 rows the spline is another function than the sine, between 400 the same one."""
     s = np.linspace(0.0, 1.0, 30)
@@ -115,6 +115,7 @@ def test_cubic_splines() -> None:
     assert abs(load - sine[0]) <= error < 1e-9 and not warnings
 
 
+@pytest.mark.ranks
 def test_what_elements_do_not_see_is_said() -> None:
     """A stiffness with noise of one percent buckles as its harmonic mean, polynomials bend as its arithmetic one."""
     s = np.linspace(0.0, 1.0, 1001)
@@ -124,6 +125,7 @@ def test_what_elements_do_not_see_is_said() -> None:
     assert load / buckling(lambda x: np.interp(x, s, EI), s, 1) - 1 == pytest.approx(6e-5, rel=0.2)
 
 
+@pytest.mark.ranks
 def test_a_layer_in_an_element_stays_positive() -> None:
     """Polynomials overshoot a stiffness that rises by fifty within 0.01: they are drawn to its mean."""
     s = np.linspace(0.0, 1.0, 1001)
@@ -133,6 +135,7 @@ def test_a_layer_in_an_element_stays_positive() -> None:
     assert abs(np.array(loads) / expected - 1) == pytest.approx([0, 0], abs=0.1) and abs(loads[1] / expected - 1) < 1e-3
 
 
+@pytest.mark.ranks
 def test_curvature_load_and_mass() -> None:
     def helix(s: Any, sin: Any, cos: Any) -> tuple[Any, ...]:
         return (2 * cos(3 * s), 6 + sin(5 * s), 1 + 0 * s)
@@ -170,6 +173,7 @@ def moved(place: Callable[[Any], Any], turn: Any, push: Any, span: Sequence[floa
     return trace(scene, MESH, Plan(depth=0, **plan))
 
 
+@pytest.mark.ranks
 def test_a_smooth_path_is_its_function() -> None:
     """Every row, with its tangent and the work of the load, is that of the same scene with UFL's functions."""
     t = np.linspace(0.0, 1.0, 1000)
@@ -185,6 +189,7 @@ def test_a_smooth_path_is_its_function() -> None:
         assert (p.energy, p.conjugate) == pytest.approx((q.energy, q.conjugate), rel=1e-6, abs=1e-7)
 
 
+@pytest.mark.ranks
 def test_corners_are_rows() -> None:
     """There and back: a row at each corner, and the same special point; rows as with the straight pieces alone."""
     t, r = [0.0, 0.3, 0.55, 1.0], np.array([[0, 0, 1], [0.3, 0, 0.8], [0.3, 0.4, 0.7], [0, 0.1, 0.6]])
@@ -204,6 +209,7 @@ def test_corners_are_rows() -> None:
     assert [a.ordinate, b.ordinate] == pytest.approx([c.ordinate] * 2, abs=1e-10)
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 def test_corners_in_a_sweep() -> None:
     """A follower load that grows in pieces: flutter where it is with a load that grows evenly."""
@@ -247,13 +253,13 @@ S = np.linspace(0.0, 1.0, 5)
         (lambda: moved(path(S, np.ones((5, 2))), None, None, (0.0, 1.0)), "position of the right end has 2 components"),
     ],
 )  # fmt: skip
-@pytest.mark.alone
 def test_sentences(make: Callable[[], Any], words: str) -> None:
     with pytest.raises(SceneError, match=words) as raised:
         make()
     assert str(raised.value).count("\n") == 0
 
 
+@pytest.mark.ranks
 def test_numbers() -> None:
     """With numbers a table is a function of numbers."""
     assert tabulated(S, S**2)(0.125) == 0.03125 and tabulated(S, S**3, 3)(0.3) == pytest.approx(0.027)
@@ -262,6 +268,7 @@ def test_numbers() -> None:
     assert turn(0.5) == pytest.approx((np.cos(pi / 8), 0, 0, np.sin(pi / 8)))
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize("mesh", [Discretization("pointwise"), Discretization(factors="petsc")])
 def test_both_formulations_and_factors(mesh: Discretization) -> None:
     load, error, warnings = found(column(tabulated(np.linspace(0, 1, 1001), wave(np.linspace(0, 1, 1001)))), mesh)

@@ -1,7 +1,5 @@
 """A diagram does not depend on the units in which its scene is stated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import demo_cases
@@ -44,6 +42,7 @@ def column(length: float, stiffness: float, rod: str) -> Scene:
     )
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize("units", [(1.0, 1e-35), (1e4, 1e-21)])
 def test_index_where_the_stiffness_is_lost_beside_the_constraints(units: tuple[float, float]) -> None:
@@ -90,7 +89,6 @@ def pushed(length: float, stiffness: float, mass: float) -> Scene:
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize(("length", "force"), [(1e-9, 1e-12), (1e4, 1e9)])
 @pytest.mark.parametrize("elements", [2, 8])
 def test_frequencies_of_a_cantilever(length: float, force: float, elements: int) -> None:
@@ -107,6 +105,7 @@ def test_frequencies_of_a_cantilever(length: float, force: float, elements: int)
     assert pencil.asymmetry()[0] == 4
 
 
+@pytest.mark.ranks
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "units"), [("cord", (7.0, 1e6)), ("hemitropic", (1e-3, 1e6))])
 def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> None:
@@ -129,7 +128,6 @@ BAR = ["classic haringx", "classic bow", "classic Beck"]
 
 
 @pytest.mark.few(1)
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("name", "units"),
     [
@@ -148,7 +146,6 @@ def test_recorded_scenes(name: str, units: tuple[float, ...]) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 @pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
 def test_methods(method: str) -> None:
     """Eigenvalues of a flexible rod by each method, in the kinetic metric of unit rotary inertia."""

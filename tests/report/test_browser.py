@@ -4,8 +4,6 @@ It needs Debian's ``chromium`` and ``chromium-driver``, and ``pip install "rodfe
 skipped, unless ``RODFEM_BROWSER=required`` says, as in ``.ci/run``, that it must run.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import re
@@ -25,8 +23,7 @@ from PIL import Image
 from problem.test_docs import scenes
 from scipy.ndimage import uniform_filter
 
-from rodfem.app.run import run
-from rodfem.diagram.plan import Plan
+from rodfem import Plan, run
 from rodfem.output.glyphs import POINT
 from rodfem.report.page import page_of, payload_of
 
@@ -60,7 +57,6 @@ IN_PLANE = """const plot = document.getElementById("loci"), { xaxis, yaxis } = p
 """Where the plane of loci has a point."""
 
 pytestmark = [
-    pytest.mark.alone,
     pytest.mark.skipif(
         not (REQUIRED or (CHROMIUM and DRIVER)), reason="needs apt-get install chromium chromium-driver"
     ),

@@ -1,7 +1,5 @@
 """What a report says and shows, against closed forms: labels, words, writhe, shapes, placed bodies, packed arrays."""
 
-from __future__ import annotations
-
 import base64
 import json
 from itertools import pairwise
@@ -18,8 +16,6 @@ from rodfem.output.words import readings_of, words_of
 from rodfem.report.branches import _spectrum, _without_noise, html_of, packed, plain, plain_of, script_json
 from rodfem.report.rods import shapes_of
 from rodfem.writhe import writhe
-
-pytestmark = pytest.mark.alone
 
 
 def special(row: int, kind: str = "branch point", before: int = 0, after: int = 1, **more: Any) -> dict[str, Any]:

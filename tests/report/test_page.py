@@ -1,7 +1,5 @@
 """The page of a report: made from files alone, whole, without network, and harmless whatever its texts are."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess
@@ -14,14 +12,11 @@ import pytest
 from output.test_formats import MESH, RUNS
 from problem.test_docs import scenes
 
+from rodfem import InputError, Plan, run
 from rodfem.app import console
-from rodfem.app.run import run
-from rodfem.diagram.plan import Plan
-from rodfem.errors import InputError
 from rodfem.report.page import STATIC, page_of, payload_of
 
 HOSTILE = "</script><img src=x onerror=alert(1)>{{payload}}"
-pytestmark = pytest.mark.alone
 
 
 class Elements(HTMLParser):

@@ -1,7 +1,5 @@
 """One verdict from all methods, the paper's among them; nasty pencils; the band of the count; the constraints' rank."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,21 +14,15 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from small_states import buckled, plain, scene
 
+from rodfem import ConvergenceError, Discretization, Inertia, InputError, Plan, SceneError, Solver
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
-from rodfem.errors import ConvergenceError, InputError, SceneError
-from rodfem.fem.fields import Discretization
 from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
 from rodfem.kumar_healey.null_space import kernel
 from rodfem.kumar_healey.reduction import ReducedPencil, cayley_shift
-from rodfem.problem.scene import Inertia
 from rodfem.stability import METHODS, find
 from rodfem.stability.assessment import Assessor, Method
 from rodfem.stability.dependence import named, smallest_singular, weak_combinations
 from rodfem.stability.pencil import Blocks, Pencil
-
-pytestmark = pytest.mark.alone
 
 SMALL = (6, 3)
 SOLVERS = [name for name in METHODS if name != "count"]

@@ -1,7 +1,5 @@
 """Round-off of eigenvalues that meet, against errors of a dense matrix's entries drawn at random."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,8 +15,6 @@ from rodfem.linalg.matrices import EPS, gathered
 from rodfem.stability.cluster import Cluster, Measured, closed, measure, noise_of, real_span
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
-
-pytestmark = pytest.mark.alone
 
 RELATIVE, DRAWS = 1e-9, 60
 

@@ -1,7 +1,5 @@
 """Constraints that depend on one another at a state that is not known to all digits."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -23,6 +21,8 @@ from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import SceneError
 from rodfem.stability.dependence import _distance, require_independent_constraints, smallest_singular
 from rodfem.stability.pencil import Blocks
+
+pytestmark = pytest.mark.ranks
 
 PLAN = Plan(depth=0, steps=StepControl(most=3), error_bars=False)
 

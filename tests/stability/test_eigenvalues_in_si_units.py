@@ -1,7 +1,5 @@
 """Frequencies of rods in metres, newtons and kilograms: those of the closed form, by every method."""
 
-from __future__ import annotations
-
 import classics
 import numpy as np
 import pytest
@@ -10,6 +8,8 @@ from scipy.optimize import brentq
 
 from rodfem import Discretization, Inertia, Ordinate, Scene, Solver, clamped, free, hinged
 from rodfem.forms.energy import bending_and_twist
+
+pytestmark = pytest.mark.ranks
 
 UNITS = [(1e4, 1e9, 1e3), (100.0, 1e7, 100.0), (300.0, 1e14, 3e5), (100.0, 1.0, 1.0), (1e-8, 2e-28, 1e-18)]
 """Length, bending stiffness and mass per length."""

@@ -1,7 +1,5 @@
 """Frequencies under loads without a potential: none missing, none infinite, motions without rotation by name."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 
@@ -17,8 +15,6 @@ from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.motion_names import STRAIGHT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.spectrum import SHIFT
-
-pytestmark = pytest.mark.alone
 
 EA = 40.0
 

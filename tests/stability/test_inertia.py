@@ -1,7 +1,5 @@
 """Index and eigenvalues from factorisations, against dense linear algebra on the same matrices and closed forms."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import closed_form_hemitropic
@@ -63,6 +61,7 @@ def eigenvalues(S: np.ndarray, M: np.ndarray, f: BranchSolver) -> np.ndarray:
     return scipy.linalg.eigh(condensed, np.diag(size[~massless]), eigvals_only=True)
 
 
+@pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.versions
 @pytest.mark.short
@@ -80,7 +79,6 @@ def test_index_is_that_of_dense_matrices(formulation: str, branch: int, load: fl
         assert f.inertia.at(p.x).below(sigma) == (others < sigma).sum()
 
 
-@pytest.mark.alone
 @FORMULATIONS
 @STATES
 def test_eigenvalues_nearest_zero(formulation: str, branch: int, load: float) -> None:
@@ -96,7 +94,6 @@ def test_eigenvalues_nearest_zero(formulation: str, branch: int, load: float) ->
     assert [f.system.norm(v) for v in vectors] == pytest.approx([1, 1, 1], abs=1e-10)
 
 
-@pytest.mark.alone
 def test_close_eigenvalues_nearest_zero() -> None:
     """Three within 1 %, of which the block holds two: iterations of the block alone gain 1 % each."""
     f = follower("reduced", *SMALL)
@@ -111,6 +108,7 @@ def test_close_eigenvalues_nearest_zero() -> None:
     np.testing.assert_allclose(sorted(values), sorted(expected), rtol=1e-9)
 
 
+@pytest.mark.ranks
 @pytest.mark.versions
 @FORMULATIONS
 @STATES
@@ -126,7 +124,6 @@ def test_spectrum_is_that_of_dense_matrices(formulation: str, branch: int, load:
     assert (modes.values < -f.inertia.tolerance).sum() == p.negative
 
 
-@pytest.mark.alone
 @pytest.mark.few(1)
 def test_the_matrix_is_kept_for_the_state_that_it_holds() -> None:
     """Asked for the same state again it is not assembled or factored; it is after a shift, and for another state."""
@@ -143,7 +140,6 @@ def test_the_matrix_is_kept_for_the_state_that_it_holds() -> None:
     assert compiled()["factorisations"] == before["factorisations"] + 5
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("load", [0.05, 0.25, 0.7])
 def test_spectrum_of_the_straight_rod(load: float) -> None:
     f = follower("reduced", 12, 6)

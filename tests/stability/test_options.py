@@ -1,7 +1,5 @@
 """PETSc's and SLEPc's options reach each solver by its prefix, and overrule what is set for it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,8 +13,6 @@ from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import ReducedPencil
 from rodfem.stability.assessment import Assessor, in_interval
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-
-pytestmark = pytest.mark.alone
 
 ORDERING = 2
 """MUMPS's approximate minimum fill: not what rodfem asks for."""

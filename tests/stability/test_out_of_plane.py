@@ -1,7 +1,5 @@
 """How much of a motion is out of the plane of a planar rod, on all ranks alike."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +7,8 @@ import pytest
 
 from rodfem import Discretization, Ordinate, Parameter, Scene, Solver, clamped
 from rodfem.forms.energy import bending_and_twist
+
+pytestmark = pytest.mark.ranks
 
 
 @pytest.mark.few(1)

@@ -1,7 +1,5 @@
 """Round-off of eigenvalues: of a quadratic form entry by entry, in wide bands, at states far from the rod's."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,15 +11,12 @@ from classics import column
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import Attachment, Discretization, Ordinate, Scene, Solver, clamped, free
+from rodfem import Attachment, ConvergenceError, Discretization, Ordinate, Scene, Solver, clamped, free
 from rodfem.continuation.first_equilibrium import examined, first_equilibrium, is_stable
-from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import NewtonResult
 from rodfem.linalg.matrices import rounding
 from rodfem.stability.inertia import Index
 from rodfem.stability.near_zero import decide, quotient_error, resolve
-
-pytestmark = pytest.mark.alone
 
 EPS = np.finfo(float).eps
 

@@ -1,7 +1,5 @@
 """Soft modes by name, value and uncertainty, and an index that is undecided where a mesh cannot tell it."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from functools import cache
@@ -35,8 +33,6 @@ from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.pieces import UNDECIDED, UNSTABLE, pieces_of, typical_state
 from rodfem.stability.soft_mode import SoftMode, index_range, is_stable, stability
-
-pytestmark = pytest.mark.alone
 
 SLIDING = "sliding along the rod"
 
@@ -157,7 +153,6 @@ def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.alone
 def test_an_index_that_no_richer_mesh_confirms() -> None:
     """At twenty times its critical load an elastica has other strains on 4 linear elements than on 2, of one index."""
     elastica = column("elastica", SUPPORTS["clamped-free"], (0.0, 50.0))
@@ -172,7 +167,6 @@ def test_an_index_that_no_richer_mesh_confirms() -> None:
         assert ("not compared with a richer mesh" in str(verdict)) == bool(why)
 
 
-@pytest.mark.alone
 def test_a_bent_cantilever_that_is_nearly_round_has_one_name_for_its_rotation() -> None:
     """It turns about its axis as its sections turn back; it slides nowhere, and its mode is that soft mode."""
     round_but = lambda v, k, c: bending_and_twist(k, (1.0, 1.0 + 1e-6, 1.0))  # noqa: E731

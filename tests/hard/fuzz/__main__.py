@@ -6,8 +6,6 @@ works on one scene and prints what it shows, ``--summary FILE...`` says what fil
 of the wider family (:mod:`.wider`), whose files are ``results/fuzz-wide-SEED.jsonl``.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

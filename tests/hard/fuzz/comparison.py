@@ -5,8 +5,6 @@ points within the sum of their error bars; states at the loads asked for; the nu
 *silent* unless one of the two traces has said that it leaves something open.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
@@ -15,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rodfem import Diagram, Discretization, Plan, Scene, StepControl, trace
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem import Branch, Diagram, Discretization, Plan, Point, Scene, SpecialPoint, StepControl, trace
 from rodfem.continuation.kinds import EVENT
 from rodfem.diagram.sweep import FREQUENCIES
 from rodfem.errors import ConvergenceError, InputError

@@ -4,8 +4,6 @@ Along a branch an event of the load alone happens once in each piece between two
 one of its zeros.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,8 +11,7 @@ from math import asin, isfinite, pi, tanh
 
 import numpy as np
 
-from rodfem import Diagram, Event
-from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem import Branch, Diagram, Event, SpecialPoint
 from rodfem.continuation.kinds import EVENT
 from rodfem.tolerances import round_off
 

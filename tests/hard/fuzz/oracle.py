@@ -6,8 +6,6 @@ changes no sign.  Eigenvalues are relative to the metric, in which strains have 
 bending.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

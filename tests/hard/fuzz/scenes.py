@@ -4,8 +4,6 @@ Four successive numbers have one structure, so that they share their compiled fo
 Lengths are multiples of ``c.l``, forces of ``c.f``: a scene may be stated in any units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot, pi
@@ -39,7 +37,7 @@ class Draw:
     force: float = 1.0
 
     @classmethod
-    def of(cls, seed: int, number: int) -> Draw:
+    def of(cls, seed: int, number: int) -> "Draw":
         """Generators of scene ``number`` of a seed."""
         group, variant = divmod(number, VARIANTS)
         numbers = np.random.default_rng([seed, group, variant + 1])

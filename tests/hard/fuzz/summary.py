@@ -1,7 +1,5 @@
 """Results of many scenes in a few lines."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any

@@ -6,8 +6,6 @@ masses are attached, elements differ in size by many orders, ranges begin inside
 located.  The base scene is that of the same seed and number, but for its units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from math import pi

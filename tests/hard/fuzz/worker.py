@@ -1,7 +1,5 @@
 """Scenes one by one in a child process, and a line of results for each."""
 
-from __future__ import annotations
-
 import json
 import os
 import select
@@ -12,8 +10,7 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from rodfem import Scene
-from rodfem.errors import InputError
+from rodfem import InputError, Scene
 
 from . import wider
 from .comparison import NOTHING, compared, of_a_sentence
