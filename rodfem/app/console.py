@@ -163,6 +163,13 @@ def _row(*cells: str) -> str:
     return " ".join([*(f"{cell:<{width}}" for cell, width in zip(others, HEADS.values(), strict=True)), last])
 
 
+def many(words: Sequence[str]) -> None:
+    """Trace a rod for each line of a table of its constants and options."""
+    from rodfem.app.main import many_main
+
+    many_main(words)
+
+
 def run(words: Sequence[str]) -> None:
     """Trace the rod of a file, with its constants as options."""
     from rodfem.app.main import main as run_file
@@ -186,4 +193,12 @@ def view(words: Sequence[str]) -> None:
         webbrowser.open(path.resolve().as_uri())
 
 
-COMMANDS = {"convert": convert, "explain": explain, "info": info, "list": list_diagrams, "run": run, "view": view}
+COMMANDS = {
+    "convert": convert,
+    "explain": explain,
+    "info": info,
+    "list": list_diagrams,
+    "many": many,
+    "run": run,
+    "view": view,
+}

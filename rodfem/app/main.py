@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
+from hashlib import sha256
 from inspect import Parameter, cleandoc, getdoc, isfunction, signature
 from pathlib import Path
 from types import ModuleType
@@ -79,6 +81,99 @@ def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
             raise InputError(f"The constant {constant.name} has the name of an option of all rods: choose another.")
         constant.declare(group)
     return parser
+
+
+def many_main(words: Sequence[str]) -> None:
+    """State the rods of a table, all before any computation, trace each, and write what is special of them."""
+    parser = Parser(prog="rodfem many", description="Trace a rod of a file once for each line of a table.")
+    parser.add_argument("file", type=Path, help="as rodfem run has it")
+    parser.add_argument("table", type=Path, help=f"CSV with a line for each rod; {COLUMNS}")
+    parser.add_argument("--scene", metavar="NAME", help="of several in the file")
+    parser.add_argument("--output", type=folder, default=Path("results/many"), metavar="DIR", help="for all files")
+    given = parser.parse_args(words)
+    module = load(given.file)
+    rods = Rods(rod_of(module, given.scene), mesh_of(module), given)
+    start_petsc([])
+    with sentences(rods.parser):
+        rods.trace()
+
+
+COLUMNS = "a column is a constant, an option of rodfem run without its dashes (elements), or a field of Plan (steps)"
+
+
+class Rods:
+    """Rods of a table: values of constants and options of one that a file states."""
+
+    def __init__(self, of: Callable[..., Scene] | Scene, mesh: Mesh | None, given: argparse.Namespace) -> None:
+        """Read the table; raises :class:`InputError` for a column that is none of a rod, or a table without lines."""
+        self.statement, self.mesh, self.given = Statement(of), mesh, given
+        self.parser = parser_of(self.statement, self.statement.scene(), f"rodfem run {given.file}")
+        actions = [action for action in self.parser._actions if action.dest not in ("help", "output")]
+        self.options = {action.dest: action.option_strings[0] for action in actions}
+        self.options |= {option[2:]: option for option in self.options.values()} | {"steps": self.options["largest"]}
+        try:
+            self.rows = list(csv.DictReader(given.table.read_text(encoding="utf-8-sig").splitlines()))
+        except (OSError, ValueError) as trouble:
+            raise InputError(f"{given.table} cannot be read ({trouble}): give a table of text.") from trouble
+        unknown = [name for name in (self.rows[0] if self.rows else ("",)) if name not in {*self.options, *MORE}]
+        if unknown:
+            what = f"has a column {unknown[0]!r}" if self.rows else "has no line of a rod"
+            known = ", ".join(dict.fromkeys(x.name for x in self.statement.constants))
+            raise InputError(f"{given.table} {what}: {COLUMNS}; the constants are {known or 'none'}.")
+
+    def stated(self, number: int) -> tuple[Scene, Discretization, Plan]:
+        """Scene, mesh and plan of a rod; raises :class:`InputError` with its line for one that cannot be traced."""
+        try:
+            return self._stated(self.rows[number])
+        except InputError as trouble:
+            raise InputError(f"{self.given.table}, rod {number}: {trouble}") from None
+
+    def _stated(self, row: Mapping[str, str]) -> tuple[Scene, Discretization, Plan]:
+        """The same of a line, an empty cell of which is the default."""
+        filled = {name: cell.strip() for name, cell in row.items() if cell and cell.strip()}
+        words = [word for n, cell in filled.items() if n not in MORE for word in (self.options[n], *cell.split())]
+        options = self.parser.parse_args(words)
+        constants = self.statement.values(options)
+        scene, own = self.statement.scene(**constants), None if self.mesh is None else self.mesh(**constants)
+        known: dict[str, Any] = {"true": True, "false": False}
+        more: dict[str, Any] = {
+            n: int(x) if x.isdigit() else known.get(x.lower(), x) for n, x in filled.items() if n in MORE
+        }
+        discretization, plan = discretization_of(options, own), replace(plan_of(options), **more)
+        plan.check(scene, discretization)
+        return scene, discretization, plan
+
+    def trace(self) -> None:
+        """Trace all rods that have not been traced, and write the table of their special points; collective."""
+        from mpi4py import MPI
+
+        from rodfem.app.many import key_of, shared
+        from rodfem.diagram.diagram import trace
+        from rodfem.output.states import as_csv
+        from rodfem.ranks import on_first
+        from rodfem.whole_files import write_whole
+
+        target, text = self.given.output, sha256(self.given.file.read_bytes()).hexdigest()
+
+        def work(number: int) -> dict[str, Any]:
+            diagram = trace(*stated[number], comm=MPI.COMM_SELF)
+            diagram.save(target / f"rod-{number:05d}")
+            return {"special": [{"branch": b["name"]} | s for b in diagram.data["branches"] for s in b["special"]]}
+
+        stated, lines = [*map(self.stated, range(len(self.rows)))], list[dict[str, Any]]()
+        keys = [key_of(x[0]) | {"row": row, "file": text} for x, row in zip(stated, self.rows, strict=True)]
+        works = [partial(work, number) for number in range(len(keys))]
+        results = shared(keys, works, target, MPI.COMM_WORLD, lambda done, whole: None)
+        for number, (row, result) in enumerate(zip(self.rows, results, strict=True)):
+            found = result.get("special") or [{"error": result["error"]}]
+            lines += [row | {"rod": number} | entry for entry in found]
+        on_first(MPI.COMM_WORLD, lambda: write_whole({target / "many.csv": as_csv(lines)}))
+        if MPI.COMM_WORLD.rank == 0:
+            print(target / "many.csv")
+
+
+MORE = ("error_bars", "most_branches")
+"""Fields of a plan that no option sets."""
 
 
 def _run(

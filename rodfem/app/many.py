@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,26 +55,39 @@ def many(
     :class:`InputError` where ``folder`` cannot be written, is in use by another process, or has a result in another
     format, and where ``work`` returns anything else.
     """
+    return shared(
+        [key_of(scene) for scene in scenes], [partial(work, scene) for scene in scenes], folder, comm, progress
+    )
+
+
+def shared(
+    keys: Sequence[dict[str, Any]],
+    works: Sequence[Callable[[], dict[str, Any]]],
+    folder: Path | str,
+    comm: MPI.Comm,
+    progress: Callable[[int, int], None],
+) -> list[dict[str, Any]]:
+    """Results of ``works``, as :func:`many` has them; a saved one is used again if it has the same key."""
     folder = Path(folder)
     end_together()
     with locked(folder, comm):
-        files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
+        files = [folder / f"rod-{i:05d}.json" for i in range(len(keys))]
         on_first(comm, lambda: _check(files))
         trouble: InputError | None = None
         try:
-            for done, i in enumerate(range(comm.rank, len(scenes), comm.size), start=1):
-                if _saved(files[i], key_of(scenes[i])) is None:
-                    result = _result(scenes[i], work)
+            for done, i in enumerate(range(comm.rank, len(keys), comm.size), start=1):
+                if _saved(files[i], keys[i]) is None:
+                    result = _result(works[i])
                     with held():
-                        save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
+                        save_json({"format": RESULT.mark(), "key": keys[i], "result": result}, files[i])
                 if comm.rank == 0:
-                    progress(min(done * comm.size, len(scenes)), len(scenes))
+                    progress(min(done * comm.size, len(keys)), len(keys))
         except InputError as error:  # a result or a file cannot be written: the other ranks go on with theirs
             trouble = error
         for other in filter(None, comm.allgather(trouble)):
             raise other
-        pairs = zip(files, scenes, strict=True) if comm.rank == 0 else ()
-        return comm.bcast([_saved(file, key_of(scene)) or {} for file, scene in pairs])
+        pairs = zip(files, keys, strict=True) if comm.rank == 0 else ()
+        return comm.bcast([_saved(file, key) or {} for file, key in pairs])
 
 
 def _check(files: Sequence[Path]) -> None:
@@ -83,11 +97,11 @@ def _check(files: Sequence[Path]) -> None:
             RESULT.check(data, file)
 
 
-def _result(scene: Scene, work: Work) -> dict[str, Any]:
+def _result(work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """What the work returns, or the sentence of its error; raises :class:`InputError` for what no file can hold."""
     try:
         with as_failure(MPI.COMM_SELF):
-            result = work(scene)
+            result = work()
     except (InputError, ConvergenceError) as trouble:
         return {"error": str(trouble)}
     try:

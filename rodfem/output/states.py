@@ -240,12 +240,12 @@ def to_csv(folder: Path, target: Path) -> list[Path]:
             numbers = row_of(branch, row)
             rows.append(about | {"row": row} | numbers | reactions_by_name(numbers.pop("reactions", ())))
         special += [about | one for one in branch["special"]]
-    contents = {target / "rows.csv": _table(rows), target / "special.csv": _table(special)}
+    contents = {target / "rows.csv": as_csv(rows), target / "special.csv": as_csv(special)}
     write_whole(contents)
     return list(contents)
 
 
-def _table(rows: list[dict[str, Any]]) -> bytes:
+def as_csv(rows: list[dict[str, Any]]) -> bytes:
     """Rows as text, numbers with all their digits, nothing where there is none."""
     text = io.StringIO()
     writer = csv.DictWriter(text, dict.fromkeys(name for row in rows for name in row), lineterminator="\n")
