@@ -361,7 +361,8 @@ TABLE = {
         "a-family-of-states-is-not-said": (
             "        if self._zeros:", "        if False:", "diagram/test_family_of_states.py"),
         "ordinate-of-a-load-that-is-exact": (
-            "of_ordinate += abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))", "pass", "literature/test_follower.py"),
+            "of_ordinate += abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))", "pass",
+            "literature/test_follower.py"),
         "taut-rods-have-frequencies": (" or self._dependent(state)", "", "stability/test_frequencies.py"),
     },
     "rodfem/diagram/tracer.py": {
