@@ -6,10 +6,8 @@ option for each, names that instead (:meth:`rodfem.app.cli.Parser.in_options`).
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
-CONTROL = re.compile("[\\x00-\\x09\\x0b-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
 INTERRUPTED = 130  # status of a program that is interrupted
 
 
@@ -47,17 +45,12 @@ SMALLER_STEPS = Remedy("use smaller steps ({})", Argument("StepControl", "larges
 POINTWISE = Remedy("use {}", Argument("Discretization", "formulation", "pointwise"))
 
 
-def printable(text: str) -> str:
-    """Text without control characters, but for new lines: those of a file would work on the terminal."""
-    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
-
-
 class _Remediable(Exception):
     """An error in one sentence, or in the first half of one that its ``remedy`` completes."""
 
     def __init__(self, sentence: str, remedy: Remedy | None = None) -> None:
         """Keep both."""
-        super().__init__(printable(sentence if remedy is None else f"{sentence}: {remedy}."))
+        super().__init__(sentence if remedy is None else f"{sentence}: {remedy}.")
         self.remedy = remedy
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from fnmatch import fnmatch
 from pathlib import Path
@@ -30,8 +30,6 @@ DRAFTS = ".*.rodfem-part*"  # names of drafts: that of the file, whose suffix sa
 LOCK = ".lock"  # file whose lock says that the folder is in use; it has the process and the host in words
 OF_A_RUN = ("modes.h5", "modes-*.png", "modes-*.gif", "locus-*.json", "locus.png", "diagram.png", "shape.png")
 """Names of the files that a run may write next to its diagram and states."""
-PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
-"""Suffixes of pictures of diagrams; without one it is PNG."""
 FOLDERS: set[Path] = set()  # folders whose lock this process has
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
@@ -145,17 +143,3 @@ def remove_earlier(folder: Path, names: Iterable[str]) -> None:
         for name in names:
             if Path(name).name == name and any(fnmatch(name, pattern) for pattern in OF_A_RUN):
                 (folder / name).unlink(missing_ok=True)
-
-
-def picture_at(path: Path, suffixes: Sequence[str]) -> None:
-    """Make the folder of a picture; raises :class:`InputError` where it cannot be written, or has another suffix."""
-    if path.suffix.lower() not in suffixes:
-        known = ", ".join(filter(None, suffixes))
-        raise InputError(f"The picture {path} has an unknown format: choose one of {known}.")
-    if path.is_dir():
-        raise InputError(f"The picture {path} is a folder: give a name in it, as in {path / 'picture.png'}.")
-    with writing(path.parent):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        probe = path.parent / f".probe-{os.getpid()}"
-        probe.touch(exist_ok=False)
-        probe.unlink()

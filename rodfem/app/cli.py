@@ -85,12 +85,6 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
-def run_folder(text: str) -> Path:
-    """Value of an option that names the folder of a run, or one of its files; raises as :func:`folder` does."""
-    path = folder(text)
-    return path.parent if path.is_file() and path.name in ("diagram.json", "states.h5") else path
-
-
 @contextmanager
 def sentences(parser: Parser) -> Iterator[None]:
     """Bad input, and what fails for a reason that is known, ends with one sentence and status 2."""

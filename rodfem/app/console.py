@@ -17,8 +17,8 @@ from shutil import get_terminal_size
 from textwrap import fill
 
 import rodfem
-from rodfem.app.cli import Parser, complain, folder, run_folder
-from rodfem.errors import InputError, SetupError, printable
+from rodfem.app.cli import Parser, complain, folder
+from rodfem.errors import InputError, SetupError
 
 HELP = """usage: rodfem COMMAND [ARGUMENTS]
 
@@ -73,19 +73,17 @@ def convert(words: Sequence[str]) -> None:
     from rodfem.whole_files import writing
 
     parser = Parser(prog="rodfem convert", description=_summary(convert))
-    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
+    parser.add_argument("folder", type=folder, help="that of a run, as results/cord")
     parser.add_argument("--to", dest="format", choices=FORMATS, default="vtkhdf", help="format (default vtkhdf)")
     parser.add_argument("--output", type=folder, metavar="DIR", help="folder for the files (default FOLDER/FORMAT)")
     options = parser.parse_args(words)
     target: Path = options.output or options.folder / options.format
     load_json(options.folder / "diagram.json")  # no folder is made for a run that there is not
-    if options.output is None and target.is_symlink():
-        raise InputError(f"{target} is a link to another folder: name that with --output.")
     with writing(target):
         target.mkdir(parents=True, exist_ok=True)
     with refusal(UNFIT.format(options.folder)):
         for path in FORMATS[options.format](options.folder, target):
-            print(printable(str(path)))
+            print(path)
 
 
 def explain(words: Sequence[str]) -> None:
@@ -112,7 +110,7 @@ def info(words: Sequence[str]) -> None:
     from rodfem.output.words import table_of
 
     parser = Parser(prog="rodfem info", description=_summary(info))
-    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
+    parser.add_argument("folder", type=folder, help="that of a run, as results/cord")
     path = parser.parse_args(words).folder / "diagram.json"
     needs = ("scene", "parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
     data = read_json(path, DIAGRAM, needs)
@@ -127,7 +125,7 @@ def info(words: Sequence[str]) -> None:
             for name, kind, load, ordinate, index, _ in (row for row in rows if row[0] == branch["name"]):
                 lines.append(f"  {name:<12} {kind:<13} {load:<24} {ordinate:<24} {index}")
             lines.append(f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}")
-        print(printable("\n".join([*lines, *(f"  {sentence}" for sentence in in_sentences(data))])))
+        print("\n".join([*lines, *(f"  {sentence}" for sentence in in_sentences(data))]))
 
 
 def list_diagrams(words: Sequence[str]) -> None:
@@ -138,7 +136,7 @@ def list_diagrams(words: Sequence[str]) -> None:
     files = sorted(place.rglob("diagram.json"))
     if not files:
         raise InputError(f"No folder in {place} has a diagram.json: run a scene, or name a folder with results.")
-    print(printable("\n".join([_row(*HEADS, "in words"), *map(_diagram, files)])))
+    print("\n".join([_row(*HEADS, "in words"), *map(_diagram, files)]))
 
 
 def _diagram(file: Path) -> str:

@@ -243,11 +243,9 @@ def locus(
 ) -> Locus:
     """Follow a ``special`` point in the plane of the scene's load and a second ``parameter``, to both sides.
 
-    ``bounds`` are their intervals, on which the curve ends exactly; lengths of ``steps`` are relative to them.  Errors
-    are estimated at the marked rows and so many others, ``error_bars``; 0: at none.  The ``solver`` is that of the
-    special point, and is left as it was; ``doubtful``: its mesh leaves the index next to the point open.  Raises
-    :class:`InputError` for a parameter, bounds or a kind that make no sense, :class:`ConvergenceError` if the special
-    point is not found again.
+    On ``bounds``, their intervals, the curve ends exactly; lengths of ``steps`` are relative to them.  Errors are
+    estimated at the marked rows and so many others, ``error_bars``.  The ``solver`` is that of the special point, and
+    is left as it was; ``doubtful``: its mesh leaves the index next to the point open.
     """
     plane = Plane(solver.system, parameter, bounds)
     with solver.system.clock.scope("locus"), plane.kept():

@@ -119,7 +119,7 @@ class Locus:
             raise InputError(f"{value} is not one parameter of the locus: {one}.")
         if self.solve is None:
             raise InputError("This locus is from a file, which has no states: follow it again, by diagram.locus(...).")
-        return self.solve(self.names.index(names[0]), finite(names[0], value[names[0]], 1.0))
+        return self.solve(self.names.index(names[0]), finite(1.0)(names[0], value[names[0]]))
 
     def passes(self, special: SpecialPoint, units: Units) -> bool:
         """Whether the curve passes the line of its start at a special point of a scene with these natural sizes."""

@@ -60,8 +60,8 @@ Test = Callable[[LocusPoint], float]  # what vanishes at a point of codimension 
 class Place:
     """Arclength ``s`` from the middle of a window of this ``half`` width, and its uncertainty ``ds``.
 
-    ``through`` are the polynomials of both parameters in the arclength, and ``nodes`` the points of the window.  By
-    ``apart`` (2,) the parameters of another window differ; ``windows`` are the half widths of both.
+    ``through`` are the polynomials of both parameters in the arclength; by ``apart`` (2,) those of another window
+    differ.
     """
 
     s: float

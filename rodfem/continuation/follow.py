@@ -56,8 +56,8 @@ class StepControl:
     def __post_init__(self) -> None:
         """Check kinds and the largest step; raises :class:`InputError`."""
         for name in ("first", "largest", "smallest", "aim"):
-            object.__setattr__(self, name, real(name, getattr(self, name), getattr(StepControl, name)))
-        if whole("most", self.most, StepControl.most) < 1:
+            object.__setattr__(self, name, real(getattr(StepControl, name))(name, getattr(self, name)))
+        if whole(StepControl.most)("most", self.most) < 1:
             raise InputError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
         if not self.smallest < self.largest <= 1:
             raise InputError(
@@ -93,9 +93,9 @@ class IndexStepControl(StepControl):
     def __post_init__(self) -> None:
         """Check the bound, too; raises :class:`InputError`."""
         super().__post_init__()
-        if whole("change", self.change, IndexStepControl.change) < 1:
+        if whole(IndexStepControl.change)("change", self.change) < 1:
             raise InputError(f"A change of the index of {self.change} leads nowhere: give change=1 or more.")
-        if finite("resolved", self.resolved, IndexStepControl.resolved) < 0:
+        if finite(IndexStepControl.resolved)("resolved", self.resolved) < 0:
             raise InputError(f"resolved is {self.resolved:g}: give zero or more, as in resolved=1e-4.")
 
     def accepts(self, before: Point, after: Point) -> bool:

@@ -52,9 +52,8 @@ NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not a
 class Deflation:
     """Search for equilibria at one ``load``, on the mesh of a ``solver``, other than the ``known`` ones at that load.
 
-    New ones are ``found``, one of each set that the symmetries carry into each other; ``tries`` are the outcomes, in
-    order.  ``nearly`` counts equilibria that are nearly mirror images of others, which an imperfection makes different
-    ones.  Raises :class:`InputError` for a known equilibrium at another load.
+    New ones are ``found``, one of each set that the symmetries carry into each other; ``tries`` are the outcomes.
+    ``nearly`` counts those that are nearly mirror images of others, which an imperfection makes different ones.
     """
 
     def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
@@ -258,10 +257,7 @@ def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
 
 
 class Coexisting(NamedTuple):
-    """An equilibrium with its symmetric copies: so many mirror images, itself among them.
-
-    Continuous symmetries that it breaks, ``freedoms`` of them, make a circle (a torus, a line) of each.
-    """
+    """A point, the number of its mirror images, itself among them, and the ``freedoms`` that make a line of each."""
 
     point: Point
     images: int

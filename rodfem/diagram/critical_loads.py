@@ -211,10 +211,7 @@ def meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
     last, ahead = _neighbour(mine, behind.spectrum, count)
     nu = np.array([first, mine.pairs.nu[:count], last])
     t = abs(before.load - row.load) / abs(behind.load - row.load)
-    found = [
-        *_pairs(mine, nu, np.array([back * back.T, ahead * ahead.T]), t),
-        *_single(mine, nu, t),
-    ]
+    found = [*_pairs(mine, nu, np.array([back * back.T, ahead * ahead.T]), t), *_single(mine, nu, t)]
     return [Meeting(row.load + at * (behind.load - row.load), mean) for at, mean in found]
 
 

@@ -38,7 +38,7 @@ from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, origin, save_run
 from rodfem.output.table import REMARK
-from rodfem.problem.arguments import a, checked, count, interval, number, path, text
+from rodfem.problem.arguments import Check, a, checked, finite, interval, path, text, whole
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains, statement
@@ -46,7 +46,7 @@ from rodfem.ranks import agree, end_together, on_first
 from rodfem.stability.assessment import Verdict
 from rodfem.stability.nonsymmetric import FREQUENCIES
 from rodfem.timing import Clock
-from rodfem.whole_files import PICTURES, draft_of, locked, picture_at
+from rodfem.whole_files import locked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -124,7 +124,7 @@ class Diagram:
             raise InputError(f"There is no kind {kind!r}: choose one of {', '.join(known)}.")
         return found
 
-    @checked(load=number(1.0))
+    @checked(load=finite(1.0))
     def at(self, load: float) -> list[Point]:
         """All equilibria of the diagram at exactly ``load``, computed there, each with its own index.
 
@@ -146,7 +146,7 @@ class Diagram:
         compare = self.plan.error_bars or self.plan.accuracy is not None
         return [self.solver(p).examined(p, compare=compare, special=self._special_at(p)) for p in found]
 
-    @checked(load=number(1.0))
+    @checked(load=finite(1.0))
     def states(self, load: float) -> list[Coexisting]:
         """All equilibria at a load, as :meth:`at` finds them, each with the number of its symmetric copies.
 
@@ -162,12 +162,12 @@ class Diagram:
 
     # --- what it can be asked ------------------------------------------------------------------------------------
 
-    @checked(point=POINT, method=METHOD, number=count(4, 1))
+    @checked(point=POINT, method=METHOD, number=whole(4, 1))
     def assess(self, point: Point | SpecialPoint, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of a point with a given method: see :meth:`rodfem.Solver.assess`."""
         return self.solver(point).assess(self._special_at(point) or point, method, number)
 
-    @checked(point=POINT, number=count(3, 1), method=METHOD)
+    @checked(point=POINT, number=whole(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of a point: see :meth:`rodfem.Solver.modes`."""
         return self.solver(point).modes(point, number, method)
@@ -211,7 +211,7 @@ class Diagram:
         solver, bounds = self.solvers[special.point.mesh], ((low, high), interval)
         return locus(solver, special, parameter, bounds, steps or STEPS, doubtful=doubtful)
 
-    @checked(load=number(1.0), tries=count(24), seed=count(0))
+    @checked(load=finite(1.0), tries=whole(24, 0), seed=whole(0, 0))
     def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` that are on no branch, by ``tries`` deflated Newton iterations; none twice."""
         return Solver.of(self.solvers[self._finest()]).search(load, self.at(load), tries, seed)
@@ -338,18 +338,17 @@ class Diagram:
         """Draw the diagram with stability and special points; also into a file, if a ``path`` is given.
 
         A notebook shows what is returned.  In axes of matplotlib, ``ax``, several diagrams are one picture: each has
-        colours that the others do not have.  As all that is written it may be in a new folder.  Raises
-        :class:`~rodfem.errors.InputError` where that cannot be written, or has a suffix of no picture.
+        colours that the others do not have.  Raises :class:`~rodfem.errors.InputError` where it cannot be written.
         """
-        self._can_write(path, PICTURES)
+        from rodfem.output.style import save
+
         if self.scene.conservative:
             from rodfem.output.plot_diagram import figure_of
         else:
             from rodfem.output.plot_frequencies import figure_of
         figure = figure_of(self.data, ax)
-        if path is not None and self.solvers[0].system.comm.rank == 0:
-            with draft_of(Path(path)) as draft:
-                figure.savefig(draft)
+        if path is not None:
+            on_first(self.solvers[0].system.comm, lambda: save(figure, Path(path)))
         return figure
 
     @checked(point=POINT, path=path("shape.png"), caption=text("stable"))
@@ -361,13 +360,8 @@ class Diagram:
         """
         from rodfem.output.render import snapshot
 
-        self._can_write(path, (".png",))
         shown = point.point if isinstance(point, SpecialPoint) else point
         return snapshot(self.branches, self.solvers, shown, path, caption)
-
-    def _can_write(self, path: Path | str | None, suffixes: Sequence[str]) -> None:
-        if path is not None:
-            on_first(self.solvers[0].system.comm, lambda: picture_at(Path(path), suffixes))
 
     def __repr__(self) -> str:
         """Scene, size and range."""
@@ -389,7 +383,7 @@ class Diagram:
         return f"<p>{escape(repr(self)[1:-1])}</p><table><thead><tr>{title}</tr></thead><tbody>{body}</tbody></table>"
 
 
-PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
+PLAN: Check = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
 
 
 @checked(scene=SCENE, discretization=MESH, plan=PLAN, observer=a(Observer, "a rodfem.Observer"), comm=RANKS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from functools import partial
 from typing import Any
 
 from rodfem.continuation.follow import StepControl
@@ -100,17 +99,17 @@ class Plan:
             self,
             span=optional(interval(0.0, 1.0, real)),
             at=lambda name, values: tuple(dict.fromkeys(reals(name, values, (0.5, 1.0)))),
-            depth=partial(whole, example=2),
+            depth=whole(2),
             steps=a(StepControl, "StepControl, as in steps=StepControl(largest=0.02)"),
             error_bars=yes_or_no,
-            spectrum=partial(whole, example=4),
-            tries=partial(whole, example=24),
+            spectrum=whole(4),
+            tries=whole(24),
             locus=optional(_locus),
             method=a(str, "the name of one, as in method='auto'"),
-            modes=partial(whole, example=3),
-            accuracy=optional(partial(real, example=ACCURACY)),
+            modes=whole(3),
+            accuracy=optional(real(ACCURACY)),
             events=lambda name, values: tuple(EVENTS(name, values)),
-            most_branches=partial(whole, example=20),
+            most_branches=whole(20),
         )
         if self.method not in ("", AUTO):
             find(self.method)

@@ -29,7 +29,7 @@ from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
-from rodfem.problem.arguments import Check, a, checked, count, each, number, path, text
+from rodfem.problem.arguments import Check, a, checked, each, finite, path, text, whole
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.dependence import may_depend, require_independent_constraints
@@ -46,7 +46,7 @@ METHOD: Check = text("auto")  # checks of arguments that several functions have
 class Solver:
     """Computes single equilibria of a scene on one mesh, with their index; collective over the ranks of ``comm``."""
 
-    @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=count(4), clock=a(Clock, "a Clock"))
+    @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=whole(4, 0), clock=a(Clock, "a Clock"))
     def __init__(
         self,
         scene: Scene,
@@ -147,7 +147,7 @@ class Solver:
             point.tangent = tangent
         return point
 
-    @checked(load=number(1.0), guess=STATE)
+    @checked(load=finite(1.0), guess=STATE)
     def equilibrium(self, load: float, guess: Point | SpecialPoint | PETSc.Vec | None = None) -> Point:
         """Equilibrium at exactly ``load``, from a ``guess`` on this mesh, at any load, or the scene's start.
 
@@ -174,7 +174,7 @@ class Solver:
             check_index(found, load, point.index)
         return point
 
-    @checked(point=STATE, method=METHOD, number=count(4, 1))
+    @checked(point=STATE, method=METHOD, number=whole(4, 1))
     def assess(self, point: Point | SpecialPoint | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of an equilibrium on this mesh by a given method.
 
@@ -194,7 +194,7 @@ class Solver:
         found = self.examined(self.equilibria.point(x, 0.0, None), compare=True, special=special)
         return verdict.at(found)
 
-    @checked(point=STATE, number=count(3, 1), method=METHOD)
+    @checked(point=STATE, number=whole(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of an equilibrium on this mesh, each with its value, motion and error.
 
@@ -204,7 +204,7 @@ class Solver:
         check_number(self.scene, self.equilibria.system.fields.discretization, number)
         return self._finder(self._state(point), number, method)[1]
 
-    @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=count(0))
+    @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=whole(0, 0))
     def restore(self, states: Path | str, branch: str, row: int) -> Point:
         """Equilibrium of a saved row; it is solved anew, as the mesh may be another one.
 
@@ -214,7 +214,10 @@ class Solver:
         return self.equilibrium(self.equilibria.system.scalar(x), x)
 
     @checked(
-        load=number(1.0), known=each(a(Point, "a point, as diagram.at(load) returns")), tries=count(24), seed=count(0)
+        load=finite(1.0),
+        known=each(a(Point, "a point, as diagram.at(load) returns")),
+        tries=whole(24, 0),
+        seed=whole(0, 0),
     )
     def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` other than the ``known`` ones, by ``tries`` deflated Newton iterations.

@@ -39,14 +39,7 @@ from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, without
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.dependence import may_depend, require_independent_constraints
-from rodfem.stability.nonsymmetric import (
-    FREQUENCIES,
-    REAL,
-    Frequencies,
-    NonsymmetricSolver,
-    begins_slowly,
-    named,
-)
+from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, begins_slowly, named
 from rodfem.stability.spectrum import SHIFT
 from rodfem.tolerances import DRIFT, ROUND_OFF, round_off, unit
 

@@ -55,8 +55,8 @@ class Discretization:
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`InputError`."""
-        object.__setattr__(self, "elements", whole("elements", self.elements, 8))
-        object.__setattr__(self, "degree", whole("degree", self.degree, 6))
+        object.__setattr__(self, "elements", whole(8)("elements", self.elements))
+        object.__setattr__(self, "degree", whole(6)("degree", self.degree))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
         names, elements = formulations.names(), self.elements

@@ -21,7 +21,6 @@ Symmetry modes, whose eigenvalue is zero for a reason, come after the others.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,9 +28,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import h5py
 import numpy as np
 
-from rodfem.errors import Argument, InputError
+from rodfem.errors import InputError
 from rodfem.file_format import MODES
-from rodfem.problem.arguments import checked, count, text
+from rodfem.problem.arguments import checked, text, whole
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting, read
@@ -123,29 +122,17 @@ def save_modes(
     write_whole({path: with_added(path, add, first=first)})
 
 
-@checked(path=argument_path("results/column/modes.h5"), branch=text("straight"), row=count(0))
+@checked(path=argument_path("results/column/modes.h5"), branch=text("straight"), row=whole(0, 0))
 def load_modes(path: Path | str, branch: str, row: int) -> Modes:
     """Modes of a saved state; raises :class:`InputError` where the file has none, or has another or a newer format."""
-    unfit = f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(Path(path))}."
+    unfit = f"{path} has no modes of row {row} of a branch {branch!r} ({{}}): give {MODES.file}."
     with MODES.opened(path, ("branches",), unfit) as file:
         group = file[f"branches/{branch}/{row}"]
         names = [name for name in Modes.__dataclass_fields__ if name != "note"]
         arrays = {name: group[name][()] for name in names if name != "motion"}
         motion, note = tuple(group["motion"].asstr()[()]), str(group.attrs.get("note", ""))
-    _check_arrays(arrays, motion, path)
     arrays["load"] = float(arrays["load"])
     return Modes(motion=motion, note=note, **arrays)
-
-
-def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path | str) -> None:
-    """Raise :class:`InputError` where arrays of a file are not of the shapes of :class:`Modes`, or not finite."""
-    m, k = len(np.atleast_1d(arrays["s"])), len(motion)
-    shapes = {"load": (), "s": (m,), "r": (m, 3), "q": (m, 4), **dict.fromkeys(("value", "residual", "error"), (k,))}
-    for name, array in arrays.items():
-        wanted, given = shapes.get(name, (k, m, 3)), np.asarray(array)
-        finite = given.dtype.kind in "fciu" and (name in ("residual", "error") or np.isfinite(given).all())
-        if given.shape != wanted or not finite:
-            raise InputError(f"{path} has no {name} of {wanted} finite numbers: run the scene again.")
 
 
 def rows_with_modes(path: Path) -> list[tuple[str, int]]:
@@ -168,19 +155,10 @@ def heading(path: Path) -> str:
         return f"{file.attrs['title']}, " if "title" in file.attrs else ""
 
 
-def _contents(path: Path) -> str:
-    """Contents of a file of modes, in words."""
-    with suppress(InputError):
-        if found := rows_with_modes(path):
-            return "it has " + "; ".join(f"{name}, row {row}" for name, row in found)
-    return f"run a scene with {Argument('Plan', 'modes')} and {Argument('Plan', 'at')}"
-
-
 class Few(NamedTuple):
-    """Some modes of a state, of unit kinetic energy; arrays are complex under loads without a potential.
+    """Some modes of a state, of unit kinetic energy, symmetries last; complex under loads without a potential.
 
-    Eigenvalues ``value`` (K,), those of symmetries, zero, last; backward errors ``residual`` (K,), nan for symmetries;
-    ``motion``, the name of each; ``displacement`` and ``rotation`` (K, m, 3) in the space frame.
+    Displacements and rotations (K, m, 3) are in space, backward errors ``residual`` (K,) nan for symmetries.
     """
 
     value: np.ndarray

@@ -155,10 +155,8 @@ def save_run(
 ) -> None:  # fmt: skip
     """Add ``branches`` to ``states.h5`` of a folder, and replace ``diagram.json``; collective, written on rank 0.
 
-    ``data`` are the contents of ``diagram.json``, ``solvers`` those of the meshes that points name, ``modes`` those of
-    the typical states of each of the branches; ``first`` says that ``states.h5`` is a new one.  Both files are written
-    before either takes its place, ``states.h5`` first, so that it has all branches of a ``diagram.json`` of the same
-    run.  Raises :class:`InputError` on every rank where the folder cannot be written.
+    Both files are written before either takes its place, ``states.h5`` first, so that it has all branches of a
+    ``diagram.json`` of the same run.
     """
     states = folder / "states.h5"
     image = states_of(branches, solvers, states, run=data["run"], first=first, modes=modes)

@@ -71,10 +71,9 @@ class Glyph(NamedTuple):
 def body_of(name: str) -> Surface:
     """Surface of a body.
 
-    ``box`` and ``wedge`` have half sides of one, ``ball`` the radius one.  ``bar`` and ``arrow`` go from zero to one
-    along z, with radii of one for the bar and the arrow's shaft.  ``coil`` and ``small coil`` go so, too, with x and y
-    in radii of the rod.  ``spiral`` lies in the plane of x and y, and ``turn`` is an arrow three quarters of the way
-    about z, whose radius is one, and whose head is at x.
+    ``box`` and ``wedge`` have half sides of one, ``ball`` the radius one.  ``bar``, ``arrow`` and coils go from zero to
+    one along z, with a radius of one, of coils in radii of the rod.  ``spiral`` lies in the plane of x and y, and
+    ``turn`` is an arrow three quarters of the way about z, whose head is at x.
     """
     if name in ("box", "wedge"):
         top = 0.22 if name == "wedge" else 1.0
@@ -197,10 +196,9 @@ def striped(
 def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats) -> Floats:
     """Outline of a rod's cross-sections at arclengths (n,), at angles (k,) from d1: (n, k, 2), of mean radius 1.
 
-    ``section`` has second moments of area (m, 2, 2) at arclengths (m,), up to a factor; round without it.  The outline
-    has their principal axes and their proportion, ``sqrt(J1 / J2)``, as far as it is not flatter than :data:`FLATTEST`;
-    it is an ellipse where it is nearly round, and tends to a rectangle where it is flat.  Its area is proportional to
-    the fourth root of their determinant.
+    It has the principal axes of the second moments of area (m, 2, 2) of ``section``, and their proportion, ``sqrt(J1 /
+    J2)``, up to :data:`FLATTEST`: an ellipse where it is nearly round, a rectangle where it is flat.  Its area is
+    proportional to the fourth root of their determinant.
     """
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     if section is None:
@@ -249,8 +247,7 @@ def glyphs_of(
 ) -> list[Glyph]:
     """Glyphs for all that holds and loads a rod, by its ``setting``, in a picture of this ``look``.
 
-    ``s`` (n,) are arclengths, ``pose`` the centreline (n, 3) and the directors (n, 3, 3) as columns; ``home`` (n, 3) is
-    the centreline of the equilibrium from which a motion has taken the rod, None: it is there.
+    ``pose`` has the centreline (n, 3) and the directors (n, 3, 3), ``home`` the centreline that a motion has left.
     """
     centres, frames = pose
     home = centres if home is None else home
@@ -331,10 +328,7 @@ def _spring(body: str, at: Floats, home: Floats, way: Floats, look: Look) -> lis
     end = home + length * look.radius * way
     along = (end - at) / np.linalg.norm(end - at)
     plate = 0.8 * BLOCK * look.radius * np.diag([wide, wide, 0.2]) @ _triad(way, look.up)
-    return [
-        between(body, at + 0.8 * look.radius * along, end, look.radius, STEEL),
-        glyph("box", GREY, end, plate),
-    ]
+    return [between(body, at + 0.8 * look.radius * along, end, look.radius, STEEL), glyph("box", GREY, end, plate)]
 
 
 def _foundation(setting: Setting, s: Floats, centres: Floats, home: Floats, look: Look) -> list[Glyph]:

@@ -28,11 +28,9 @@ Branch = Mapping[str, Any]
 
 
 class Piece(NamedTuple):
-    """Rows ``first`` to ``last`` of a branch with one index between them.
+    """Rows of a branch with one index, ``negative``, that ``in_space`` (None: unknown), and ``undecided`` eigenvalues.
 
-    ``negative`` is the index, of a planar rod in its plane, ``in_space`` that among all perturbations (None: unknown),
-    ``undecided`` the number of eigenvalues that may be negative as well.  On a ``kink``, of the functions of that name,
-    the index is that of one side.
+    On a ``kink``, of the functions of that name, the index is that of one side.
     """
 
     first: int
@@ -86,11 +84,9 @@ def _index(ends: Sequence[tuple[int | None, int, int]]) -> tuple[int, int]:
 
 
 def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
-    """Rows at which the index is known before and after, with both.
+    """Rows at which the index is known before and after, with both: singular points, and rows next to them.
 
-    They are singular points, and rows next to them at the same load: a load asked for may be that of a special point,
-    where the index of the row itself is not decided.  At the branch point that a branch leaves they are undecided rows,
-    too, whose index is that of the next row.
+    At the branch point that a branch leaves they are undecided rows, too, whose index is that of the next row.
     """
     columns = branch["columns"]
     for point in (point for point in branch.get("special", []) if point["kind"] in COUNTED):
@@ -140,8 +136,7 @@ def _in_space(branch: Branch) -> list[int]:
 class Interval:
     """Consecutive rows of a ``branch`` of ``diagram.json`` with one ``kind`` of stability, from ``first`` to ``last``.
 
-    ``least`` and ``most`` bound the index, ``in_space`` is the index among all perturbations of a planar rod (None:
-    unknown).  Stability is undecided on a ``kink``, of the functions of that name, and where eigenvalues are too near
+    ``least`` and ``most`` bound the index.  Stability is undecided on a ``kink`` and where eigenvalues are too near
     zero (``soft``).
     """
 
@@ -197,8 +192,7 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
     """Branch, row and words of the state to draw: a stable one well inside a branch that leaves the first one.
 
     Where none is stable there, one of another branch but the first; else one of least index on a branch that leaves the
-    first, described as unstable; on the first branch only where there is no other.  Raises :class:`InputError` for a
-    diagram without states.
+    first; on the first branch only where there is no other.
     """
     branches = [branch for branch in data["branches"] if branch["columns"]["load"]]
     if not branches:

@@ -33,15 +33,12 @@ POINTS: dict[str, dict[str, Any]] = {
 
 
 def draw_locus(loci: Sequence[Locus], path: Path) -> Path:
-    """Draw loci of one scene in the plane of its two parameters, one over the other.
+    """Draw loci of one scene, contents of their files, in the plane of their two parameters; the load is upwards.
 
-    The first parameter, the load, is upwards.  Next to each curve stand the indices of the equilibria on its two sides
-    where they were counted, as ``0|1``.  The stable side of a curve is shaded as far as the next curve, or the bound of
-    the load: there stability is known as far as these curves tell, as no other one was looked for.
-
-    ``loci`` are the contents of files written by :meth:`rodfem.codim2.locus.Locus.save`; ``path`` is the picture to
-    write, and to return.  Raises :class:`InputError` for another format of file, and :class:`ValueError` without any
-    locus, or if they are not of the same two parameters.
+    Next to each curve stand the indices on its two sides where they were counted, as ``0|1``.  The stable side of a
+    curve is shaded as far as the next curve, or the bound of the load: as far as these curves tell.  Returns ``path``;
+    raises :class:`InputError` for another format of file, and :class:`ValueError` for loci of different parameters, or
+    none.
     """
     if any(one["parameters"] != loci[0]["parameters"] for one in loci) or not loci:
         raise ValueError(

@@ -39,11 +39,10 @@ GROWTH = 1e-9  # real part of the root of -mu, relative to it, above which a mod
 
 
 def draw_modes(path: Path, branch: str, row: int, output: Path) -> Path:
-    """Draw the modes of one state, each in a panel of its own.
+    """Draw the modes of one state of a file ``modes.h5``, each in a panel of its own; returns ``output``.
 
-    ``path`` is the file ``modes.h5``, ``branch`` and ``row`` the state.  ``output`` is the picture to write, and to
-    return; an animation if its suffix is .gif, in which unstable modes grow like ``exp(sqrt(-mu) t)``, then go back,
-    and stable ones oscillate, each in a time of its own.  Raises :class:`InputError` if the file has no such modes.
+    If its suffix is .gif it is an animation, in which unstable modes grow like ``exp(sqrt(-mu) t)``, then go back, and
+    stable ones oscillate, each in a time of its own.
     """
     modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)

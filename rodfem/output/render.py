@@ -32,7 +32,8 @@ from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import HELD, TURNS, Setting
 from rodfem.problem.setting import read as read_setting
-from rodfem.whole_files import draft_of, picture_at, write_whole
+from rodfem.ranks import on_first
+from rodfem.whole_files import draft_of, write_whole
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Branch, Point
@@ -57,17 +58,11 @@ def draw_shape(
 ) -> Path:  # fmt: skip
     """Draw one equilibrium: the rod with a stripe along d1, arrows along d1 and d2, what holds it and what loads it.
 
-    Cross-sections lie in the plane of d1 and d2, so that shear shows, and have the proportion of the bending
-    stiffnesses (:func:`rodfem.output.glyphs.profile_of`).  What a file does not record is not drawn: of one without
-    supports the rod alone, round.  See :func:`view_of` for the direction of view.
-
-    The state is in a ``row``, from 0 on, of a ``branch`` of the file ``states``; the suffix of ``path`` decides the
-    format (.png, .jpg, .bmp, .tif).  ``caption`` is the line at its foot (None: scene, branch and load), ``radius`` the
-    mean radius of the rod (None: :func:`thickness`), ``size`` width and height in pixels (words keep
-    theirs, so that a smaller picture has larger ones), and ``view`` has the axes of the picture as rows (3, 3), as
-    :func:`view_in` gives them (None: those of this state).  Raises :class:`ValueError` where there is no such state or
-    an argument has no meaning, :class:`ImportError` where PyVista or a library that it needs is missing, and
-    :class:`RuntimeError` where the picture comes out blank.
+    Cross-sections lie in the plane of d1 and d2, so that shear shows (:func:`rodfem.output.glyphs.profile_of`).  The
+    state is in a ``row`` of a ``branch`` of the file ``states``; the suffix of ``path`` decides the format.  By default
+    ``caption`` says scene, branch and load, ``radius`` is :func:`thickness`, and ``view``, the axes of the picture (3,
+    3), that of this state; ``size`` is in pixels.  Raises :class:`ValueError` where there is no such state,
+    :class:`ImportError` without PyVista, and :class:`RuntimeError` where the picture comes out blank.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -230,12 +225,11 @@ def view_of(
 ) -> Floats:
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
-    ``reference`` and ``moved`` (n, 3) are the centreline of the state that the rod has left, and the displacement from
-    it.  Directions (3,) are ``axis``, that of the rod (None: its chord), ``down``, that of gravity, ``load``, that of a
-    force across the rod, or of its deflection, and ``side``, upwards where a straight rod has not moved.  With ``feet``
-    the rod is held in two places or more, and may be an arch.
+    The rod has ``moved`` (n, 3) from the centreline ``reference`` (n, 3).  Directions (3,) are the ``axis`` of the rod
+    (None: its chord), gravity, ``down``, the ``load`` across the rod, and ``side``, upwards where a straight rod has
+    not moved.  With ``feet`` the rod is held in two places or more, and may be an arch.
 
-    Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is the
+    Without gravity the axis goes to the right, so that nothing that holds the rod looks tilted, and vertical is the
     principal direction of the displacement across it, or a load that is not nearly along that; then the rod is seen
     from aside.  A closed rod is shown in the plane nearest to it.
     """
@@ -332,7 +326,8 @@ class Snapshot:
     def save(self, path: Path | str) -> Path:
         """Write it; its folder is made.  Raises :class:`InputError` where it cannot be written."""
         path = Path(path)
-        picture_at(path, (".png",))
+        if path.suffix.lower() != ".png":
+            raise InputError(f"The picture {path} is PNG: give a name that says so, as in shape.png.")
         write_whole({path: self.png})
         return path
 
@@ -360,8 +355,8 @@ def snapshot(
         if comm.rank == 0:
             png = draw_shape(states, name, row, picture, caption=caption).read_bytes()
     found = Snapshot(png)
-    if path is not None and comm.rank == 0:
-        found.save(path)
+    if path is not None:
+        on_first(comm, lambda: found.save(path))
     return found
 
 

@@ -52,11 +52,7 @@ VECTORS = {
 
 @dataclass(frozen=True)
 class Rows:
-    """All rows of a branch: ``columns`` by name (rows,), and ``fields`` at the nodes by name, (m, k) for each row.
-
-    Fields are ``s``, ``r``, ``q``, the directors ``d1`` to ``d3``, the nodal unknowns of the scene, and, along the
-    directors, strains ``v``, curvatures ``k``, contact force ``n`` and moment ``m``.
-    """
+    """All rows of a branch: ``columns`` by name (rows,), and ``fields`` at the nodes by name, (m, k) for each row."""
 
     name: str
     columns: dict[str, Floats]

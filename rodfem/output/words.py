@@ -48,9 +48,8 @@ def rounded_up(error: float) -> float:
 def number(value: float, error: float, resolved: bool | None = True, scale: float = 0.0) -> str:
     """A ``value`` with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
 
-    The bar is rounded up; to the error it adds what the digits left out amount to.  ``(at least 3e-02)`` where the mesh
-    has not ``resolved`` what the number is of.  Without an ``error`` that is finite it says so, and is zero where it is
-    round-off of numbers of the ``scale``.
+    The bar is rounded up; to the error it adds what the digits left out amount to.  It is ``at least`` that where the
+    mesh has not ``resolved`` the state.  Without an ``error`` what is round-off of numbers of the ``scale`` is zero.
     """
     if not isfinite(error):
         return f"{0.0 if abs(value) <= NEGLIGIBLE * scale else value:.8g}{NO_ESTIMATE}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Iterable, Mapping, Set
+from contextlib import suppress
 from functools import wraps
 from math import isfinite, nan
 from numbers import Integral, Real
@@ -36,41 +37,51 @@ def refused(name: str, value: Any, wanted: str) -> InputError:
     return InputError(f"{name} is {SHORT.repr(value)}: give {wanted.replace('@', name)}.")
 
 
-def whole(name: str, value: Any, example: int, least: int | None = None) -> int:
-    """Whole number, no bool and no float, ``least`` or more unless that is None."""
-    if not isinstance(value, Integral) or isinstance(value, bool):
-        raise refused(name, value, f"a whole number, as in @={example}")
-    if least is not None and value < least:
-        raise refused(name, value, f"{least} or more, as in @={example}")
-    return int(value)
+def whole(example: int, least: int | None = None) -> Check:
+    """Check for a whole number, no bool and no float, ``least`` or more unless that is None."""
+
+    def check(name: str, value: Any) -> int:
+        if not isinstance(value, Integral) or isinstance(value, bool):
+            raise refused(name, value, f"a whole number, as in @={example}")
+        if least is not None and value < least:
+            raise refused(name, value, f"{least} or more, as in @={example}")
+        return int(value)
+
+    return check
 
 
-def real(name: str, value: Any, example: float) -> float:
-    """Number, no bool and no string."""
-    try:
+def real(example: float) -> Check:
+    """Check for a number, no bool and no string."""
+
+    def check(name: str, value: Any) -> float:
         if isinstance(value, Real) and not isinstance(value, (bool, np.bool_)):
-            return float(value)
-    except OverflowError:  # of an integer
-        pass
-    raise refused(name, value, f"a number, as in @={example:g}")
+            with suppress(OverflowError):  # of an integer
+                return float(value)
+        raise refused(name, value, f"a number, as in @={example:g}")
+
+    return check
 
 
-def finite(name: str, value: Any, example: float) -> float:
-    """Finite number."""
-    number = real(name, value, example)
-    if not isfinite(number):
-        raise refused(name, number, f"a finite number, as in @={example:g}")
-    return number
+def finite(example: float) -> Check:
+    """Check for a finite number."""
+
+    def check(name: str, value: Any) -> float:
+        number = real(example)(name, value)
+        if not isfinite(number):
+            raise refused(name, number, f"a finite number, as in @={example:g}")
+        return float(number)
+
+    return check
 
 
 def reals(
-    name: str, values: Any, example: tuple[float, ...], size: int | None = None, one: Callable[..., float] = real
+    name: str, values: Any, example: tuple[float, ...], size: int | None = None, one: Callable[[float], Check] = real
 ) -> tuple[float, ...]:
     """Tuple of numbers, ``size`` of them unless that is None, each of which passes the check ``one``."""
     given = tuple(values) if isinstance(values, Iterable) and not isinstance(values, UNORDERED) else None
     if given is None or (size is not None and len(given) != size):
         raise refused(name, values, f"{size or 'a tuple of'} numbers, as in @={example}")
-    return tuple(one(f"{name}[{i}]", value, example[0]) for i, value in enumerate(given))
+    return tuple(one(example[0])(f"{name}[{i}]", value) for i, value in enumerate(given))
 
 
 def takes(function: Any, arguments: int) -> bool:
@@ -137,17 +148,7 @@ def text(example: str) -> Check:
     return a(str, f"a text, as in {example!r}")
 
 
-def count(example: int, least: int = 0) -> Check:
-    """Check for a whole number, ``least`` or more."""
-    return lambda name, value: whole(name, value, example, least)
-
-
-def number(example: float) -> Check:
-    """Check for a finite number."""
-    return lambda name, value: finite(name, value, example)
-
-
-def interval(low: float, high: float, one: Callable[..., float] = finite) -> Check:
+def interval(low: float, high: float, one: Callable[[float], Check] = finite) -> Check:
     """Check for two finite numbers, as in ``(low, high)``, or two that pass the check ``one``."""
     return lambda name, value: reals(name, value, (low, high), 2, one)
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from rodfem.errors import InputError
 from rodfem.forms import inertia, loads
-from rodfem.problem.arguments import convert, number, optional, yes_or_no
+from rodfem.problem.arguments import convert, finite, optional, yes_or_no
 from rodfem.problem.functions import Constants, Given, OfPlace, Place, Role, functions_of, role_field
 
 Direction = tuple[float, ...]
@@ -193,7 +193,7 @@ class Attachment(Contribution):
 
     def __post_init__(self) -> None:
         """Check the place, and that there is something; raises :class:`InputError`."""
-        convert(self, s=number(0.5))
+        convert(self, s=finite(0.5))
         if all(value is None for name, value in vars(self).items() if name != "s"):
             raise InputError(
                 f"Nothing is attached at s = {self.s:g}: give the attachment a force, a follower force, an energy, a "
@@ -226,7 +226,7 @@ class Constraint(Contribution):
 
     def __post_init__(self) -> None:
         """Check the place; raises :class:`InputError`."""
-        convert(self, s=optional(number(0.5)))
+        convert(self, s=optional(finite(0.5)))
 
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """One scalar multiplier."""

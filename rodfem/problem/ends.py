@@ -23,7 +23,7 @@ import ufl
 from rodfem.errors import InputError, SceneError
 from rodfem.forms import loads
 from rodfem.forms.rotation import IDENTITY, rotation
-from rodfem.problem.arguments import check_vector, convert, number, number_of, plain, reals, yes_or_no
+from rodfem.problem.arguments import check_vector, convert, finite, number_of, plain, reals, yes_or_no
 from rodfem.problem.contribution import (
     DEAD_AT_END,
     FOLLOWER,
@@ -260,7 +260,7 @@ class Ring:
 
     def __post_init__(self) -> None:
         """Check the kinds; raises :class:`InputError`."""
-        convert(self, odd=yes_or_no, turn=number(np.pi))
+        convert(self, odd=yes_or_no, turn=finite(np.pi))
 
     def __iter__(self) -> Iterator[End]:
         """Yield the left and the right end."""
@@ -330,8 +330,7 @@ def _dot(multipliers: Any, values: Any, components: Any) -> Any:
 class SlidingHinge(End):
     """End that turns about the axis ``hinge``, and whose ``position`` slides along a unit vector ``guide`` of space.
 
-    Components of the position across which the direction is are held.  Forces of the guide, scalar unknowns, keep the
-    others on it: as many as there are, less one.
+    Components across which the direction is are held; forces of the guide, scalar unknowns, keep the others on it.
     """
 
     guide: Direction = (0.0, 0.0, 1.0)  # type: ignore[misc]
@@ -436,10 +435,7 @@ def sliding(position: Given, rotation: Given = IDENTITY, force: Given = None) ->
 
 
 def hinged(
-    axis: tuple[float, float, float],
-    position: Given = (0.0, 0.0, 0.0),
-    rotation: Given = IDENTITY,
-    force: Given = None,
+    axis: tuple[float, float, float], position: Given = (0.0, 0.0, 0.0), rotation: Given = IDENTITY, force: Given = None
 ) -> End:
     """Return an end that turns freely about one ``axis`` only, given along the directors of ``rotation``.
 

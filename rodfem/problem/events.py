@@ -78,7 +78,7 @@ class Level:
 
     def __post_init__(self) -> None:
         """Check the value; raises :class:`InputError`."""
-        finite("value", self.value, 0.5)
+        finite(0.5)("value", self.value)
 
     @property
     def name(self) -> str:

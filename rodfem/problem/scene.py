@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, partial
+from functools import cached_property
 from keyword import iskeyword
 from math import inf, isfinite
 from numbers import Real
@@ -21,7 +21,7 @@ import ufl
 from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import RODS, UNDEFORMED
-from rodfem.problem.arguments import Check, a, convert, encodes, interval, number, optional, plain, real, text
+from rodfem.problem.arguments import Check, a, convert, encodes, finite, interval, optional, plain, real, text
 from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution
 from rodfem.problem.ends import End, Ring
 from rodfem.problem.functions import (
@@ -66,7 +66,7 @@ class Parameter:
     def __post_init__(self) -> None:
         """Check the kinds, and have floats; raises :class:`InputError`."""
         word = text("P")
-        convert(self, value=partial(real, example=1.0), admissible=interval(0.0, inf, real))
+        convert(self, value=real(1.0), admissible=interval(0.0, inf, real))
         convert(self, label=word, words=word, unit=word)
 
     def check(self, name: str, value: float) -> None:
@@ -135,7 +135,7 @@ class Ordinate:
     def __post_init__(self) -> None:
         """Check the kinds; raises :class:`InputError`."""
         word = text("tip")
-        convert(self, name=word, label=word, unit=word, s=optional(number(1.0)))
+        convert(self, name=word, label=word, unit=word, s=optional(finite(1.0)))
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -189,7 +189,7 @@ def _parameters(name: str, value: Any) -> dict[str, Parameter]:
     for n, p in a(Mapping, "a dictionary, as in {'P': Parameter(0.0)}")(name, value).items():
         if not isinstance(n, str) or not n.isidentifier() or iskeyword(n) or n == "s" or n.startswith("__"):
             raise SceneError(f"A parameter cannot have the name {n!r}: choose another (s is the arclength).")
-        made[n] = p if isinstance(p, Parameter) else Parameter(real(n, p, 0.0))
+        made[n] = p if isinstance(p, Parameter) else Parameter(real(0.0)(n, p))
     return made
 
 
@@ -309,7 +309,6 @@ class Scene(Contribution, metaclass=Stated):
         check_scene(self)
 
     def __dir__(self) -> list[str]:
-        """Names for completion."""
         return dir(type(self))
 
     def _check_values(self) -> None:
@@ -330,10 +329,7 @@ class Scene(Contribution, metaclass=Stated):
         self.check_span(self.span)
 
     def check_span(self, span: tuple[float, float]) -> None:
-        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ.
-
-        For another range than that of the scene all is checked that the scene is checked for at the loads of its own.
-        """
+        """Raise :class:`SceneError` unless a range of loads is admissible, and checked as the scene's own."""
         for value in span:
             self.parameters[self.load].check(self.load, value)
         if span[0] == span[1]:
@@ -386,10 +382,7 @@ class Scene(Contribution, metaclass=Stated):
 
     @cached_property
     def parts(self) -> list[Part]:
-        """All that contributes to the problem but the stored energy: loads along the rod, ends, what is attached.
-
-        Constraints whose multipliers are fields, and those whose multipliers are scalars, are numbered each for itself.
-        """
+        """All that contributes but the stored energy; multipliers that are fields are numbered by themselves."""
         out = [Part(self, 0, None), *(Part(end, i, self.interval[i]) for i, end in enumerate(self.sides))]
         out += [Part(x, i, x.s) for i, x in enumerate(self.attachments)]
         for i, x in enumerate(self.constraints):

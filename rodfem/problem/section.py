@@ -145,7 +145,7 @@ def _bounded(example: float, least: float, most: float, words: str, *, open_belo
     """Check for a finite number above ``least``, or at least that, and at most ``most``."""
 
     def check(name: str, value: Any) -> float:
-        number = finite(name, value, example)
+        number = finite(example)(name, value)
         if number > most or number < least or (open_below and number == least):
             raise InputError(f"{name} is {number:g}: {words}.")
         return number

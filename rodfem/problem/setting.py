@@ -31,10 +31,9 @@ HELD, AXIS, TURNS = "held", "axis", "free"  # freedom of directors: held, rotati
 class Support:
     """Support and loads of a rod at the arclength ``s``, in one state; vectors are (3,), zero if there is none.
 
-    ``guide`` is the only direction in which the position moves if that need not be e1, e2 or e3.  ``frame`` is the unit
-    quaternion of what holds the directors, or of the scene's start, ``axis`` is along them.  Stiffnesses (3, 3) are
-    along, and about, e1, e2, e3; ``force`` and ``moment`` are in the frame of space, felt in the free directions, those
-    of potentials that are no springs among them.
+    ``guide`` is the only direction in which the position moves if that need not be e1, e2 or e3; ``frame`` is the
+    quaternion of what holds the directors, ``axis`` is along them.  Stiffnesses (3, 3), ``force`` and ``moment``, felt
+    in the free directions, are in the frame of space.
     """
 
     s: float
@@ -90,11 +89,11 @@ class Tie:
 
 @dataclass(frozen=True)
 class Setting:
-    """Supports and loads of a rod in one state, as a file records them; empty for a file without them.
+    """Supports and loads of a rod in one state, as a file records them.
 
-    ``section`` has arclengths (n,) and second moments of area (n, 2, 2) up to a factor; ``distributed`` arclengths (n,)
-    and forces per length (n, 3) in the frame of space and along the directors; ``foundation`` arclengths (n,) and
-    stiffnesses per length (n, 3, 3).  ``notes`` names in words what acts and has no place in a picture.
+    ``section`` has arclengths (n,) and second moments of area (n, 2, 2); ``distributed`` arclengths and forces per
+    length (n, 3) in space and along the directors; ``foundation`` arclengths and stiffnesses per length (n, 3, 3).
+    ``notes`` names in words what acts and has no place in a picture.
     """
 
     supports: tuple[Support, ...] = ()

@@ -87,11 +87,10 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
 
 
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
-    """Profiles of a branch, whose group of ``states.h5`` is given; ``states`` is the number of those of all branches.
+    """Profiles of a branch: ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors.
 
-    They are ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors
-    at M points, nan beyond the last one of a coarser mesh; ``element`` (P,), how many of them an element has, which
-    determine its polynomials, and 0 where some are left out; ``jumps`` (P,) of each of the four between elements.
+    ``element`` (P,) says how many of the M points an element has, which determine its polynomials, and 0 where some are
+    left out; ``jumps`` (P,) are those of each of the four between elements.
     """
     found = [profiles_of(group, row) for row in range(len(group["load"]))]
     most, loaded = group[POINTS][0].size, _loaded(group)
@@ -213,10 +212,9 @@ def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any)
 
 
 class Shown(NamedTuple):
-    """A mode: eigenvalue ``value``, bound of its ``error`` (nan: not estimated), name of its ``motion``.
+    """A mode with the bound of its ``error`` (nan: not estimated), and displacement and rotation (m, 3) at nodes ``s``.
 
-    ``u`` and ``w`` (m, 3) are displacement and rotation at the nodes ``s`` (m,); ``zero`` says that the count at the
-    state has its eigenvalue among those that vanish.
+    ``zero`` says that the count at the state has its eigenvalue among those that vanish.
     """
 
     value: complex
