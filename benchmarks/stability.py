@@ -69,7 +69,7 @@ def state(formulation: str, elements: int, degree: int, which: str = "straight")
 
     Neither has a symmetry; the search for one, longer than what is measured, is left out.
     """
-    rodfem.fem.system.find_symmetries = lambda fields, equations: []
+    rodfem.fem.system.find_symmetries = lambda equations: []
     solver = Solver(demo_cases.scene("cord"), Discretization(formulation, elements, degree)).equilibria
     solver.system.set_phase(None)
     load = LOAD if which == "straight" else BUCKLED
@@ -99,28 +99,30 @@ def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
         found.below(0.0)
         right = np.zeros((x.local_size, 2))
         return lambda: found.factors.solve_all(right)
-    spectrum = assessor.spectrum if method in ("eigenvalues", "proof", "scipy", "dense QZ") else None
-    if spectrum is not None and method in ("eigenvalues", "proof"):
-        assessor.system.set_phase(x)
-        if method == "eigenvalues":
-            return lambda: spectrum.leftmost(x, NUMBER).values
-        spectrum.assemble(x)
+    if method in ("eigenvalues", "proof", "scipy", "dense QZ"):
+        return of_pencil(method, assessor, x)
+    return lambda: assessor(x, method, 0 if method == "count" else NUMBER).values
+
+
+def of_pencil(method: str, assessor: Assessor, x: PETSc.Vec) -> Callable[[], Any]:
+    """What is measured of the pencil of a state alone."""
+    assessor.system.set_phase(x)
+    if method == "eigenvalues":
+        return lambda: assessor.symmetric.at(x).leftmost(NUMBER).values
+    spectrum = assessor.below(x)
+    if method == "proof":
         cuts = itertools.count()
         return lambda: spectrum.below(spectrum.shift + 1e-3 * next(cuts))
-    if spectrum is not None:
-        spectrum.assemble(x)
-        spectrum.go_below()
-        S, M = gathered(spectrum.matrix).tocsc(), gathered(spectrum.mass).tocsc()
-        if method == "dense QZ":
-            return lambda: scipy.linalg.eigvals(S.toarray(), M.toarray())
-        start = np.ones(S.shape[0])
+    S, M = gathered(spectrum.matrix).tocsc(), gathered(spectrum.mass).tocsc()
+    if method == "dense QZ":
+        return lambda: scipy.linalg.eigvals(S.toarray(), M.toarray())
+    start = np.ones(S.shape[0])
 
-        def eigs() -> Any:
-            spectrum.assemble(x)  # as all other methods do
-            return np.sort(spl.eigs(S, NUMBER, M, sigma=spectrum.shift, v0=start, tol=1e-9)[0].real)
+    def eigs() -> Any:
+        spectrum.at(x)  # as all other methods do
+        return np.sort(spl.eigs(S, NUMBER, M, sigma=spectrum.shift, v0=start, tol=1e-9)[0].real)
 
-        return eigs
-    return lambda: assessor(x, method, 0 if method == "count" else NUMBER).values
+    return eigs
 
 
 def measure(method: str, formulation: str, elements: int, degree: int, which: str = "straight") -> dict[str, Any]:

@@ -138,7 +138,8 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
     system.set_phase(x)
     index = Index(at.negative, system.phase.count + len(null) + piece.still)
     point = solver.point(x, piece.begin + piece.place(x), tangent, index=index)
-    left = (0.0 if fold else load_uncertainty(solver, found)) + round_off(point.load, solver.units.load)
+    between = at.width * abs(system.scalar(at.slope))  # loads of several crossings, whose mean is solved for
+    left = (0.0 if fold else max(load_uncertainty(solver, found), between)) + round_off(point.load, solver.units.load)
     coupling = max(coupling_of(solver, x, v) for v in null)
     nearby = across(solver.inertia.metric, found.modes, null)
     special = SpecialPoint(FOLD if fold else BRANCH_POINT, point, at.before, at.after, left, null, nearby, coupling)
@@ -149,7 +150,7 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
         special.null_vectors, special.nearby = null + nearby[:more], nearby[more:]
         point.zero += more
         apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
-        special.located_to += 2 * max(apart, at.width * abs(system.scalar(at.slope)))
+        special.located_to += 2 * max(apart, between)
     return special
 
 

@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from benchmarks import fronts, reduced_stiffness
+from benchmarks import fronts, reduced_stiffness, stability
 from benchmarks.auto.output import AutoError
 from benchmarks.auto.problems import PROBLEMS
 from benchmarks.auto.program import check, require_auto
@@ -14,6 +14,7 @@ from benchmarks.speed import plots
 from benchmarks.speed.scipy_bvp import RODS, solve
 from benchmarks.speed.tables import fastest
 from benchmarks.targets import TARGETS
+from rodfem.fem import system
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -60,6 +61,14 @@ def test_figures_are_drawn_from_the_page_alone(tmp_path: Path) -> None:
     (row,) = [r for r in tables["All branches"][0] if r[:3] == ["cord", "straight", "2 P8 reduced"]]
     assert [float(row[3]), float(row[4])] == [78, 25] and plots.discretisation(row[2]) == (2, 8, "reduced")
     assert not plots.draw(Path(shutil.copy(DOCS / "rods.md", tmp_path)))
+
+
+def test_every_way_to_judge_a_state_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that find eigenvalues agree with scipy's shift-invert on the same pencil."""
+    monkeypatch.setattr(stability, "ENOUGH", 0.0)
+    monkeypatch.setattr(system, "find_symmetries", system.find_symmetries)  # benchmarks leave the search out
+    found = {name: stability.measure(name, "reduced", 20, 1)["first"] for name in (*stability.METHODS, "proof")}
+    assert [v for v in found.values() if v is not None] == pytest.approx([found["scipy"]] * 7, rel=1e-7)
 
 
 @pytest.mark.parametrize("picture", [fronts, reduced_stiffness])
