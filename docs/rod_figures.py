@@ -26,7 +26,7 @@ from rodfem.output.render import view_of
 from rodfem.output.style import STYLE, symbol_of, tex
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
-from rodfem.problem.supports import distributed_on, foundation_of, supports_of, ties_of
+from rodfem.problem.supports import distributed_on, foundation_of, supports_of
 
 DOCS = Path(__file__).parent
 COLUMNS, DPI, MOST_ENTRIES, LONG = 2, 110, 4, 40
@@ -146,7 +146,6 @@ def shape(axes: Axes, diagram: Diagram, branch: Branch, row: int) -> None:
         supports=tuple(supports_of(scene, samples[1]).values()),
         distributed=distributed_on(scene, point.load) if scene.distributed is not None else None,
         foundation=foundation_of(scene, samples[1]) if scene.potential is not None else None,
-        ties=tuple(kept[0] for kept in ties_of(scene, samples[1:])),
     )
     s = samples[1]["s"]
     look = Look(float(np.ptp(s)) / SLENDER, view)

@@ -91,16 +91,10 @@ class Modes:
 
 
 def save_modes(
-    modes: Modes,
-    path: Path,
-    branch: str,
-    row: int,
-    about: Mapping[str, Any],
-    *,
-    first: bool,
-    scene: Scene | None = None,
+    modes: Modes, path: Path, branch: str, row: int, about: Mapping[str, Any], *, first: bool, scene: Scene
 ) -> None:
     """Append the ``modes`` of a ``row`` of a ``branch`` to a file (``first``: a new one), on one rank."""
+    from rodfem.problem.supports import write, write_section  # they need UFL, which pictures do not
 
     def add(file: h5py.File) -> None:
         if first:
@@ -112,12 +106,9 @@ def save_modes(
             group[name] = getattr(modes, name)
         group.attrs["note"] = modes.note
         group["motion"] = np.array(modes.motion, dtype=h5py.string_dtype())
-        if scene is not None:
-            from rodfem.problem.supports import write, write_section  # they need UFL, which pictures do not
-
-            if first:
-                write_section(file, scene)
-            write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r", "q")}])
+        if first:
+            write_section(file, scene)
+        write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r", "q")}])
 
     write_whole({path: with_added(path, add, first=first)})
 

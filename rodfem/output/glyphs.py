@@ -6,17 +6,14 @@ whose map is stretched along its axis.  All bodies are lofts through closed ring
 
 The directors decide the body of a support (block where they are held, axle where they turn about an axis, ball on a
 point where they turn freely), free components of the position the rails on which it slides, stiffnesses the springs.
-So a slide is a block on rails, a pin that slides a ball on a wedge on rails; a free end is nothing.  A constraint that
-keeps the distance of two points is a string between them, one that keeps a point on a surface a ball in a frame tangent
-to it; an elastic foundation is a row of coils.  In a motion rails, what springs and strings are fixed to, and frames
-stay where the rod was.
+So a slide is a block on rails, a pin that slides a ball on a wedge on rails; a free end is nothing.  An elastic
+foundation is a row of coils.  In a motion rails, and what springs are fixed to, stay where the rod was.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
 from rodfem.problem.quaternions import directors
-from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
+from rodfem.problem.setting import AXIS, HELD, Setting, Support
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
 Floats = NDArray[np.float64]
@@ -268,8 +265,6 @@ def glyphs_of(
         out += body + _springs(support, place, look)
         out += [_ball(place.at, 2.2 * look.radius)] * bool(support.mass)
         out += _loads(load, share, place, 2.2 * size if body else 0.5 * BLOCK * look.radius, look)
-    for tie in setting.ties:
-        out += _tie(tie, s, centres, home, look)
     return out + _foundation(setting, s, centres, home, look) + _distributed(setting, s, pose, look)
 
 
@@ -349,24 +344,6 @@ def _stiff(stiffness: Floats) -> list[Floats]:
     if not np.allclose(stiffness, np.diag(values), rtol=0, atol=1e-3 * float(abs(stiffness).max())):
         values, vectors = np.linalg.eigh(stiffness)
     return [v for value, v in zip(values, vectors.T, strict=True) if value > 1e-3 * max(float(values.max()), POINT)]
-
-
-def _tie(tie: Tie, s: Floats, centres: Floats, home: Floats, look: Look) -> list[Glyph]:
-    """String between two points, or ball in a frame tangent to a surface; nothing for what has no place."""
-    whole = not np.isfinite(tie.s)
-    nodes = np.array([0, -1]) if whole else np.full(2, np.argmin(abs(s - tie.s)))
-    if np.isfinite(tie.line).all():
-        ends = tie.line + (centres - home)[nodes] * np.array([[whole], [True]])
-        if np.linalg.norm(ends[1] - ends[0]) < look.radius:
-            return []
-        string = between("bar", ends[0], ends[1], 0.3 * look.radius, DARK)
-        return [string, *(_ball(end, 1.4 * look.radius) for end in ends)]
-    if not np.isfinite(tie.normal).all():
-        return []
-    side, other, _ = 7.0 * look.radius * _triad(tie.normal, look.axes[0])
-    corners = [home[nodes[0]] + a * side + b * other for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
-    bars = [between("bar", a, b, 0.3 * look.radius, STEEL) for a, b in pairwise(corners)]
-    return [_ball(centres[nodes[0]], 1.7 * look.radius), *bars]
 
 
 def _loads(load: tuple[Floats, Floats], share: Floats, place: _Place, clear: float, look: Look) -> list[Glyph]:

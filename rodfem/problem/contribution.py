@@ -221,12 +221,15 @@ class Constraint(Contribution):
     of: OfPlace = field(metadata={"role": lambda x: Role("constraint", "f(x, c)", 0, along=x.s is None)})
     s: float | None = None
     letter: ClassVar[str] = "g"  # begins the name of its multiplier: those of one letter are numbered together
-    words: ClassVar[str] = ""  # for a picture in which it has no place
-    whole: ClassVar[bool] = False  # whether it is an integral
 
     def __post_init__(self) -> None:
         """Check the place; raises :class:`InputError`."""
         convert(self, s=optional(finite(0.5)))
+
+    @property
+    def words(self) -> str:
+        """What it is, for pictures, in which it has no place."""
+        return f"constraint at s = {self.s:g}"
 
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """One scalar multiplier."""
@@ -247,7 +250,6 @@ class Integral(Constraint):
 
     equals: Given = role_field(Role("value of an integral constraint", "f(c)", 0, placed=False), lambda c: 0.0)
     words = "integral constraint"
-    whole = True
 
     def value(self, x: Place, c: Constants) -> Any:
         """Integrand of the integral that is zero."""

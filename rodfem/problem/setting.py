@@ -10,19 +10,18 @@ Cross-sections are not part of a scene.  A picture gives them the proportion of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodfem.errors import SceneError
 from rodfem.problem.quaternions import directors
 
 Floats = NDArray[np.float64]
-T = TypeVar("T")
 
-SUPPORTS, DISTRIBUTED, SECTION, FOUNDATION, TIES = "supports", "distributed", "section", "foundation", "constraints"
+SUPPORTS, CONSTRAINTS, SECTION = "supports", "constraints", "section"
+DISTRIBUTED, FOUNDATION = "distributed", "foundation"
 """Groups below that of a branch or a state, and of the file."""
 HELD, AXIS, TURNS = "held", "axis", "free"  # freedom of directors: held, rotating about one axis, rotating freely
 
@@ -73,21 +72,6 @@ def kind_of(held: int, turning: str, sprung: bool) -> str:
 
 
 @dataclass(frozen=True)
-class Tie:
-    """Geometry that a constraint keeps, in one state; what it does not have is nan.
-
-    Of the point at ``s`` that is the ``line`` (2, 3) from a fixed point to it, or the unit ``normal`` (3,) of the
-    surface on which it is; of the two ends the line between them.  ``note`` is the constraint in words if it has
-    neither.
-    """
-
-    s: float
-    line: Floats
-    normal: Floats
-    note: str
-
-
-@dataclass(frozen=True)
 class Setting:
     """Supports and loads of a rod in one state, as a file records them.
 
@@ -100,7 +84,6 @@ class Setting:
     section: tuple[Floats, Floats] | None = None
     distributed: tuple[Floats, Floats, Floats] | None = None
     foundation: tuple[Floats, Floats] | None = None
-    ties: tuple[Tie, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -125,37 +108,20 @@ class Setting:
         return None if self.section is None else R[:, :2] @ np.linalg.eigh(self.section[1].mean(axis=0))[1][:, -1]
 
 
-def read(group: Any, row: int | None = None) -> Setting:
-    """Read what was written below a group of a file, with the section of the file; what is not there is left out."""
-    row, section, distributed, foundation = row or 0, None, None, None
-    supports, ties = _all(Support, group, SUPPORTS, row), _all(Tie, group, TIES, row)
-    notes = [tie.note for tie in ties if tie.note]
-    if SECTION in group.file:
-        s, B = (group.file[SECTION][name][:] for name in ("s", "stiffness"))
-        section = s, B[:, ::-1, ::-1] * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    if DISTRIBUTED in group:
-        along = group[DISTRIBUTED]
+def read(group: Any, row: int = 0) -> Setting:
+    """Read the state of a row of what was written below a group of a file, with the section of the file."""
+    supports = [
+        Support(**{name: value[row] for name, value in here.items()}, **dict(here.attrs))
+        for here in group[SUPPORTS].values()
+    ]
+    s, B = (group.file[SECTION][name][:] for name in ("s", "stiffness"))
+    section = s, B[:, ::-1, ::-1] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    notes, distributed, foundation = [x.attrs["note"] for x in group.get(CONSTRAINTS, {}).values()], None, None
+    if along := group.get(DISTRIBUTED):
         distributed = along["s"][:], along["force"][row], along["follower"][row]
-    if FOUNDATION in group:
-        along = group[FOUNDATION]
+    if along := group.get(FOUNDATION):
         if "stiffness" in along:
             foundation = along["s"][:], along["stiffness"][:]
         else:
             notes.append(along.attrs["note"])
-    return Setting(supports, section, distributed, foundation, ties, tuple(notes))
-
-
-def _all(kind: type[T], group: Any, name: str, row: int) -> tuple[T, ...]:
-    """Supports or constraints, in one state, from a group of their groups in a file."""
-    return tuple(_made(kind, here, row) for here in group[name].values()) if name in group else ()
-
-
-def _made(kind: type[T], group: Any, row: int) -> T:
-    entries = {name: value[row] for name, value in group.items()} | dict(group.attrs)
-    try:
-        return kind(**{f.name: entries[f.name] for f in fields(kind) if f.name != "guide" or "guide" in entries})  # type: ignore[arg-type]
-    except KeyError as missing:
-        raise SceneError(
-            f"{group.file.filename} has a {kind.__name__.lower()} without {missing} in {group.name}: another version "
-            "of rodfem wrote it; run the scene again."
-        ) from None
+    return Setting(tuple(supports), section, distributed, foundation, tuple(notes))

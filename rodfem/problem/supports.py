@@ -3,10 +3,6 @@ r"""Supports and loads of a rod: derived from a scene, and written to a file.
 A potential of an end is a *spring* in translation (in rotation) where its second derivative at the reference is
 positive semidefinite and not zero.  Minus its derivative at the state is a load where it is none, and where it is one
 in the directions in which the position moves without stiffness: along a stiff one it is an anchor elsewhere.
-
-A constraint ``g = 0`` of a point keeps it on a surface with the normal ``n`` along the derivative of ``g`` in the
-position.  With the second derivative ``H`` the principal curvatures are those of ``H/|g'|`` across ``n``; where they
-are one, ``k``, the point keeps its distance from the centre ``r - n/k``.  An integral of ``a . r'`` joins the two ends.
 """
 
 from __future__ import annotations
@@ -21,14 +17,11 @@ from numpy.typing import NDArray
 
 from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
-from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY, product, rotation
-from rodfem.problem import quaternions
-from rodfem.problem.contribution import Constraint
 from rodfem.problem.ends import End
 from rodfem.problem.functions import SIDES, Constants, OfPlace, Place, place
 from rodfem.problem.scene import Scene
-from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPORTS, TIES, Support, Tie, kind_of
+from rodfem.problem.setting import CONSTRAINTS, DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPORTS, Support, kind_of
 
 Floats = NDArray[np.float64]
 Sample = dict[str, Any]
@@ -165,61 +158,6 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
     return (s, found) if found.any() else None
 
 
-def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
-    """Geometry that each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
-    load = float(samples[0]["load"])
-    joined = [_of_the_ends(scene, x, load) if x.whole else None for x in scene.constraints]
-    return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, joined, strict=True)]
-
-
-def _tie(scene: Scene, constraint: Constraint, a: Floats | None, sample: Sample) -> Tie:
-    none = np.full((2, 3), np.nan)
-    if constraint.s is not None:
-        line, normal = _surface(scene, constraint.of, constraint.s, sample)
-        note = "" if np.isfinite([line[0], normal]).any() else f"constraint of the directors at s = {constraint.s:g}"
-        return Tie(constraint.s, line, normal, note)
-    if a is not None:
-        start, end = np.asarray(sample["r"][0]), np.asarray(sample["r"][-1])
-        return Tie(np.nan, np.array([start, start + a * (a @ (end - start)) / (a @ a)]), none[0], "")
-    return Tie(np.nan, none, none[0], constraint.words)
-
-
-def _surface(scene: Scene, of: OfPlace, s: float, sample: Sample) -> tuple[Floats, Floats]:
-    """Line (2, 3) from the centre of a surface to the point on it, or its unit normal (3,); nan for what it is not."""
-    r, q = _state(sample, s)
-    c, x, none = scene.constants(float(sample["load"]), s), _point(scene, s, r, q), np.full((2, 3), np.nan)
-    slope, second = derivative_of(of, c, x)[0], second_derivative_of(of, c, x)[0]
-    size = float(np.linalg.norm(slope))
-    if size == 0.0:
-        return none, none[0]
-    normal = slope / size
-    tangents = np.linalg.svd(normal[None])[2][1:]
-    first, last = np.linalg.eigvalsh(tangents @ second @ tangents.T / size)
-    if max(abs(first), abs(last)) * scene.length > FLAT and abs(last - first) < FLAT * abs(first + last):
-        return np.array([r - 2 * normal / (first + last), r]), none[0]
-    return none, normal
-
-
-def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | None:
-    """Vector ``a`` (3,) where an integrand is ``a . r'`` and a constant, None where it is not, or the rod is closed."""
-    rng = np.random.default_rng(1)
-    rows, values = [], []
-    for s in _stations(scene).tolist():
-        q = rng.normal(size=4)
-        v = np.array(UNDEFORMED) + 0.3 * rng.normal(size=3) * np.isin(np.arange(3), scene.free_strains)
-        turned, r = ufl.as_vector(q.tolist()), ufl.as_vector(rng.normal(size=3).tolist())
-        R, strains = rotation(turned), ufl.as_vector(v.tolist())
-        known = {"dr": ufl.dot(R, strains), "v": strains, "k": ufl.as_vector(rng.normal(size=3).tolist())}
-        x = place(turned, R, s, r, length=scene.length, **known)
-        values.append(_number(constraint.value(x, scene.constants(load, s))))
-        rows.append([*(quaternions.directors(q) @ v), 1.0])
-    matrix, value = np.array(rows), np.array(values)
-    a = np.linalg.lstsq(matrix, value, rcond=None)[0]
-    small = 1e-6  # error of a fit that is none
-    fits = np.linalg.norm(matrix @ a - value) < small * np.linalg.norm(value)
-    return a[:3] if fits and np.linalg.norm(a[:3]) > small and not scene.closed else None
-
-
 def _stations(scene: Scene) -> Floats:
     a, b = scene.interval
     return np.asarray(a + (b - a) * (np.arange(9) + 0.5) / 9)
@@ -238,14 +176,9 @@ def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
         along.attrs["note"] = "" if foundation else "load by a potential along the rod"
         if foundation:
             along["s"], along["stiffness"] = foundation
-    _write_ties(group, scene, samples)
-
-
-def _write_ties(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
-    for number, ties in enumerate(ties_of(scene, samples)):
-        here = group.create_group(f"{TIES}/constraint {number + 1}")
-        here.attrs.update(s=ties[0].s, note=ties[0].note)
-        here["line"], here["normal"] = np.array([tie.line for tie in ties]), np.array([tie.normal for tie in ties])
+    for number, x in enumerate(scene.constraints, start=1):
+        place = group.create_group(f"{CONSTRAINTS}/constraint {number}")
+        place.attrs.update(s=np.nan if x.s is None else x.s, note=x.words)
 
 
 def _write_supports(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:

@@ -25,7 +25,7 @@ from rodfem.output.style import PALETTE
 from rodfem.output.table import reactions_by_name
 from rodfem.output.words import eigenvalue_in_words
 from rodfem.problem.quaternions import directors
-from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES, Setting
+from rodfem.problem.setting import CONSTRAINTS, FOUNDATION, SUPPORTS, Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.branches import branch_data, packed, plain
 from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
@@ -106,7 +106,7 @@ def profiles_data(group: Any, states: int) -> dict[str, Any]:
 
 def _loaded(group: Any) -> list[float]:
     """Arclengths at which something holds or loads the rod."""
-    places = [float(place.attrs["s"]) for kind in (SUPPORTS, TIES) for place in group.get(kind, {}).values()]
+    places = [float(place.attrs["s"]) for kind in (SUPPORTS, CONSTRAINTS) for place in group.get(kind, {}).values()]
     return [s for s in places if np.isfinite(s)]
 
 
@@ -179,7 +179,7 @@ def shapes_of(group: Any, count: int) -> Shapes:
         sentence = f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again."
         raise InputError(sentence) from trouble
     at, positions, quaternions = (np.array(part) for part in zip(*rows, strict=True))
-    if SUPPORTS in group and not any(group.get(name) for name in (SUPPORTS, FOUNDATION, TIES)):
+    if SUPPORTS in group and not any(group.get(name) for name in (SUPPORTS, FOUNDATION, CONSTRAINTS)):
         positions = positions - positions.mean(axis=1, keepdims=True)
     return Shapes(at[0], positions, quaternions)
 

@@ -222,11 +222,12 @@ def test_planar_rod_stays_in_its_plane() -> None:
 @pytest.mark.long
 @pytest.mark.versions
 def test_file_and_pictures(folder: Path) -> None:
-    modes = modes_of(*state(classics.beck(span=(1.0, 35.0)), Discretization("pointwise", 6, 6), 30.0), 2)
+    scene = classics.beck(span=(1.0, 35.0))
+    modes = modes_of(*state(scene, Discretization("pointwise", 6, 6), 30.0), 2)
     if MPI.COMM_WORLD.rank:
         return
     path = folder / "modes.h5"
-    save_modes(modes, path, "branch 1", 7, {"title": "Beck's column"}, first=True)
+    save_modes(modes, path, "branch 1", 7, {"title": scene.title}, first=True, scene=scene)
     again = load_modes(path, "branch 1", 7)
     np.testing.assert_array_equal(again.displacement, modes.displacement)
     assert again.motion == modes.motion
