@@ -38,7 +38,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.orthogonal import across
 from rodfem.stability.inertia import NULL, ROUGH, Factored
-from rodfem.stability.motion_names import MotionNames
+from rodfem.stability.motion_names import names_for
 from rodfem.stability.near_zero import SPARE, NearZero, decide, near_zero, quotients, soft_limit
 from rodfem.stability.soft_mode import SoftMode, index_range
 
@@ -54,7 +54,7 @@ class SoftStates:
     """
 
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
-        self.solver, self.names = solver, MotionNames(solver.system)
+        self.solver, self.names = solver, names_for(solver.system)
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
         self.uncompared = ""

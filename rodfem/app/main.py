@@ -356,10 +356,13 @@ class Statement:
             described = descriptions(getdoc(of) or "")
             self.constants = [_constant(of.__name__, p, described) for p in signature(of).parameters.values()]
             self._of = of
-        self.scene = cache(self._made)
+        self._made = cache(self._stated)
 
-    def _made(self, **values: Any) -> Scene:
-        """The scene with these constants; raises :class:`InputError` where the function returns none."""
+    def scene(self, **values: Any) -> Scene:
+        """The scene with these constants, else their defaults; raises :class:`InputError` where there is none."""
+        return self._made(**({c.name: c.default for c in self.constants} | values))
+
+    def _stated(self, **values: Any) -> Scene:
         scene = self._of(**values)
         if not isinstance(scene, Scene):
             raise InputError(f"{getattr(self._of, '__name__', 'it')} returns {scene!r}: let it return a Scene.")

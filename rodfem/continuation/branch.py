@@ -136,7 +136,7 @@ class Point:
         """Size of the curvature at the middle of the rod, bending alone; None without a solver."""
         if self.solver is None:
             return None
-        k = self.profile([sum(self.solver.system.scene.interval) / 2]).curvature[0]
+        k = self.solver.resultants.strains(self.x, sum(self.solver.system.scene.interval) / 2)[1]
         return float(np.hypot(k[0], k[1]))
 
     @property

@@ -38,10 +38,9 @@ def natural_shape(scene: Scene, load: float) -> tuple[np.ndarray, np.ndarray, np
         return None
     s = np.linspace(*scene.interval, STEPS + 1)
     middle = strains((s[1:] + s[:-1]) / 2)
-    q = np.empty((STEPS + 1, 4))
-    q[0] = IDENTITY
-    for i, turn in enumerate(of_vector(middle[:, 3:] * np.diff(s)[:, None])):
-        q[i + 1] = product(q[i], turn)
+    q, apart = np.vstack([IDENTITY, of_vector(middle[:, 3:] * np.diff(s)[:, None])]), 1
+    while apart < len(q):  # products of all turns up to each, by those of twice as many
+        q[apart:], apart = product(q[:-apart], q[apart:]), 2 * apart
     halfway = directors(product(q[:-1], of_vector(middle[:, 3:] * np.diff(s)[:, None] / 2)))
     slopes = np.einsum("sij,sj->si", halfway, middle[:, :3])
     r = np.vstack([np.zeros(3), np.cumsum(slopes * np.diff(s)[:, None], axis=0)])

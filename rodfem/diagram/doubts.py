@@ -16,7 +16,7 @@ from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import many
 from rodfem.fem.checks import QuadratureCheck
 from rodfem.fem.newton import TOLERANCE
-from rodfem.stability.motion_names import MotionNames
+from rodfem.stability.motion_names import names_for
 from rodfem.stability.near_zero import resolve
 
 ROWS = 4  # rows one after the other that have as many zero eigenvalues, before these are said to stay
@@ -57,7 +57,7 @@ class PersistentZeros:
 
     def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
         """Report eigenvalues that are zero at two rows: to round-off, or to what Newton's method leaves of a state."""
-        found = MotionNames(solver.system)(point.x, solver.inertia.modes_near_zero(point.x, extra))
+        found = names_for(solver.system)(point.x, solver.inertia.modes_near_zero(point.x, extra))
         stay = f"  {many(extra, 'eigenvalue stays', 'eigenvalues stay')} zero that no symmetry of the scene explains "
         stay += f"({', '.join(dict.fromkeys(found))})"
         if _exact(solver, (before, point), extra) == extra:

@@ -123,6 +123,14 @@ class Resultants:
         lower, upper = (np.clip(np.searchsorted(ends, s, side) - 1, 0, None) for side in ("left", "right"))
         return self.on_elements(x, s, np.array([lower, upper]))
 
+    def strains(self, x: PETSc.Vec, s: float) -> np.ndarray:
+        """Strain and curvature at an arclength ``s`` of the state ``x``, as :meth:`profile` has them, (2, 3)."""
+        start, size = (self.shape.from_left(y) for y in (self.shape.start, self.shape.size))
+        values = self._values(x)
+        elements = np.clip(np.searchsorted(start, s, "left") - 1, 0, None), np.searchsorted(start, s, "right") - 1
+        places = [(e, _basis(self.nodes[1:-1], np.array([(s - start[e]) / size[e]]))[0]) for e in elements]
+        return np.mean([np.tensordot(basis, values[e, 1:-1, :2], 1) for e, basis in places], axis=0)
+
     def on_elements(self, x: PETSc.Vec, s: np.ndarray, elements: np.ndarray) -> Profile:
         """The same at places of given ``elements`` (k, m), of which it is the mean."""
         shape, sample, whole = self.shape, self.shape.sample(x), self._table(x)
@@ -140,12 +148,16 @@ class Resultants:
 
     def _table(self, x: PETSc.Vec) -> np.ndarray:
         """All fields at the nodes of the polynomials of each element from left to right, (elements, nodes, 4, 3)."""
-        values = self.shape.smooth(self.shape.system.at(x)).evaluate(self._evaluate)
-        whole = self.shape.from_left(values.reshape(len(values), len(self.nodes), -1, 3))
+        whole = self._values(x)
         force, moment = self.ends(x)
         for i, ends in enumerate((force + whole[:, [0, -1], 4:].sum(axis=2), moment)):
             whole[:, [0, -1], 2 + i] = np.where(np.isfinite(ends), ends, whole[:, [0, -1], 2 + i])
         return whole[:, :, : len(NAMES)]
+
+    def _values(self, x: PETSc.Vec) -> np.ndarray:
+        """The same, and what constraints add to the force, by the strains of the nodes alone."""
+        values = self.shape.smooth(self.shape.system.at(x)).evaluate(self._evaluate)
+        return self.shape.from_left(values.reshape(len(values), len(self.nodes), -1, 3))
 
     def ends(self, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
         """Contact force and moment at both ends of each element by its residual, (elements, 2, 3); nan: not known.
@@ -272,5 +284,6 @@ def turns() -> np.ndarray:
 
 def _basis(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Values of the Lagrange polynomials of ``nodes`` (n,) at ``places`` (p,), both in [0, 1]: (p, n)."""
-    values, own = (legendre.legvander(2 * x - 1, len(nodes) - 1) for x in (places, nodes))
-    return np.asarray(values @ np.linalg.inv(own))
+    own = np.eye(len(nodes), dtype=bool)  # the product of each polynomial goes over all other nodes
+    apart = np.where(own, 1.0, places[:, None, None] - nodes)
+    return np.asarray(apart.prod(axis=-1) / np.where(own, 1.0, nodes[:, None] - nodes).prod(axis=-1))

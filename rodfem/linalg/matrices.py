@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,14 +21,17 @@ def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shap
     return sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=shape)
 
 
-def times(matrix: sp.csr_matrix, vector: np.ndarray) -> np.ndarray:
-    """Product (m,) of real numbers, ``matrix`` (m, n) and ``vector`` (n,).
+def times(matrix: sp.csr_matrix, vectors: np.ndarray) -> np.ndarray:
+    """Product (m,) or (m, k) of real numbers, ``matrix`` (m, n) and ``vectors`` (n,) or (n, k).
 
     It is what ``@`` does, without the inspection of both that takes several times as long for a hundred unknowns.
     """
     rows, columns = matrix.shape
-    out = np.zeros(rows)
-    _sparsetools.csr_matvec(rows, columns, matrix.indptr, matrix.indices, matrix.data, vector, out)
+    out, stored = np.zeros((rows, *vectors.shape[1:])), (matrix.indptr, matrix.indices, matrix.data)
+    if vectors.ndim == 1:
+        _sparsetools.csr_matvec(rows, columns, *stored, vectors, out)
+    else:
+        _sparsetools.csr_matvecs(rows, columns, vectors.shape[1], *stored, vectors.ravel(), out.ravel())
     return out
 
 
@@ -95,41 +98,30 @@ def places_in(pattern: sp.csr_matrix, other: sp.csr_matrix) -> np.ndarray:
     return np.searchsorted(*numbers).astype(np.int32)
 
 
-STORED = """
-int MatSeqAIJGetArrayRead(void *matrix, void **values);
-int MatSeqAIJRestoreArrayRead(void *matrix, void **values);
-"""
-"""Functions of PETSc that petsc4py does not have: they show where the entries of a matrix are."""
-
-
 @cache
-def _petsc() -> tuple[Any, Any]:
-    """PETSc's library, which petsc4py has loaded, and what calls it."""
-    from cffi import FFI
-
-    ffi = FFI()
-    ffi.cdef(STORED)
-    return ffi, ffi.dlopen(PETSc.__file__)
+def _petsc() -> ctypes.CDLL:
+    """PETSc's library, which petsc4py has loaded, for functions that petsc4py does not have."""
+    return ctypes.CDLL(PETSc.__file__)
 
 
 class Entries:
     """Entries of an AIJ matrix on one rank whose pattern (``starts``, sorted ``columns``) stays."""
 
     def __init__(self, matrix: PETSc.Mat) -> None:
-        self.matrix = matrix
-        if (known := shared(matrix)) is not None:
-            self.starts, self.columns = known.pattern.indptr, known.pattern.indices
+        self.matrix, self.known = matrix, shared(matrix)
+        if self.known is not None:
+            self.starts, self.columns = self.known.pattern.indptr, self.known.pattern.indices
         else:
             self.starts, self.columns, _ = matrix.getValuesCSR()
 
     def values(self) -> np.ndarray:
         """Values now, in the array of PETSc: not to be kept."""
-        number = len(self.columns)
-        if not number:
+        if self.known is not None:
+            return self.known.values
+        if not (number := len(self.columns)):
             return np.empty(0, PETSc.ScalarType)
-        ffi, lib = _petsc()
-        matrix, at = ffi.cast("void *", self.matrix.handle), ffi.new("void **")
-        lib.MatSeqAIJGetArrayRead(matrix, at)
-        out = np.frombuffer(ffi.buffer(at[0], number * np.dtype(PETSc.ScalarType).itemsize), PETSc.ScalarType)
-        lib.MatSeqAIJRestoreArrayRead(matrix, at)
-        return out
+        matrix, at = ctypes.c_void_p(self.matrix.handle), ctypes.c_void_p()
+        _petsc().MatSeqAIJGetArrayRead(matrix, ctypes.byref(at))
+        stored = (ctypes.c_byte * (number * np.dtype(PETSc.ScalarType).itemsize)).from_address(at.value or 0)
+        _petsc().MatSeqAIJRestoreArrayRead(matrix, ctypes.byref(at))
+        return np.frombuffer(memoryview(stored), PETSc.ScalarType)

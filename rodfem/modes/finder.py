@@ -39,7 +39,6 @@ from rodfem.stability import motion_names
 from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.cluster import DRAWN, as_vectors
 from rodfem.stability.inertia import NOISE
-from rodfem.stability.motion_names import MotionNames
 from rodfem.stability.near_zero import soft_limit
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
@@ -202,12 +201,8 @@ class ModeFinder:
         inertia = self.solver.inertia
         square = v.dot(inertia.metric * v).real
         if abs(value) < soft_limit(inertia) * square:
-            return self._soft(x, [v / square**0.5])[0]
+            return motion_names.names_for(self.system)(x, [v / square**0.5])[0]
         return motion_names.name_of(self.system, self.system.at(x).turned, v.array_r.real[:, None])
-
-    @cached_property
-    def _soft(self) -> MotionNames:
-        return MotionNames(self.system)
 
     def _weights(self, values: np.ndarray, responses: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
         """Each new mode as a combination: places of those combined, and weights; ``responses`` are (K, 36)."""
@@ -215,10 +210,13 @@ class ModeFinder:
         parted = np.flatnonzero(np.diff(values) > SAME_EIGENVALUE * abs(values).max(initial=0.0)) + 1
         for group in np.split(np.arange(len(values)), parted):
             mine, basis = responses[group], list[np.ndarray]()
+            seen = SEEN * abs(mine).max()
             for response in mine.T:
                 rest = response - sum((b * (b @ response) for b in basis), np.zeros(len(group)))
-                if np.linalg.norm(rest) > SEEN * abs(mine).max() and len(basis) < len(group):
-                    basis.append(rest / np.linalg.norm(rest))
+                if (size := np.linalg.norm(rest)) > seen:
+                    basis.append(rest / size)
+                if len(basis) == len(group):
+                    break
             out += [(group.tolist(), b) for b in (basis if len(basis) == len(group) else np.eye(len(group)))]
         return out
 

@@ -134,8 +134,9 @@ def _mumps() -> str:
 
 
 def as_json(data: dict[str, Any]) -> bytes:
-    """Text of a JSON file."""
-    return (json.dumps(data, indent=1) + "\n").encode()
+    """Text of a JSON file, a line for each entry."""
+    lines = (f" {json.dumps(name)}: {json.dumps(value)}" for name, value in data.items())
+    return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
 
 
 def save_json(data: dict[str, Any], path: Path) -> None:

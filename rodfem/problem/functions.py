@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from functools import wraps
+from functools import lru_cache, wraps
 from itertools import chain
 from logging import getLogger
 from math import sqrt
@@ -131,6 +131,8 @@ def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
 
 def in_floats(value: Any) -> Any:
     """Replace fractions and numbers of numpy, which UFL does not know, by floats, also in tuples, lists and arrays."""
+    if type(value) is float:  # most are
+        return value
     if type(value) in (tuple, list):
         floats = type(value)(map(in_floats, value))
         return value if all(a is b for a, b in zip(floats, value, strict=True)) else floats
@@ -277,10 +279,11 @@ def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
 
 
 def some_places(
-    scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x, s: float | None = None
+    scene: Scene, state: int = 0, wrap: Callable[[Any], Any] | None = None, s: float | None = None
 ) -> tuple[Place, Place]:
     """A point and a place along the rod in a ``state`` of :data:`STATES`, by default at an ``s`` inside the rod."""
-    return places_at(scene.length, inside(scene.interval)[0] if s is None else s, STATES[state], wrap)
+    given = scene.length, inside(scene.interval)[0] if s is None else s, STATES[state]
+    return numbers_at(*given) if wrap is None else places_at(*given, wrap)
 
 
 def places_at(
@@ -292,6 +295,10 @@ def places_at(
     q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
     R = rotation(q)
     return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+
+
+numbers_at = lru_cache(32)(places_at)
+"""The same, made once: all functions of a scene are tried in the same states."""
 
 
 # --- what the functions of a scene depend on

@@ -22,6 +22,19 @@ def _euler_rodrigues() -> np.ndarray:
 EULER_RODRIGUES = _euler_rodrigues()
 
 
+def _hamilton() -> np.ndarray:
+    """Coefficients of the components of ``p q`` in the products ``p_i q_j``: (16, 4)."""
+    out = np.zeros((4, 4, 4))
+    out[0, range(4), range(4)] = out[range(4), 0, range(4)] = 1.0
+    out[range(1, 4), range(1, 4), 0] = -1.0
+    for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
+        out[i, j, k], out[j, i, k] = 1.0, -1.0
+    return out.reshape(16, 4)
+
+
+HAMILTON = _hamilton()
+
+
 def directors(q: np.ndarray) -> np.ndarray:
     """Rotation matrices of quaternions (..., 4) of any length: (..., 3, 3)."""
     q = np.asarray(q)
@@ -31,8 +44,8 @@ def directors(q: np.ndarray) -> np.ndarray:
 
 def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Products ``p q``: the rotation ``q`` in the frame turned by ``p``."""
-    a, u, b, v = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
-    return np.concatenate([a * b - np.sum(u * v, axis=-1, keepdims=True), a * v + b * u + np.cross(u, v)], axis=-1)
+    pairs = p[..., :, None] * q[..., None, :]
+    return np.asarray(pairs.reshape(*pairs.shape[:-2], 16) @ HAMILTON)
 
 
 def of_vector(vector: np.ndarray) -> np.ndarray:

@@ -196,7 +196,7 @@ class _Trial:
         self._check(values)
         return values
 
-    def _called(self, c: Constants, state: int, wrap: Callable[[Any], Any] = lambda x: x) -> list[Any]:
+    def _called(self, c: Constants, state: int, wrap: Callable[[Any], Any] | None = None) -> list[Any]:
         """Components of what the function returns for constants and a state, whose vectors pass through ``wrap``."""
         if self.of_place:
             places = some_places(self.scene, state, wrap, c.s)

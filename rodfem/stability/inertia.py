@@ -27,7 +27,7 @@ from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
 from rodfem.linalg.chain import factors_of
 from rodfem.linalg.factorization import Factors
-from rodfem.linalg.matrices import EPS, local_rows, places_in, rounding, shared
+from rodfem.linalg.matrices import EPS, local_rows, places_in, rounding, shared, times
 from rodfem.linalg.orthogonal import generic
 from rodfem.tolerances import TINY
 
@@ -177,12 +177,12 @@ class Inertia:
 
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors, the columns of ``own`` (own rows, count)."""
-        return np.asarray(self._weights @ self._whole(own))
+        return times(self._weights, self._whole(own))
 
     def times(self, own: np.ndarray) -> np.ndarray:
         """The matrix times vectors, the columns of ``own`` (own rows, count)."""
         rows = local_rows(self.matrix).real if self._shared is None else self._shared.matrix
-        return np.asarray(rows @ self._whole(own))
+        return times(rows, self._whole(own))
 
     def _whole(self, own: np.ndarray) -> np.ndarray:
         """Rows of all ranks."""

@@ -21,6 +21,7 @@ from petsc4py import PETSc
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Generators, Symmetry, elementary_generators, rigid_motions, summed
 from rodfem.fem.system import System
+from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
 
 SHARE = 0.9
@@ -98,6 +99,11 @@ class MotionNames:
         if self._sliding in names and share(gram, b)[0] > SHARE:
             return self._sliding
         return name_of(self.system, state.turned, v.array_r.real[:, None])
+
+
+def names_for(system: System) -> MotionNames:
+    """The one of a system, whose generators are made once."""
+    return derived(system, MotionNames, lambda: MotionNames(system))
 
 
 def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
