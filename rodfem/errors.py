@@ -25,7 +25,6 @@ class Argument:
     value: object = ...
 
     def __str__(self) -> str:
-        """As it is written in Python."""
         return f"{self.owner}({self.name}={'...' if self.value is ... else repr(self.value)})"
 
 
@@ -33,11 +32,9 @@ class Remedy:
     """What to try: words in which each ``{}`` stands for an argument."""
 
     def __init__(self, words: str, *arguments: Argument) -> None:
-        """Keep words and arguments."""
         self.words, self.arguments = words, arguments
 
     def __str__(self) -> str:
-        """In Python's words."""
         return self.words.format(*self.arguments)
 
 
@@ -49,7 +46,6 @@ class _Remediable(Exception):
     """An error in one sentence, or in the first half of one that its ``remedy`` completes."""
 
     def __init__(self, sentence: str, remedy: Remedy | None = None) -> None:
-        """Keep both."""
         super().__init__(sentence if remedy is None else f"{sentence}: {remedy}.")
         self.remedy = remedy
 

@@ -68,7 +68,6 @@ class SmoothnessIndicator:
     """Measures how smooth the states of one discretisation are; collective."""
 
     def __init__(self, solver: BranchSolver) -> None:
-        """Tabulate the transformation from nodal values to Legendre coefficients."""
         self.solver, self.weights = solver, _weights_of(solver.system.scene)
         fields = solver.system.fields
         self._cells = slice(0, fields.owned_cells)

@@ -113,7 +113,6 @@ class Plane:
     """Lines in the plane of two parameters, the first of which is the scene's load, scaled by their intervals."""
 
     def __init__(self, system: System, parameter: str, intervals: tuple[Interval, Interval]) -> None:
-        """Check parameter and bounds; raises :class:`SceneError`."""
         scene = system.scene
         if parameter not in scene.parameters:
             raise SceneError(
@@ -223,7 +222,6 @@ class Singular(Criterion):
     """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
 
     def __init__(self, solver: BranchSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
-        """Border the matrix with the null vectors of a point ``near`` the curve."""
         super().__init__(solver, plane)
         self.fold = fold
         self.states = SingularSystem(solver, near.modes, near.multiplicity, fold=fold)

@@ -102,7 +102,6 @@ class Locus:
     solve: Callable[[int, float], list[Row]] | None = None
 
     def __repr__(self) -> str:
-        """Kind, names, size and ranges."""
         each = zip(self.names, self.values.min(axis=0), self.values.max(axis=0), strict=True)
         ranges = ", ".join(f"{name} from {low:.6g} to {high:.6g}" for name, low, high in each)
         return f"<Locus of the {self.kind}: {len(self.values)} points, {ranges}>"

@@ -70,12 +70,11 @@ class Diagram:
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[BranchSolver]) -> None:
-        """Keep what was traced; ``solvers`` may grow."""
         self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
         self.warnings: list[Remark] = []
         self.notes: list[Remark] = []
         self.run, self.origin, self.complete = uuid4().hex, origin(), False
-        self.asked: dict[str, Any] | None = None  # plan and fingerprint of the equations, as they were traced
+        self.asked: dict[str, Any] = {}  # plan and fingerprint of the equations, as they were traced
         self.lacks = ""  # what its plan had and its file does not hold: ``events`` or ``steps``
 
     # --- what there is ---------------------------------------------------------------------------------------------
@@ -91,11 +90,9 @@ class Diagram:
         return self.plan.over(self.scene)
 
     def __len__(self) -> int:
-        """Number of branches."""
         return len(self.branches)
 
     def __iter__(self) -> Iterator[Branch]:
-        """Branches in the order in which they were found."""
         return iter(self.branches)
 
     def __getitem__(self, key: str | int) -> Branch:
@@ -275,8 +272,8 @@ class Diagram:
         """Contents of ``diagram.json``: see docs/files.md."""
         systems = [solver.system for solver in self.solvers]
         data = as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
-        asked = {} if self.asked is None else {"asked": self.asked}
-        return data | asked | self.remarks | {"complete": self.complete, "run": self.run, "origin": self.origin}
+        own = {name: getattr(self, name) for name in ("asked", "complete", "run", "origin")}
+        return data | self.remarks | own
 
     @property
     def remarks(self) -> dict[str, Any]:
@@ -364,7 +361,6 @@ class Diagram:
         return snapshot(self.branches, self.solvers, shown, path, caption)
 
     def __repr__(self) -> str:
-        """Scene, size and range."""
         low, high = self.span
         points = sum(len(b.points) for b in self.branches)
         return (

@@ -153,7 +153,6 @@ class LoadSteps:
     """Equilibria on one path, load by load."""
 
     def __init__(self, solver: BranchSolver, first: Point, span: tuple[float, float]) -> None:
-        """Begin at the ``first`` point of a sweep over a ``span`` of loads."""
         self.solver, self.least = solver, LEAST * abs(span[1] - span[0])
         self.known, self.step = [first], inf
         f = solver.system.fields

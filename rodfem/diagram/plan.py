@@ -94,7 +94,6 @@ class Plan:
     most_branches: int = 0
 
     def __post_init__(self) -> None:
-        """Check that all is of the right kind; raises :class:`InputError`."""
         convert(
             self,
             span=optional(interval(0.0, 1.0, real)),

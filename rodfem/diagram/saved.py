@@ -15,14 +15,14 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.observer import Remark
 from rodfem.diagram.diagram import Diagram
-from rodfem.diagram.plan import EQUATIONS, Plan, not_held, plan_without
+from rodfem.diagram.plan import EQUATIONS, not_held, plan_without
 from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint, same
 from rodfem.fem.system import System
-from rodfem.file_format import DIAGRAM, refusal
-from rodfem.output.files import load_json, load_state
+from rodfem.file_format import DIAGRAM, read_json, refusal
+from rodfem.output.files import load_state
 from rodfem.output.states import check_run
 from rodfem.output.table import point_values, special_values
 from rodfem.problem.arguments import checked, path
@@ -42,20 +42,20 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     """
     folder = Path(folder)
     path, states = folder / "diagram.json", folder / "states.h5"
-    data = load_json(path)
-    DIAGRAM.check(data, path, ("scene", "range", "meshes"))
+    data = read_json(path, DIAGRAM, ("scene", "range", "meshes", "asked"))
     with refusal(f"{path} lacks something, or holds something else ({{}}): give {DIAGRAM.file}."):
         _check(data, scene, folder)
         check_run(data, states)
         solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
         _check_equations(data, solvers[0].system, folder)
         branches = [_branch(entry, solvers, states) for entry in data["branches"]]
-        asked, span = data.get("asked"), tuple(data["range"])
-        plan = replace(Plan() if asked is None else plan_without(asked), span=span, accuracy=data["accuracy"])
-        diagram = Diagram(scene, plan, branches, solvers)
-        diagram.warnings, diagram.notes = ([_remark(e) for e in data.get(x) or ()] for x in ("warnings", "notes"))
-    diagram.lacks = "" if asked is None else not_held(asked)
-    diagram.asked, diagram.complete = asked, data.get("complete", True)
+        asked = data["asked"]
+        diagram = Diagram(scene, replace(plan_without(asked), span=tuple(data["range"])), branches, solvers)
+        diagram.warnings, diagram.notes = (
+            [Remark(e["sentence"], *e["loads"] or (), branch=e["branch"]) for e in data[x]]
+            for x in ("warnings", "notes")
+        )
+        diagram.asked, diagram.lacks, diagram.complete = asked, not_held(asked), data["complete"]
     return diagram
 
 
@@ -79,8 +79,7 @@ def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
 
 def _check_equations(data: dict[str, Any], system: System, folder: Path) -> None:
     """Raise :class:`InputError` where the equations of a ``system`` are not those that the files of the run tell."""
-    before = (data.get("asked") or {}).get(EQUATIONS)
-    if before is not None and not same(before, fingerprint(system, tuple(data["range"]))):
+    if not same(data["asked"][EQUATIONS], fingerprint(system, tuple(data["range"]))):
         raise InputError(
             f"{folder} was run with other equations than those of the scene {system.scene.name!r} (at one and the "
             "same state their residual, ordinate, or stored, potential or kinetic energy differ): give the scene that "
@@ -105,19 +104,11 @@ def _branch(entry: dict[str, Any], solvers: Sequence[BranchSolver], states: Path
     depth = len(entry["name"].split(".")) if parent else 0
     branch = Branch(entry["name"], (parent[0], parent[1]) if parent else None, depth, points, ended=entry["ended"])
     branch.special = [_special(s, points, solvers) for s in entry["special"]]
-    branch.singular_start = entry.get("singular_start", 0)
-    branch.image = entry.get("image", "")
-    branch.unexplained = [_unexplained(change, points) for change in entry.get("unexplained", ())]
+    branch.singular_start, branch.image = entry["singular_start"], entry["image"]
+    branch.unexplained = [
+        Unexplained(points[x["row"]], points[x["row"] + 1], x["before"], x["after"]) for x in entry["unexplained"]
+    ]
     return branch
-
-
-def _unexplained(change: dict[str, Any], points: Sequence[Point]) -> Unexplained:
-    row = change["row"]
-    return Unexplained(points[row], points[row + 1], change["before"], change["after"])
-
-
-def _remark(entry: dict[str, Any]) -> Remark:
-    return Remark(entry["sentence"], *entry["loads"] or (), branch=entry["branch"])
 
 
 def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[BranchSolver], states: Path) -> Point:

@@ -89,7 +89,6 @@ class Solver:
         return Solver(scene, system.fields.asked, system.comm, spectrum=spectrum, clock=system.clock)
 
     def __repr__(self) -> str:
-        """Scene and discretisation."""
         fields = self.equilibria.system.fields
         d = fields.discretization
         return (

@@ -335,7 +335,6 @@ class SweepErrors:
     """Estimates the errors of special points on the mesh of one solver, over a ``span`` of loads."""
 
     def __init__(self, solver: BranchSolver, span: tuple[float, float]) -> None:
-        """Make the richer discretisation."""
         self.solver, self.span, self.units = solver, span, solver.system.scene.units
         system = solver.system
         self.richer = BranchSolver(richer_system(system))

@@ -71,7 +71,6 @@ class Modes:
     note: str = ""  #: why errors that were asked for are not estimated; empty where they are
 
     def __repr__(self) -> str:
-        """Load, and each eigenvalue with its motion."""
         each = ", ".join(f"{v:.6g} ({m})" for v, m in zip(self.value, self.motion, strict=True))
         return f"<Modes at load {self.load:.10g}: mu = {each}>"
 

@@ -319,7 +319,6 @@ class Snapshot:
         return self.png
 
     def __repr__(self) -> str:
-        """Size."""
         return f"<Snapshot: PNG of {len(self.png)} bytes>"
 
     @checked(path=argument_path("shape.png"))

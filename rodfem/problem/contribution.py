@@ -223,7 +223,6 @@ class Constraint(Contribution):
     letter: ClassVar[str] = "g"  # begins the name of its multiplier: those of one letter are numbered together
 
     def __post_init__(self) -> None:
-        """Check the place; raises :class:`InputError`."""
         convert(self, s=optional(finite(0.5)))
 
     @property

@@ -259,11 +259,9 @@ class Ring:
     turn: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the kinds; raises :class:`InputError`."""
         convert(self, odd=yes_or_no, turn=finite(np.pi))
 
     def __iter__(self) -> Iterator[End]:
-        """Yield the left and the right end."""
         for last in (False, True):
             yield JoinedEnd(sign=-1.0 if self.odd else 1.0, last=last, turn=self.turn)
 

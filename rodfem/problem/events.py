@@ -77,7 +77,6 @@ class Level:
     value: float
 
     def __post_init__(self) -> None:
-        """Check the value; raises :class:`InputError`."""
         finite(0.5)("value", self.value)
 
     @property

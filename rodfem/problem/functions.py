@@ -237,7 +237,6 @@ class Placeless:
     """Constants without the arclength: a function of ``c.s`` at an end would be one along the rod under an integral."""
 
     def __init__(self, c: Any) -> None:
-        """Be the constants ``c`` otherwise."""
         self._constants = c
 
     def __getattr__(self, name: str) -> Any:

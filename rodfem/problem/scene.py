@@ -64,7 +64,6 @@ class Parameter:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        """Check the kinds, and have floats; raises :class:`InputError`."""
         word = text("P")
         convert(self, value=real(1.0), admissible=interval(0.0, inf, real))
         convert(self, label=word, words=word, unit=word)
@@ -133,7 +132,6 @@ class Ordinate:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        """Check the kinds; raises :class:`InputError`."""
         word = text("tip")
         convert(self, name=word, label=word, unit=word, s=optional(finite(1.0)))
 
@@ -299,7 +297,6 @@ class Scene(Contribution, metaclass=Stated):
     states: str | None = None
 
     def __post_init__(self) -> None:
-        """Check all that can be checked before any computation; raises :class:`InputError`."""
         convert(self, **KINDS)
         for what, function, role in functions_of(self):
             check_function(what, function, role)

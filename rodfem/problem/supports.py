@@ -168,9 +168,8 @@ def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
     _write_supports(group.create_group(SUPPORTS), scene, samples)
     if scene.distributed is not None or scene.follower is not None:
         along = group.create_group(DISTRIBUTED)
-        found = [distributed_on(scene, float(sample["load"])) for sample in samples]
-        along["s"] = found[0][0]
-        along["force"], along["follower"] = (np.array([f[i] for f in found]) for i in (1, 2))
+        s, dead, follower = zip(*(distributed_on(scene, float(sample["load"])) for sample in samples), strict=True)
+        along["s"], along["force"], along["follower"] = s[0], np.array(dead), np.array(follower)
     if scene.potential is not None:
         along, foundation = group.create_group(FOUNDATION), foundation_of(scene, samples[0])
         along.attrs["note"] = "" if foundation else "load by a potential along the rod"

@@ -42,7 +42,6 @@ class Page:
     html: str
 
     def __repr__(self) -> str:
-        """Size."""
         return f"<Page of {len(self.html) / 1e6:.1f} MB: .open() shows it in a browser, .save(path) keeps it>"
 
     def _repr_html_(self) -> str:
@@ -100,7 +99,6 @@ class Loaded(dict[str, Any]):
     """Entries of a group by name, arrays and groups alike; ``attrs``, ``name`` and ``file`` are those of the group."""
 
     def __init__(self, group: Any) -> None:
-        """Read a group and all below it."""
         super().__init__({name: Loaded(x) if isinstance(x, h5py.Group) else x[()] for name, x in group.items()})
         self.attrs, self.name, self.file = dict(group.attrs), group.name, group.file
 
