@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rodfem.app.interrupts import end_quietly, listen
+from rodfem.app.interrupts import listen
 from rodfem.errors import ConvergenceError, InputError, SetupError
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
@@ -38,6 +38,7 @@ def check_installation() -> None:
 check_installation()
 # Open MPI 4 starts a daemon otherwise, in 0.2 s, which needs a home folder; a file with a rod may start MPI when read
 os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
+os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"  # a closed pipe is no error
 listen()
 
 
@@ -103,7 +104,6 @@ def start_petsc(options: Sequence[str]) -> None:
     try:
         petsc4py = import_module("petsc4py")
         petsc4py.init(["rodfem", *options])
-        end_quietly()
     except Exception as trouble:  # petsc4py has no class of its own for errors until PETSc is loaded
         words = str(trouble).splitlines()[0]
         complain(f"PETSc does not start with the options {' '.join(options)} ({words}): see whether files are missing.")

@@ -7,7 +7,6 @@ it runs.
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import webbrowser
 from collections.abc import Callable, Sequence
@@ -18,6 +17,7 @@ from textwrap import fill
 
 import rodfem
 from rodfem.app.cli import Parser, complain, folder
+from rodfem.app.interrupts import end_quietly
 from rodfem.errors import InputError, SetupError
 
 HELP = """usage: rodfem COMMAND [ARGUMENTS]
@@ -35,6 +35,8 @@ HEADS = {"folder": 28, "scene": 16, "date": 10, "branches": 8, "special": 7}
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that ``arguments``, by default those of the shell, name; bad input ends with one sentence."""
+    if arguments is None:  # a reader, as head, may leave
+        end_quietly()
     name, *words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if name in ("-h", "--help", "help"):
         lines = (f"  {each:<10}{_summary(command)}" for each, command in COMMANDS.items())
@@ -45,8 +47,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
     else:
-        if arguments is None:  # a reader, as head, may leave; PETSc, which a command may load, would complain
-            signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         try:
             COMMANDS[name](words)
         except (InputError, SetupError) as trouble:

@@ -73,7 +73,5 @@ def held() -> Iterator[None]:
 
 
 def end_quietly() -> None:
-    """Have the system end this process when nobody reads what it prints, as ``head``, and not PETSc, which it loads."""
-    from petsc4py import PETSc  # noqa: F401
-
+    """Have the system end this process if nobody reads what it prints, as ``head``; PETSc has no handler of its own."""
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)

@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rodfem.app.cli import Parser, complain, folder, sentences, start_petsc
-from rodfem.app.persons_file import as_sentence, load
+from rodfem.app.persons_file import RUN, as_sentence, load
 from rodfem.errors import InputError
 from rodfem.problem.scene import Scene
 from rodfem.stability import AUTO, METHODS
@@ -30,7 +30,8 @@ HELP = """usage: rodfem run FILE.py [--scene NAME] [OPTIONS]
 
 Trace the rod of a file: a Scene, or a function with '-> Scene' whose arguments have defaults and are the rod's
 constants. Where the file has several, --scene names one. A function with '-> Discretization' of the same constants is
-its mesh, where no option asks for another.
+its mesh, where no option asks for another. Options that are left out are those of the file's own Discretization and
+Plan: with which it runs its rod itself, or the only ones in it.
 
 rodfem run FILE.py --help lists all options of the rod.
 """
@@ -46,7 +47,7 @@ def main(words: Sequence[str]) -> None:
     if rest[:1] == ["--scene"]:
         name, rest = (rest[1] if len(rest) > 1 else ""), rest[2:]
     module = load(Path(file))
-    statement, mesh = Statement(rod_of(module, name)), mesh_of(module)
+    statement = Statement(rod_of(module, name), own_of(module, "Discretization"), own_of(module, "Plan"))
     end = rest.index("--") if "--" in rest else len(rest)
     ours, petsc = rest[:end], rest[end + 1 :]
     usual = statement.scene()
@@ -58,7 +59,7 @@ def main(words: Sequence[str]) -> None:
     kept = f"the branches that were finished are in {options.output}"
     try:
         with sentences(parser):
-            _run(statement, mesh, options, petsc, parser.in_options)
+            _run(statement, options, petsc, parser.in_options)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {kept}: rodfem.load reads them") from None
     except MemoryError:
@@ -92,7 +93,8 @@ def many_main(words: Sequence[str]) -> None:
     parser.add_argument("--output", type=folder, default=Path("results/many"), metavar="DIR", help="for all files")
     given = parser.parse_args(words)
     module = load(given.file)
-    rods = Rods(rod_of(module, given.scene), mesh_of(module), given)
+    own = own_of(module, "Discretization"), own_of(module, "Plan")
+    rods = Rods(Statement(rod_of(module, given.scene), *own), given)
     start_petsc([])
     with sentences(rods.parser):
         rods.trace()
@@ -104,9 +106,9 @@ COLUMNS = "a column is a constant, an option of rodfem run without its dashes (e
 class Rods:
     """Rods of a table: values of constants and options of one that a file states."""
 
-    def __init__(self, of: Callable[..., Scene] | Scene, mesh: Mesh | None, given: argparse.Namespace) -> None:
+    def __init__(self, statement: Statement, given: argparse.Namespace) -> None:
         """Read the table; raises :class:`InputError` for a column that is none of a rod, or a table without lines."""
-        self.statement, self.mesh, self.given = Statement(of), mesh, given
+        self.statement, self.given = statement, given
         self.parser = parser_of(self.statement, self.statement.scene(), f"rodfem run {given.file}")
         actions = [action for action in self.parser._actions if action.dest not in ("help", "output")]
         self.options = {action.dest: action.option_strings[0] for action in actions}
@@ -133,13 +135,12 @@ class Rods:
         filled = {name: cell.strip() for name, cell in row.items() if cell and cell.strip()}
         words = [word for n, cell in filled.items() if n not in MORE for word in (self.options[n], *cell.split())]
         options = self.parser.parse_args(words)
-        constants = self.statement.values(options)
-        scene, own = self.statement.scene(**constants), None if self.mesh is None else self.mesh(**constants)
+        scene, discretization, plan = self.statement.asked(options)
         known: dict[str, Any] = {"true": True, "false": False}
         more: dict[str, Any] = {
             n: int(x) if x.isdigit() else known.get(x.lower(), x) for n, x in filled.items() if n in MORE
         }
-        discretization, plan = discretization_of(options, own), replace(plan_of(options), **more)
+        plan = replace(plan, **more)
         plan.check(scene, discretization)
         return scene, discretization, plan
 
@@ -176,13 +177,7 @@ MORE = ("error_bars", "most_branches")
 """Fields of a plan that no option sets."""
 
 
-def _run(
-    statement: Statement,
-    mesh: Mesh | None,
-    options: argparse.Namespace,
-    petsc: Sequence[str],
-    words: Callable[[str], str],
-) -> None:
+def _run(statement: Statement, options: argparse.Namespace, petsc: Sequence[str], words: Callable[[str], str]) -> None:
     """State the rod and run it; ``words`` rewords what is said."""
     from petsc4py import PETSc
 
@@ -190,9 +185,7 @@ def _run(
 
     if petsc:  # once more, for a PETSc that was running already; what it does not read it lists at the end
         PETSc.Options().insertString(" ".join([*petsc, "-options_left"]))
-    constants = statement.values(options)
-    own = None if mesh is None else mesh(**constants)
-    scene, discretization, plan = statement.scene(**constants), discretization_of(options, own), plan_of(options)
+    scene, discretization, plan = statement.asked(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
     run(scene, discretization, plan, options.output, figures=options.figures, verbose=options.verbose, words=words)
@@ -213,12 +206,20 @@ def rod_of(module: ModuleType, name: str | None) -> Callable[..., Scene] | Scene
     return next(iter(scenes.values()))
 
 
-def mesh_of(module: ModuleType) -> Mesh | None:
-    """Function of a module that returns a discretisation, if it has one; raises :class:`InputError` for several."""
-    found = _returning(module, "Discretization")
+def own_of(module: ModuleType, kind: str) -> Callable[..., Any] | None:
+    """What a module has of a class of rodfem, of the constants; raises :class:`InputError` if there are several.
+
+    A function that returns one comes before the one of its own run, and that before one with a name.
+    """
+    named = {n: x for n, x in vars(module).items() if type(x).__name__ == kind}
+    run = {n: x for n, x in enumerate(vars(module).get(RUN, ())) if type(x).__name__ == kind}
+    found = _returning(module, kind) or run or named
     if len(found) > 1:
-        raise InputError(f"{module.__file__} has the meshes {', '.join(found)}: keep one function with that result.")
-    return next(iter(found.values()), None)
+        raise InputError(
+            f"{module.__file__} has more than one {kind} ({', '.join(map(str, found))}): keep one of them."
+        )
+    (one,) = found.values() or (None,)
+    return one if one is None or isfunction(one) else lambda **_: one
 
 
 def _returning(module: ModuleType, kind: str) -> dict[str, Callable[..., Any]]:
@@ -257,20 +258,20 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
     words = f"start at {load} = A, stay between A and B (default: the scene's)"
     add("--range", dest="span", type=float, nargs=2, metavar=("A", "B"), help=words)
     words = f"compute every branch also at exactly these values of {load}"
-    add("--at", type=float, nargs="+", default=[], metavar="LOAD", help=words)
-    words = "largest step along a branch, in radian of rotation (root mean square; default 0.1)"
-    add("--step", dest="largest", type=float, default=0.1, metavar="S", help=words)
+    add("--at", type=float, nargs="+", metavar="LOAD", help=words)
+    words = "largest step along a branch, in radian of rotation (root mean square; default: the file's own, or 0.1)"
+    add("--step", dest="largest", type=float, metavar="S", help=words)
     words = "follow what leaves from branch points of branches of a depth less than D; the first branch has depth 0, "
-    words += "what leaves from it 1, and so on (default 2)"
-    add("--depth", type=int, default=2, metavar="D", help=words)
+    words += "what leaves from it 1, and so on (default: the file's own, or 2)"
+    add("--depth", type=int, metavar="D", help=words)
     words = "also compute the K left-most eigenvalues of every state with SLEPc"
-    add("--spectrum", type=int, default=0, metavar="K", help=words)
+    add("--spectrum", type=int, metavar="K", help=words)
     words = "judge the states at the loads of --at, and print all that is said, by "
-    add("--method", default="", metavar="NAME", help=words + ", ".join((AUTO, *METHODS)))
+    add("--method", metavar="NAME", help=words + ", ".join((AUTO, *METHODS)))
     words = "find and draw the K left-most modes of the states at the loads of --at"
-    add("--modes", type=int, default=0, metavar="K", help=words)
+    add("--modes", type=int, metavar="K", help=words)
     words = "at each load of --at also look for equilibria that no branch has reached, with that many tries"
-    add("--search", dest="tries", type=int, default=0, metavar="TRIES", help=words)
+    add("--search", dest="tries", type=int, metavar="TRIES", help=words)
     words = "follow every special point in the plane of the load and the constant NAME from LOW to HIGH"
     add("--locus", nargs=3, metavar=("NAME", "LOW", "HIGH"), help=words)
 
@@ -297,21 +298,22 @@ def discretization_of(options: argparse.Namespace, own: Discretization | None) -
     return replace(own, factors=options.factors, **given)
 
 
-def plan_of(options: argparse.Namespace) -> Plan:
-    """Plan that the options ask for; raises :class:`InputError` for what is none."""
-    from rodfem.continuation.follow import StepControl
+def plan_of(options: argparse.Namespace, own: Plan | None) -> Plan:
+    """Plan that the options ask for, or the file's ``own``; raises :class:`InputError` for what is none."""
     from rodfem.diagram.plan import Plan
 
-    locus = options.locus
+    own, locus = own or Plan(), options.locus
     if locus is not None:
         try:
             locus = locus[0], float(locus[1]), float(locus[2])
         except ValueError:
             what = f"{locus[1]} to {locus[2]} is no interval"
             raise InputError(f"{what}: give two numbers after {locus[0]}.") from None
-    same = {x: getattr(options, x) for x in ("depth", "spectrum", "tries", "method", "modes", "accuracy")}
-    steps, span = StepControl(largest=options.largest), None if options.span is None else tuple(options.span)
-    return Plan(span, tuple(options.at), steps=steps, locus=locus, **same)
+    same = ("span", "at", "depth", "spectrum", "tries", "method", "modes", "accuracy")
+    chosen = {name: getattr(options, name) for name in same} | {"locus": locus}
+    if options.largest is not None:
+        own = replace(own, steps=replace(own.steps, largest=options.largest))
+    return replace(own, **{name: value for name, value in chosen.items() if value is not None})
 
 
 class Constant(NamedTuple):
@@ -344,7 +346,9 @@ class Constant(NamedTuple):
 class Statement:
     """A rod as a function of its constants, of a scene alone the parameters apart from its load."""
 
-    def __init__(self, of: Callable[..., Scene] | Scene) -> None:
+    def __init__(
+        self, of: Callable[..., Scene] | Scene, mesh: Mesh | None = None, plan: Callable[..., Plan] | None = None
+    ) -> None:
         """Read the constants; raises :class:`InputError` for one without a default, or of no type that has options."""
         if isinstance(of, Scene):
             scene, self.words = of, of.title
@@ -356,7 +360,7 @@ class Statement:
             described = descriptions(getdoc(of) or "")
             self.constants = [_constant(of.__name__, p, described) for p in signature(of).parameters.values()]
             self._of = of
-        self._made = cache(self._stated)
+        self._made, self.mesh, self.plan = cache(self._stated), mesh, plan
 
     def scene(self, **values: Any) -> Scene:
         """The scene with these constants, else their defaults; raises :class:`InputError` where there is none."""
@@ -367,6 +371,12 @@ class Statement:
         if not isinstance(scene, Scene):
             raise InputError(f"{getattr(self._of, '__name__', 'it')} returns {scene!r}: let it return a Scene.")
         return scene
+
+    def asked(self, options: argparse.Namespace) -> tuple[Scene, Discretization, Plan]:
+        """Scene, mesh and plan of parsed options: what these leave out is the file's own."""
+        constants = self.values(options)
+        mesh, plan = self.mesh and self.mesh(**constants), self.plan and self.plan(**constants)
+        return self.scene(**constants), discretization_of(options, mesh), plan_of(options, plan)
 
     def values(self, options: argparse.Namespace) -> dict[str, Any]:
         """Values of the constants among parsed options."""

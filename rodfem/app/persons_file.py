@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -17,6 +17,7 @@ from types import ModuleType
 
 from rodfem.errors import InputError
 
+RUN = "__run__"  #: name in a module of the mesh and the plan with which it runs its rod itself
 _read: list[Path] = []  # the files that are read for the rod that they state
 
 
@@ -24,10 +25,10 @@ class RunsItselfError(BaseException):
     """A file that is read for its rod asks for a run of its own: reading it ends there, the rod is stated."""
 
 
-def leave_the_run() -> None:
-    """Raise :class:`RunsItselfError` where a file is read for its rod: it would be run twice."""
+def leave_the_run(*own: object) -> None:
+    """Raise :class:`RunsItselfError` with its ``own`` mesh and plan if a file is read for its rod: not to run twice."""
     if _read:
-        raise RunsItselfError
+        raise RunsItselfError(*own)
 
 
 @contextmanager
@@ -63,8 +64,10 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     sys.path.append(str(path.parent))
     _read.extend(for_its_rod)
     try:
-        with suppress(RunsItselfError), as_sentence(file, f"run {sys.executable} {file} to see more"):
+        with as_sentence(file, f"run {sys.executable} {file} to see more"):
             spec.loader.exec_module(module)
+    except RunsItselfError as run:
+        vars(module)[RUN] = run.args
     finally:
         del _read[len(_read) - len(for_its_rod) :]
         if before is not None:

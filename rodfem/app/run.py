@@ -80,8 +80,8 @@ def run(
     nothing is printed, ``verbose`` that what is technical is printed, too: unknowns, meshes, points as they are found,
     times, and methods.  ``words`` rewords each line on the terminal.
     """
-    leave_the_run()
     plan, discretization = plan_of(plan, of_plan), discretization or Discretization()
+    leave_the_run(discretization, plan)
     output = Path(output or Path("results") / scene.name)
     plan.check(scene, discretization)
     terminal = Terminal(plan, output, comm, words, quiet=quiet, verbose=verbose)

@@ -1,5 +1,7 @@
 """A reader that leaves, as ``head`` does: the program ends there, without a word."""
 
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -29,3 +31,15 @@ def test_a_reader_that_leaves_ends_the_program_quietly(tmp_path: Path, kind: str
         run.stdout.close()
         assert run.stderr.read() == ""
     assert run.returncode == -13
+
+
+@pytest.mark.parametrize("words", ["help", "explain", "list nowhere", "run own.py --help"])
+def test_commands_end_without_a_word(tmp_path: Path, words: str) -> None:
+    """Nobody reads from the first character on."""
+    shutil.copy(CHECK.parents[2] / "demos" / "cord.py", tmp_path / "own.py")
+    command = [sys.executable, "-m", "rodfem", *words.split()]
+    reader, writer = os.pipe()
+    os.close(reader)
+    run = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False)
+    os.close(writer)
+    assert run.stderr == "" if words != "list nowhere" else run.stderr.startswith("error: No folder in nowhere")

@@ -11,7 +11,7 @@ import pytest
 
 import rodfem
 from rodfem.app import console
-from rodfem.app.main import Statement, mesh_of, rod_of
+from rodfem.app.main import Statement, own_of, rod_of
 from rodfem.app.persons_file import load
 from rodfem.errors import InputError
 
@@ -60,6 +60,7 @@ def test_a_file_with_a_rod(text: str, tmp_path: Path, capsys: pytest.CaptureFixt
         ("import no_such_module", "line 1: ModuleNotFoundError"),
         ("x = 1", "states no rod"),
         (SCENE + "other = column", "has the scenes column, other"),
+        (SCENE + "from rodfem import Plan\na, b = Plan(), Plan()", "has more than one Plan (a, b): keep one of them"),
         (SCENE.replace("span=(0.0, 10.0)", "span=(0.0, 0.0)"), "range"),
         (FUNCTION.replace("EI: float = 1", "EI"), "The argument EI of column has no default"),
         (FUNCTION.replace("EI: float = 1", "EI=None"), "The argument EI of column has the default None"),
@@ -103,11 +104,28 @@ def test_a_file_that_runs_its_rod_itself(tmp_path: Path, capsys: pytest.CaptureF
         assert capsys.readouterr().out.startswith("column: EI = 1\n")
 
 
+OWN = "\nfrom rodfem import Plan\nplan = Plan(span=(0.0, 3.0), depth=0, at=(1.0, 2.0))\n"
+
+
+@pytest.mark.parametrize(
+    "end", ["", "import rodfem\nother = Plan()\nrodfem.run(column, Discretization(elements=3), plan)\n"]
+)
+def test_the_options_of_a_file_are_those_of_its_own_plan(end: str, tmp_path: Path) -> None:
+    """Of the plan that it has, or with which it runs its rod; an option replaces one field of it."""
+    file = tmp_path / "mine.py"
+    file.write_text(SCENE + OWN + end)
+    line = ["run", str(file), "--at", "1.5", "--no-figures", "--output", str(tmp_path / "made")]
+    console.main(line)
+    data = rodfem.load_json(tmp_path / "made" / "diagram.json")
+    assert data["range"] == [0.0, 3.0] and data["asked"]["plan"]["depth"] == 0 and len(data["branches"]) == 1
+    assert data["asked"]["plan"]["at"] == [1.5] and data["discretization"]["elements"] == (3 if end else 8)
+
+
 def test_a_named_scene(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text(SCENE + "other = column")
     module = load(file)
-    assert rod_of(module, "other") is module.other and mesh_of(module) is None
+    assert rod_of(module, "other") is module.other and own_of(module, "Discretization") is None
     with pytest.raises(InputError, match="choose one of column, other"):
         rod_of(module, "third")
 
