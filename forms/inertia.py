@@ -30,6 +30,11 @@ def translational(dr1: Expr, dr2: Expr, rho_A: Expr) -> Expr:
     return rho_A * ufl.dot(dr1, dr2)
 
 
+def resistive(d3: Expr, dr1: Expr, dr2: Expr, across: Expr, along: Expr) -> Expr:
+    """Power of drag ``across`` and ``along`` the unit tangent ``d3`` (3,) at speeds ``dr1``, ``dr2``, per length."""
+    return translational(dr1, dr2, across) + (along - across) * ufl.dot(d3, dr1) * ufl.dot(d3, dr2)
+
+
 def rotation_metric(dq1: Expr, dq2: Expr) -> Expr:
     """Return ``4 dq1 . dq2``: the dot product of the rotation vectors where ``dq`` is tangent to ``|q| = 1``."""
     return 4 * ufl.dot(dq1, dq2)

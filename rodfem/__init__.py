@@ -57,7 +57,7 @@ _HOMES = {
         "codim2.locus": "Locus",
         "problem.ends": "End clamped pinned sliding hinged sliding_hinge circular_guide free elastic Ring",
         "problem.contribution": "Attachment Constraint integral at everywhere",
-        "problem.scene": "Scene Parameter Ordinate Inertia",
+        "problem.scene": "Scene Parameter Ordinate Inertia Drag",
         "problem": "section",
         "problem.table": "tabulated path",
         "fem.fields": "Discretization",

@@ -42,6 +42,7 @@ from rodfem.problem.ends import sliding as sliding
 from rodfem.problem.ends import sliding_hinge as sliding_hinge
 from rodfem.problem.events import Event as Event
 from rodfem.problem.events import Level as Level
+from rodfem.problem.scene import Drag as Drag
 from rodfem.problem.scene import Inertia as Inertia
 from rodfem.problem.scene import Ordinate as Ordinate
 from rodfem.problem.scene import Parameter as Parameter

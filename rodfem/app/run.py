@@ -155,7 +155,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     terminal.summary(data)
     terminal.table(data, branches, plan.most_branches)
     terminal.spectra(branches, scene)
-    terminal.frequencies(branches, scene.load)
+    terminal.frequencies(branches, scene)
     terminal.timing(diagram.clock, sum(len(b.points) for b in branches))
     named = shlex.quote(str(output))
     terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {named} shows them)")
@@ -175,7 +175,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
 def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""
     scene, plan, output = diagram.scene, terminal.plan, terminal.output
-    which = "left-most eigenvalues mu = omega^2" if scene.conservative else "eigenvalues mu = omega^2 nearest zero"
+    which = f"left-most {scene.inertia.words}" if scene.conservative else f"{scene.inertia.words} nearest zero"
     terminal.say(f"\nIs it stable? ({which})")
     finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
     saved: list[tuple[str, int]] = []

@@ -48,14 +48,17 @@ def _mesh(system: System) -> str:
     return f"{words}, {system.fields.unknowns} unknowns"
 
 
-def _roots(point: Point, one: float) -> dict[str, str]:
-    """Frequencies of a point, of a natural size ``one``, in words for each kind of motion; a complex pair once."""
+def _roots(point: Point, one: float, order: int) -> dict[str, str]:
+    """Frequencies of a point, of a natural size ``one``, in words for each kind of motion; a complex pair once.
+
+    Of the ``order`` 1 in time they are rates.
+    """
     words: dict[str, list[str]] = {}
     for value, kind in zip(point.omega2, point.motion, strict=True):
-        w = complex(*value) ** 0.5
+        w = complex(*value) ** (1.0 / order)
         if value[1] >= 0:
             re, im = in_decimals(w.real, 4, one), in_decimals(abs(w.imag), 4, one)
-            text = re if value[0] >= 0 else f"{im}i"
+            text = re if value[0] >= 0 or order == 1 else f"{im}i"
             words.setdefault(kind, []).append(text if value[1] == 0 else f"{re}+-{im}i")
     return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
 
@@ -241,23 +244,27 @@ class Report(Observer):
         """Print the left-most eigenvalues of the special points, if they were asked for."""
         rows = [(b.name, s.kind.words, s.point) for b in branches for s in b.special if s.point.spectrum]
         if rows:
-            inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
-            self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out; no error bars)")
+            own = "drag" if scene.inertia.order == 1 else "inertia"
+            inertia = f"the scene's {own}" if scene.has_inertia else "unit rotary inertia"
+            self.say(f"\nLeft-most {scene.inertia.words} for {inertia} (symmetry modes left out; no error bars)")
         wide = max((len(kind) for _, kind, _ in rows), default=0)
         for name, kind, point in rows:
             values = "  ".join(f"{mu:.6g}" for mu in point.spectrum)
             self.say(f"  {name:<12} {kind:<{wide}} {point.load:<13.8g} {values}")
 
-    def frequencies(self, branches: Sequence[Branch], load: str, rows: int = 11) -> None:
-        """Print the square roots of the left-most eigenvalues against the load, if the scene has them."""
-        points = [p for b in branches for p in b.points if p.omega2]
+    def frequencies(self, branches: Sequence[Branch], scene: Scene, rows: int = 11) -> None:
+        """Print the square roots of the left-most eigenvalues, or rates, against the load, if the scene has them."""
+        points, order = [p for b in branches for p in b.points if p.omega2], scene.inertia.order
         if points:
-            head = "Frequencies omega, the square roots of the left-most eigenvalues, against"
-            self.say(f"\n{head} {load} (errors not estimated)")
-            self._frequencies(points[:: max(1, (len(points) - 1) // (rows - 1))], load)
+            heads = (
+                "Rates of decay against",
+                "Frequencies omega, the square roots of the left-most eigenvalues, against",
+            )
+            self.say(f"\n{heads[order - 1]} {scene.load} (errors not estimated)")
+            self._frequencies(points[:: max(1, (len(points) - 1) // (rows - 1))], scene.load, order)
 
-    def _frequencies(self, shown: Sequence[Point], load: str) -> None:
-        table = [_roots(p, self.units.omega2**0.5) for p in shown]
+    def _frequencies(self, shown: Sequence[Point], load: str, order: int) -> None:
+        table = [_roots(p, self.units.omega2 ** (1.0 / order), order) for p in shown]
         kinds = sorted(set().union(*table))
         table.insert(0, dict(zip(kinds, kinds, strict=True)))
         widths = {kind: max(len(words.get(kind, "")) for words in table) for kind in kinds}
@@ -265,7 +272,7 @@ class Report(Observer):
         for head, words in zip(heads, table, strict=True):
             cells = "   ".join(f"{words.get(kind, ''):<{width}}" for kind, width in widths.items())
             self.say(f"  {head:>10}  {cells}".rstrip())
-        if "torsion" not in widths:
+        if "torsion" not in widths and order == 2:
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:

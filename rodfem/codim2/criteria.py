@@ -421,7 +421,7 @@ def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None
     chosen = np.argsort(own, kind="stable")[: len(own) - size]
     values, noise = spectrum.values[chosen], np.maximum(spectrum.zero, spectrum.noise[chosen])
     met = np.maximum(noise, 1e-4 * abs(values))  # a pair that has only just met: its imaginary part is a square root
-    return int(((values.real < -noise) | (abs(values.imag) > met)).sum())
+    return int(((values.real < -noise) | ((spectrum.order == 2) & (abs(values.imag) > met))).sum())
 
 
 def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:

@@ -32,7 +32,7 @@ import numpy as np
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import SHARP, assignment
-from rodfem.continuation.kinds import DIVERGENCE
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.diagram.collisions import (
     Collisions,
     Critical,
@@ -41,12 +41,13 @@ from rodfem.diagram.collisions import (
     Side,
     cluster_at,
     interpolated_zero,
+    pairs_in_common,
     same_negative,
 )
 from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
-from rodfem.stability.nonsymmetric import ALIKE, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricSolver, groups
 from rodfem.stability.spectrum import Spectrum, times
 from rodfem.tolerances import ROUND_OFF, unit
 
@@ -122,6 +123,8 @@ class CriticalLoads:
 
     def _whole(self, a: Side, b: Side) -> list[Critical]:
         """What happens in a step that is not parted; raises :class:`ConvergenceError` where that is not clear."""
+        if a.spectrum.order == 1:
+            return self._of_rates(a, b)
         events = self.collisions.between(a, b)
         negative = [event for event in events if event.omega2 < 0]
         first, last = len(a.spectrum.negative), len(b.spectrum.negative)
@@ -136,6 +139,43 @@ class CriticalLoads:
                 f"{b.load:.6g}, is not clear: use a smaller range."
             )
         return events
+
+    def _of_rates(self, a: Side, b: Side) -> list[Critical]:
+        """The same of rates: where the real part of a complex pair vanishes, and real ones that do.
+
+        Two real ones that collide are as unstable after that as before.
+        """
+        common = pairs_in_common(b.spectrum, a.spectrum)
+        before, after = (set(side.spectrum.growing.tolist()) for side in (a, b))
+        crossing = [i for i, j in common.items() if (i in after) != (j in before)]
+        places = [[crossing[i] for i in group] for group in groups(b.spectrum.values[crossing], np.inf, MULTIPLE)]
+        events = [self._oscillating(a, b, group, 1 if group[0] in after else -1) for group in places]
+        met = 2 * (len(after - {*common}) - len(before - {*common.values()}))
+        first, last = len(a.spectrum.negative) - met, len(b.spectrum.negative)
+        if met and first != last:
+            raise ConvergenceError(
+                f"What becomes of the rates between {self._load} = {a.load:.6g} and {b.load:.6g} is not clear: use a "
+                "smaller range."
+            )
+        return events if first == last else events + self._diverging(a, b, first, last)
+
+    def _oscillating(self, a: Side, b: Side, places: list[int], sign: int) -> Critical:
+        """Load at which the mean real part of complex pairs vanishes, by their ``places`` at ``b``."""
+        cluster = cluster_at(self.eigensolver.at(b.x), b.spectrum, places)
+        mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, 0)
+        low, high = sorted((a.load, b.load))
+        near = min((low, high), key=lambda load: abs(mean(load)))
+        if abs(mean(near)) > a.spectrum.zero:
+            try:
+                near = zero_between(mean, low, high, CLOSEST * (high - low))
+            except ValueError as trouble:
+                words = f"A pair was lost between {low:.6g} and {high:.6g}: use a smaller range."
+                raise ConvergenceError(words) from trouble
+        load, uncertainty = interpolated_zero(mean, near, self.units.load)
+        inside = min(max(load, low), high)
+        found = mean.measured(inside, cluster)
+        uncertainty += abs(load - inside)
+        return Critical(FLUTTER, inside, sign * cluster.size, uncertainty, found.frequency**2, found.cluster)
 
     def _diverging(self, a: Side, b: Side, first: int, last: int) -> list[Critical]:
         """Loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
@@ -211,7 +251,9 @@ def meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
     last, ahead = _neighbour(mine, behind.spectrum, count)
     nu = np.array([first, mine.pairs.nu[:count], last])
     t = abs(before.load - row.load) / abs(behind.load - row.load)
-    found = [*_pairs(mine, nu, np.array([back * back.T, ahead * ahead.T]), t), *_single(mine, nu, t)]
+    found = _single(mine, nu, t)
+    if mine.order == 2:
+        found = _pairs(mine, nu, np.array([back * back.T, ahead * ahead.T]), t) + found
     return [Meeting(row.load + at * (behind.load - row.load), mean) for at, mean in found]
 
 
@@ -245,8 +287,9 @@ def _pairs(row: Spectrum, nu: np.ndarray, products: np.ndarray, t: float) -> lis
 
 def _single(row: Spectrum, nu: np.ndarray, t: float) -> list[tuple[float, float]]:
     """Where eigenvalues come near zero, and do not pass through it, and what they are at the row."""
-    real = np.flatnonzero(row.values[: nu.shape[1]].imag == 0.0)
-    mu = row.shift + 1.0 / nu[:, real].real
+    imaginary = row.values[: nu.shape[1]].imag
+    real = np.flatnonzero(imaginary == 0.0 if row.order == 2 else imaginary >= 0.0)
+    mu = row.shift + (1.0 / nu[:, real]).real
     ends = (mu[0] * mu[2] > 0.0) & (np.minimum(abs(mu[0]), abs(mu[2])) > row.zero / row.one)
     found = _lowest(np.sign(mu[0]) * mu, t, np.array([ends, ends]))
     return [(at, float(row.values[real[n]].real)) for n, at in found]

@@ -299,7 +299,8 @@ class Sweep:
         row = next((end for end in ends if end.load == event.load), None)
         point = row or self.at(at_load(self.solver, ends[0].x, event.load))
         assert event.cluster is not None
-        self._name(point, event.cluster, event.cluster.size - event.zeros)
+        frequency = event.omega2**0.5 if self.solver.system.scene.inertia.order == 1 else 0.0
+        self._name(point, event.cluster, event.cluster.size - event.zeros, frequency)
         if event.kind == DIVERGENCE and (zero := point.negative - min(negative)) > 0:
             point.negative, point.zero = point.negative - zero, point.zero + zero
         special = SpecialPoint(event.kind, point, *negative, event.uncertainty, omega2=event.omega2)
@@ -308,10 +309,14 @@ class Sweep:
             branch.points.append(point)
         self._special(branch, special)
 
-    def _name(self, point: Point, cluster: Cluster, number: int) -> None:
-        """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one."""
+    def _name(self, point: Point, cluster: Cluster, number: int, frequency: float) -> None:
+        """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one.
+
+        Of rates they have a ``frequency`` there.
+        """
         name = self.eigensolver.at(point.x).motion(cluster.basis)
-        distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
+        there = cluster.mean + 1j * frequency
+        distance = [abs(complex(value[0], abs(value[1])) - there) for value in point.omega2]
         for i in np.argsort(distance, kind="stable")[:number]:
             point.motion[i] = name
 
@@ -353,12 +358,14 @@ class SweepErrors:
         moved = x
         if s.cluster is not None:
             measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._cluster(s.cluster)
-            if s.kind == FLUTTER:
+            if s.kind == FLUTTER and self.solver.system.scene.inertia.order == 2:
                 load, left = self._flutter(measured, cluster, s)
             else:
                 zeros = cluster.size - abs(s.negative_after - s.negative_before)
                 load, left = zero_near(Mean(measured, cluster, zeros), point.load, self.units.load)
                 left = max(left, s.located_to)
+                if s.kind == FLUTTER:
+                    s.omega2_error = bound(s.omega2, measured(load, cluster).frequency ** 2, ROUND_OFF * s.omega2, rho)
             of_load = max(bound(point.load, load, left, rho), s.located_to)
             moved = self._moved(x, point.load, of_load)
             of_ordinate += abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))

@@ -202,7 +202,9 @@ class Equations:
         """Kinetic metric of the spectrum."""
         f, c, own = self.unknowns, self.constants, self.fields.scene.inertia
         kinetic = inertia.rotary(f.q, a.q, b.q, tuple(own.rho_I(c))) * dx
-        if f.r is not None:
+        if f.r is not None and own.along:
+            kinetic += inertia.resistive(self.along().d3, a.r, b.r, own.rho_A(c), own.along(c)) * dx
+        elif f.r is not None:
             kinetic += inertia.translational(a.r, b.r, own.rho_A(c)) * dx
         return kinetic + sum(_terms("kinetic", sites, dx))
 

@@ -133,7 +133,8 @@ class ModeFinder:
         unit = sample["q"] / np.linalg.norm(sample["q"], axis=1, keepdims=True)
         state: dict[str, Any] = {"load": self.system.scalar(x), "s": sample["s"], "r": sample["r"], "q": unit}
         state |= found._asdict() | dict(zip(LEFT, left, strict=True))
-        return verdict, Modes(**state, error=errors, note=note)
+        rates = self.system.scene.inertia.order == 1
+        return verdict, Modes(**state, error=errors, rates=rates, note=note)
 
     def few(self, x: PETSc.Vec, number: int, double: float = np.nan) -> Few:
         """The ``number`` left-most modes (nearest zero without a potential) of ``x``, and rigid motions."""
@@ -345,7 +346,8 @@ def _of_branch(branch: Branch, solvers: Sequence[BranchSolver]) -> list[Typical]
     if solvers[0].system.equations.massless:
         return []
     finders: dict[int, ModeFinder] = {}
-    double = {special.row: special.omega2 for special in branch.special}
+    rates = solvers[0].system.scene.inertia.order == 1
+    double = {special.row: special.omega2 for special in branch.special if not rates}
     out = []
     for row, number in _typical_rows(branch).items():
         point = branch.points[row]

@@ -47,6 +47,11 @@ FIELDS = ("value", "residual", "error", "displacement", "rotation", "rotation_bo
 LEFT = ("left_displacement", "left_rotation", "weight_displacement", "weight_rotation")
 
 
+def exponent(mu: complex, rates: bool) -> complex:
+    """Exponent ``a`` of motions ``exp(a t)`` of an eigenvalue ``mu = omega^2``, or of ``rates`` of decay."""
+    return -mu if rates else complex(np.sqrt(-mu))
+
+
 @dataclass(frozen=True, repr=False)
 class Modes:
     """Modes of one state, K of them, at the m nodes of the mesh; nondimensional, or in the units of the scene.
@@ -58,7 +63,7 @@ class Modes:
     s: np.ndarray  #: arclength (m,)
     r: np.ndarray  #: centreline (m, 3)
     q: np.ndarray  #: unit quaternions (m, 4)
-    value: np.ndarray  #: eigenvalues mu = omega^2 (K,), complex without a potential; zeros of symmetries last
+    value: np.ndarray  #: eigenvalues mu = omega^2, or rates (K,), complex without a potential; zeros of symmetries last
     residual: np.ndarray  #: backward errors of the eigenpairs (K,); nan for symmetries
     error: np.ndarray  #: estimated errors of the discretisation (K,); nan where not estimated, and for symmetries
     motion: tuple[str, ...]  #: what each does: SYMMETRY, bending about a director, torsion, or a mixture
@@ -68,6 +73,7 @@ class Modes:
     left_rotation: np.ndarray
     weight_displacement: np.ndarray  #: with the next, what takes motions to the mode's amplitude
     weight_rotation: np.ndarray
+    rates: bool = False  #: whether the eigenvalues are rates of decay
     note: str = ""  #: why errors that were asked for are not estimated; empty where they are
 
     def __repr__(self) -> str:
@@ -104,6 +110,7 @@ def save_modes(
         for name in ("load", "s", "r", "q", *FIELDS, *LEFT):
             group[name] = getattr(modes, name)
         group.attrs["note"] = modes.note
+        group.attrs["rates"] = modes.rates
         group["motion"] = np.array(modes.motion, dtype=h5py.string_dtype())
         if first:
             write_section(file, scene)
@@ -118,11 +125,12 @@ def load_modes(path: Path | str, branch: str, row: int) -> Modes:
     unfit = f"{path} has no modes of row {row} of a branch {branch!r} ({{}}): give {MODES.file}."
     with MODES.opened(path, ("branches",), unfit) as file:
         group = file[f"branches/{branch}/{row}"]
-        names = [name for name in Modes.__dataclass_fields__ if name != "note"]
+        names = [name for name in Modes.__dataclass_fields__ if name not in ("note", "rates")]
         arrays = {name: group[name][()] for name in names if name != "motion"}
         motion, note = tuple(group["motion"].asstr()[()]), str(group.attrs.get("note", ""))
+        rates = bool(group.attrs.get("rates", False))
     arrays["load"] = float(arrays["load"])
-    return Modes(motion=motion, note=note, **arrays)
+    return Modes(motion=motion, rates=rates, note=note, **arrays)
 
 
 def rows_with_modes(path: Path) -> list[tuple[str, int]]:

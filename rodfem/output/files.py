@@ -47,6 +47,8 @@ PARTS = ("assembly", "solve", "stability", "location", "error bars", "modes", "s
 MEANING = {column.name: column.words for column in COLUMNS}
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
 """Meaning of ``negative`` where loads have no potential."""
+GROWING = "number of rates of decay whose real part is negative, of those found: 0 is stable"
+"""The same of a rod with drag."""
 
 
 def as_data(
@@ -56,7 +58,7 @@ def as_data(
     """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene)."""
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
-    load, ordinate = scene.parameters[scene.load], scene.ordinate
+    load, ordinate, rates = scene.parameters[scene.load], scene.ordinate, scene.inertia.order == 1
     return {
         "format": DIAGRAM.mark(),
         "scene": scene.name,
@@ -75,10 +77,10 @@ def as_data(
         "discretization": mesh_of(system),
         "accuracy": accuracy,
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
-        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
+        "meaning": MEANING | ({} if scene.conservative else {"negative": GROWING if rates else UNSTABLE}),
         "branch_points_not_followed": not_followed(branches),
         "meshes": list(map(_mesh_data, systems)),
-        "branches": list(map(branch_data, branches)),
+        "branches": [branch_data(branch) | ({"rates": True} if rates else {}) for branch in branches],
         "timing": _timing(clock, sum(len(b.points) for b in branches)) | {"ranks": system.comm.size},
     }
 

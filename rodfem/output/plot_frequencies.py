@@ -80,7 +80,7 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
         for found in ranges_of(branch):
             axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
             ranges[found.words] = Patch(color=found.shade, label=found.words)
-        for curve in curves(branch["columns"], branch["special"]):
+        for curve in curves(branch["columns"], branch["special"], rates=bool(branch.get("rates"))):
             shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
         shown |= _marked(axes, branch["special"])
     looks: dict[str, dict[str, Any]] = {
@@ -158,21 +158,38 @@ class Range(NamedTuple):
     shade: str
 
 
-def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()) -> list[FrequencyCurve]:
-    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve."""
+def root(mu: Any, rates: bool) -> Any:
+    """Frequency ``w`` of motions ``exp(i w t)``, of a positive real part; of ``rates`` without their decay.
+
+    Of a pair of conjugate rates, whose motions are one, the second has none.
+    """
+    if not rates:
+        return np.sqrt(mu)
+    mu = np.asarray(mu)
+    return np.where(mu.imag < 0.0, complex(np.nan, np.nan), mu.imag + 1j * np.maximum(-mu.real, 0.0))
+
+
+def curves(
+    columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = (), *, rates: bool = False
+) -> list[FrequencyCurve]:
+    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve.
+
+    By its ``columns`` and ``special`` points; ``rates`` are smooth at these.
+    """
     found: dict[int, list[Member]] = {}
     rows = zip(*(columns[name] for name in ("load", "omega2", "motion", "curve")), strict=True)
     for row, (load, *modes) in enumerate(rows):
         for pair, motion, number in zip(*modes, strict=True):
             mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
             found.setdefault(number, []).append((load, row, mu, motion))
-    met = {p["row"]: float(p["omega2"]) for p in special if p["kind"] == FLUTTER and p.get("omega2") is not None}
+    flutter = [p for p in special if p["kind"] == FLUTTER and p.get("omega2") is not None and not rates]
+    met = {p["row"]: float(p["omega2"]) for p in flutter}
     out = []
     for each in found.values():
         loads, places, values, motions = zip(*sorted(_with_roots(each, met), key=lambda x: x[0]), strict=True)
-        roots = np.sqrt(np.array(values, dtype=np.complex128))
+        roots = root(np.array(values, dtype=np.complex128), rates)
         out.append(FrequencyCurve(Counter(motions).most_common(1)[0][0], np.array(loads), np.array(places), roots))
-    return sorted(out, key=lambda curve: (curve.motion, abs(curve.roots[0])))
+    return sorted(out, key=lambda curve: (curve.motion, np.nan_to_num(abs(curve.roots[0]))))
 
 
 def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Member]:
@@ -207,7 +224,8 @@ def _unstable(interval: Interval) -> list[frozenset[str]]:
     values = [[complex(*v) for v in row] for row in rows]
     least, kinds = REAL * max(abs(v) for row in values for v in row), []
     for row in values:
-        flutter = any(abs(v.imag) > REAL * abs(v) for v in row)
+        bound = -least if interval.branch.get("rates") else np.inf
+        flutter = any(abs(v.imag) > REAL * abs(v) and v.real < bound for v in row)
         divergence = any(v.real < -least and abs(v.imag) <= REAL * abs(v) for v in row)
         kinds.append(frozenset([FLUTTER] * flutter + [DIVERGENCE] * divergence))
     return [a | b for a, b in pairwise(kinds)]
@@ -217,7 +235,8 @@ def top(branch: Mapping[str, Any], most: int) -> float:
     """Greatest of critical frequencies, imaginary parts of all roots, and real parts of the ``most`` left-most ones."""
     highest = LEAST
     for pairs in branch["columns"]["omega2"]:
-        roots = [complex(*pair) ** 0.5 for pair in pairs]  # in ascending order of the real parts of the squares
-        highest = max([highest, *(w.imag for w in roots), *(w.real for w in roots[:most])])
+        # in ascending order of the real parts of the squares
+        roots = np.nan_to_num(root(np.array([complex(*pair) for pair in pairs]), bool(branch.get("rates"))))
+        highest = max([highest, *roots.imag.tolist(), *roots[:most].real.tolist()])
     critical = [abs(complex(s["omega2"])) ** 0.5 for s in branch["special"] if s.get("omega2") is not None]
     return max([highest, *critical])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
+from rodfem.modes.modes import SYMMETRY, Modes, exponent, heading, load_modes, load_setting
 from rodfem.output.glyphs import POINT, Glyph, Look, Solid, between, glyphs_of, striped
 from rodfem.output.render import axes_of, axis_of
 from rodfem.output.states import curve_of
@@ -108,7 +108,7 @@ class _Panel:
         size, self.radius = drawn_size(u, w, span), min(span, s[-1] - s[0]) / 65
         self.u, self.w = size * u, size * w
         self.combed = np.linalg.norm(abs(self.u), axis=1).max() < 0.5 * LARGEST[0] * span
-        self.root = np.sqrt(-mu)
+        self.root = exponent(mu, modes.rates)
         free = modes.motion[number] == SYMMETRY or abs(mu) <= (error if np.isfinite(error) else 0.0)
         self.color = FREE if free else GROWS if self.root.real > GROWTH * abs(self.root) else SWINGS
         doubt = f" ({error:.0e})" if np.isfinite(error) else ""

@@ -33,6 +33,11 @@ RECOVERY = {
     DIVERGENCE: "ceases to diverge: a frequency passes through zero",
 }
 """The same where the index does not rise."""
+OF_RATES = (
+    {FLUTTER: "flutters: an oscillation ceases to decay", DIVERGENCE: "diverges: a motion ceases to decay"},
+    {FLUTTER: "ceases to flutter: an oscillation decays again", DIVERGENCE: "ceases to diverge: a motion decays again"},
+)
+"""The same two of a rod with drag."""
 FORMS = {
     "supercritical pitchfork": "buckles supercritically",
     "subcritical pitchfork": "buckles subcritically and jumps",
@@ -146,7 +151,8 @@ def _state(interval: Interval, data: Data) -> str:
     sweep = is_sweep(data)
     if interval.kind == STABLE:
         plane = " in its plane (not examined in space)" if data.get("planar") and interval.in_space is None else ""
-        return f"stable{plane}, by the frequencies found," if sweep else f"stable{plane}"
+        found = "rates" if interval.branch.get("rates") else "frequencies"
+        return f"stable{plane}, by the {found} found," if sweep else f"stable{plane}"
     if interval.kind == UNDECIDED:
         soft = ["an eigenvalue is too near zero for its sign to be known on this mesh"] * interval.soft
         return f"of undecided stability ({'; '.join([on_kink(interval.kink)] * bool(interval.kink) + soft)})"
@@ -194,7 +200,8 @@ def _difference(one: Interval, after: Interval) -> str:
 def _event(special: Data, branch: Data, branches: Sequence[Data]) -> str:
     """What happens at a special point, as a verb with all that is known of it."""
     kind, rises = special["kind"], special["negative_after"] > special["negative_before"]
-    words = (EVENTS if rises else EVENTS | RECOVERY).get(kind, f"passes a special point, {kind}")
+    verbs = EVENTS | (OF_RATES[not rises] if branch.get("rates") else {} if rises else RECOVERY)
+    words = verbs.get(kind, f"passes a special point, {kind}")
     if kind == IMPERFECT:
         size = special.get("unfolding")
         known = "" if size is None else f" of the relative size {abs(size):.0e}"

@@ -94,8 +94,9 @@ def is_sweep(data: Data) -> bool:
 
 
 def row_of(branch: Data, row: int) -> dict[str, Any]:
-    """Columns of one row."""
-    return {name: column[row] for name, column in branch["columns"].items()}
+    """Columns of one row, and whether its eigenvalues are ``rates`` of decay."""
+    kind = {"rates": True} if branch.get("rates") else {}
+    return {name: column[row] for name, column in branch["columns"].items()} | kind
 
 
 def index_in_words(special: Data, row: Data) -> str:
@@ -147,8 +148,10 @@ def _remarks(special: Data, row: Data) -> list[str]:
     """What else there is to say of a special point, whose columns are ``row``."""
     remarks = [str(mode) for mode in soft_modes(row)]
     if special["kind"] == FLUTTER and special.get("omega2") is not None:
-        bar = special.get("omega2_error_estimate")
-        remarks.append(f"double eigenvalue omega^2 = {number(special['omega2'], inf if bar is None else bar)}")
+        omega2, bar = special["omega2"], special.get("omega2_error_estimate")
+        bar = inf if bar is None else bar
+        oscillates = f"frequency {number(omega2**0.5, bar / (2 * omega2**0.5))}" if row.get("rates") else ""
+        remarks.append(oscillates or f"double eigenvalue omega^2 = {number(omega2, bar)}")
     remarks += [law_in_words(special)] if special.get("law") else []
     return remarks + ([special["note"]] if special.get("note") else [])
 
@@ -265,7 +268,7 @@ def _stability(row: Data) -> Words:
         sentence = f"Stability undecided: {on_kink(row['kink'])}; {side}."
         return Words(UNDECIDED, index_range(negative, undecided, row["kink"]), sentence)
     if "omega2" in row:
-        return _of_frequencies(negative, row["omega2"])
+        return _of_rates(negative, row["omega2"]) if row.get("rates") else _of_frequencies(negative, row["omega2"])
     verdict = VERDICTS.get(stability(negative, undecided, in_space=space), UNSTABLE)
     index = index_range(negative, undecided) + ("" if space is None or undecided else f" ({space})")
     zero = row["zero"]
@@ -288,6 +291,16 @@ def _verdict(negative: int, undecided: int, space: int | None) -> str:
 def _too_near_zero(undecided: int) -> str:
     sign = "its" if undecided == 1 else "their"
     return f"{many(undecided, 'eigenvalue')} too near zero for {sign} sign to be known on this mesh"
+
+
+def _of_rates(negative: int, found: Sequence[Sequence[float]]) -> Words:
+    """The same by rates of decay."""
+    if not negative:
+        return Words(STABLE, "0", f"Stable: all of the {len(found)} motions found decay.")
+    growing = sum(1 for real, imaginary in found if real < 0.0 and imaginary)
+    return Words(
+        UNSTABLE, str(negative), f"Unstable: {many(negative, 'motion')} grow, {growing} of them by oscillations."
+    )
 
 
 def _of_frequencies(negative: int, omega2: Sequence[Sequence[float]]) -> Words:

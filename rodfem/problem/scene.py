@@ -13,7 +13,7 @@ from functools import cached_property
 from keyword import iskeyword
 from math import inf, isfinite
 from numbers import Real
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import ufl
@@ -91,6 +91,10 @@ def _no_rotary(c: Constants) -> tuple[float, ...]:
     return (0.0, 0.0, 0.0)
 
 
+def _one(c: Constants) -> float:
+    return 1.0
+
+
 @dataclass(frozen=True)
 class Inertia:
     """Mass ``rho_A(c)`` and rotary inertia ``rho_I(c)`` about the directors, both per unit length.
@@ -99,6 +103,9 @@ class Inertia:
     no ``rho_I`` the rotary inertia is zero, as of a slender one; without either it is one, by which eigenvalues count.
     """
 
+    order: ClassVar[int] = 2  # of the equations of motion in time
+    words: ClassVar[str] = "eigenvalues mu = omega^2"
+    along: ClassVar[None] = None
     rho_A: Given = role_field(Role("mass per length", "f(c)", 0, along=True), _massless)
     rho_I: Given = role_field(Role("rotary inertia per length", "f(c)", 3, along=True), _unit_rotary)
 
@@ -106,6 +113,32 @@ class Inertia:
         """Give a rod with a mass no rotary inertia but its own."""
         if self.rho_A is not _massless and self.rho_I is _unit_rotary:
             object.__setattr__(self, "rho_I", _no_rotary)
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Drag of a rod in a viscous fluid, in the place of its inertia: motions ``D x' = -K x``, not ``M x'' = -K x``.
+
+    Force over velocity, per length, ``across(c)`` the rod and ``along(c)`` it (None: as across), and moment over the
+    rate of ``turning(c)`` (3,) about the directors.  Eigenvalues ``mu`` of ``K x = mu D x`` are rates of decay: a state
+    is unstable where the real part of one is negative, and flutters where that of a complex pair passes through zero.
+    """
+
+    order: ClassVar[int] = 1
+    words: ClassVar[str] = "rates of decay mu"
+    across: Given = role_field(Role("drag across the rod per length", "f(c)", 0, along=True), _one)
+    along: Given = role_field(Role("drag along the rod per length", "f(c)", 0, along=True))
+    turning: Given = role_field(Role("drag of turning per length", "f(c)", 3, along=True), _no_rotary)
+
+    @property
+    def rho_A(self) -> Given:
+        """What stands in the place of a mass."""
+        return self.across
+
+    @property
+    def rho_I(self) -> Given:
+        """What stands in the place of a rotary inertia."""
+        return self.turning
 
 
 AT_A_POINT = Role(
@@ -208,7 +241,7 @@ KINDS: dict[str, Check] = {
     "states": optional(_folder),
     "ends": _two_ends,
     "parameters": _parameters,
-    "inertia": a(Inertia, "one, as in Inertia(rho_A=1.0)"),
+    "inertia": a((Inertia, Drag), "one, as in Inertia(rho_A=1.0) or Drag(across=1.0)"),
     "ordinate": a(Ordinate, "an Ordinate(name, s, of)"),
     "attachments": _tuple_of(Attachment, "(Attachment(0.5, mass=1.0),)"),
     "constraints": _tuple_of(Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
@@ -248,7 +281,7 @@ class Scene(Contribution, metaclass=Stated):
     ordinate
         What to record in addition to the load.
     inertia
-        Kinetic metric of the spectrum; unit rotary inertia by default, which serves to count.
+        Kinetic metric of the spectrum, or a :class:`Drag`; unit rotary inertia by default, which serves to count.
     distributed
         ``distributed(c)``, dead force per unit length (3,), a function of ``c.s`` if wanted; gravity, say.
     follower
@@ -285,7 +318,7 @@ class Scene(Contribution, metaclass=Stated):
     ordinate: Ordinate
     span: tuple[float, float]
     title: str = ""
-    inertia: Inertia = Inertia()
+    inertia: Inertia | Drag = Inertia()
     distributed: Given = role_field(Role("distributed force", "f(c)", 3, along=True, load=DEAD))
     follower: Given = role_field(Role("distributed follower force", "f(c)", 3, along=True, load=FOLLOWER))
     potential: OfPlace | None = role_field(Role("potential along the rod", "f(x, c)", 0, along=True, load=POTENTIAL))
@@ -492,8 +525,9 @@ class Scene(Contribution, metaclass=Stated):
         """Whether a mass or a rotary inertia, along the rod or attached to it, is a function of the load."""
         c, asked = watched(self.constants())
         attached = (f for x in self.attachments for f in (x.mass, x.rotary_inertia) if f)
-        for function in (self.inertia.rho_A, self.inertia.rho_I, *attached):
-            function(c)
+        for function in (self.inertia.rho_A, self.inertia.rho_I, self.inertia.along, *attached):
+            if function:
+                function(c)
         return self.load in asked
 
     @cached_property

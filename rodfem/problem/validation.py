@@ -43,6 +43,11 @@ def check_scene(scene: Scene) -> None:
     check_drift(scene)
     check_reach(scene)
     check_convexity(scene)
+    heavy = [x.s for x in scene.attachments if x.mass or x.rotary_inertia]
+    if heavy and scene.inertia.order == 1:
+        raise SceneError(
+            f"A mass is attached at s = {heavy[0]:g} to a rod with drag: leave it out, or give an Inertia."
+        )
     for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
         if trouble := trouble_with_inertia(scene, load):
             raise SceneError(trouble)
@@ -152,6 +157,7 @@ def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[flo
     masses += [number_of(scene.inertia.rho_A(there)) for there in along]
     rotary = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
     rotary += [number_of(x) for there in along for x in scene.inertia.rho_I(there)]
+    masses += [number_of(scene.inertia.along(there)) for there in along if scene.inertia.along]
     return masses, rotary
 
 

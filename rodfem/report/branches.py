@@ -75,6 +75,7 @@ def branch_data(branch: Data, shapes: Shapes, colour: str, data: Data) -> dict[s
         "told": [asdict(each) for each in different],
         "spectrum": _spectrum(branch),
         "omega2": _without_noise(columns),
+        "rates": bool(branch.get("rates")),
         "frequencies": _frequencies(branch) if columns.get("omega2") else None,
         "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
     }
@@ -156,7 +157,7 @@ def _frequencies(branch: Data) -> dict[str, Any]:
                 "rows": curve.rows.tolist(),
                 "parts": {"frequency": plain(curve.real)} | {name: plain(part) for name, part in curve.parts.items()},
             }
-            for curve in curves(branch["columns"], branch["special"])
+            for curve in curves(branch["columns"], branch["special"], rates=bool(branch.get("rates")))
         ],
         "ranges": [found._asdict() for found in ranges_of(branch)],
         "marks": [

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
-from rodfem.modes.modes import RIGID, SYMMETRY, Few, load_modes, rows_with_modes, typical_of
+from rodfem.modes.modes import RIGID, SYMMETRY, Few, exponent, load_modes, rows_with_modes, typical_of
 from rodfem.output.glyphs import Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
@@ -82,6 +82,7 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
     for row in sorted({*typical, *exact} & {*range(len(shapes.r))}):
         few, nodes = getattr(typical.get(row), "found", None), group["s"][row]
         if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
+            shown = [mode._replace(rates=bool(branch.get("rates"))) for mode in shown]
             modes[row] = motions_of(shown, shapes, row, read_setting(group, row), stage.look)
     return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items() if each.trouble}}
 
@@ -214,7 +215,7 @@ def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any)
 class Shown(NamedTuple):
     """A mode with the bound of its ``error`` (nan: not estimated), and displacement and rotation (m, 3) at nodes ``s``.
 
-    ``zero`` says that the count at the state has its eigenvalue among those that vanish.
+    ``zero`` says that the count at the state has its eigenvalue among those that vanish, ``rates`` that it is of decay.
     """
 
     value: complex
@@ -224,6 +225,7 @@ class Shown(NamedTuple):
     u: NDArray[Any]
     w: NDArray[Any]
     zero: bool = False
+    rates: bool = False
 
 
 def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[Shown]:
@@ -276,7 +278,7 @@ def _about(mode: Shown) -> dict[str, Any]:
     exact, known = mode.motion in (SYMMETRY, RIGID), bool(np.isfinite(mode.error))
     zero = exact or mode.zero or bool(abs(mode.value) <= np.nan_to_num(mode.error, posinf=0.0))
     mu = 0j if zero and (exact or not known) else mode.value
-    root = np.sqrt(-mu)
+    root = exponent(mu, mode.rates)
     words = "0 (exact)" if exact else eigenvalue_in_words(mu, mode.error) or "0" * zero
     return {
         "value": [mu.real, mu.imag],

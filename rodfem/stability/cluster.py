@@ -68,6 +68,11 @@ class Measured:
     cluster: Cluster
 
     @property
+    def frequency(self) -> float:
+        """Mean of the imaginary parts, of rates of decay the frequency."""
+        return float(abs(self.values.imag).mean())
+
+    @property
     def spread(self) -> float:
         """Distance of the eigenvalues from their mean, relative: how distinct they and their vectors are."""
         return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), TINY))

@@ -231,7 +231,9 @@ class NonsymmetricPencil:
 
     def about(self, target: float) -> Spectrum:
         """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""
-        return Spectrum(*self._in_units(self.mass), target / self._one, self._one)
+        out = Spectrum(*self._in_units(self.mass), target / self._one, self._one)
+        out.order = self.system.scene.inertia.order
+        return out
 
     @cached_property
     def spectrum(self) -> Spectrum:
@@ -247,6 +249,7 @@ class NonsymmetricPencil:
         mass = self.mass.copy()
         mass.axpy(LITTLE * mass.norm() / self.system.metric.norm(), self.system.metric)
         found = Spectrum(*self._in_units(mass), SHIFT, self._one)
+        found.order = self.spectrum.order
         return found.unstable - self.spectrum.unstable if found.complete else 0
 
     def _floor(self, spectrum: Spectrum) -> float:

@@ -1,4 +1,4 @@
-r"""All finite eigenvalues ``mu = omega^2`` of a pencil ``S x = mu M x``, on its unknowns with mass.
+r"""All finite eigenvalues ``mu = omega^2``, or rates of decay, of a pencil ``S x = mu M x``, on its unknowns with mass.
 
 The mass is ``M = L R^t``: ``R = L`` has as many columns as its rank; of a large pencil ``L`` is ``M``, and ``R`` one.
 With a shift ``a``
@@ -90,6 +90,8 @@ class Spectrum:
     ``one`` is their natural size, the unit of the ``shift``.  ``floor`` is what round-off makes of zero, where it is
     known (:mod:`rodfem.stability.nonsymmetric`).
     """
+
+    order = 2  # of the equations of motion in time: of the first order eigenvalues are rates of decay
 
     def __init__(self, stiffness: sp.csr_matrix, mass: sp.csr_matrix, shift: float, one: float = 1.0) -> None:
         """Factor by LU; raises :class:`~rodfem.errors.ConvergenceError` if the pencil is singular at the shift."""
@@ -230,14 +232,20 @@ class Spectrum:
         return np.flatnonzero(self.values.imag > 0.0)
 
     @property
+    def growing(self) -> np.ndarray:
+        """Places (m,) of the complex pairs of which one grows: all, but of rates those of a negative real part."""
+        upper = self.upper
+        return upper if self.order == 2 else upper[self.values[upper].real < -np.maximum(self.zero, self.noise[upper])]
+
+    @property
     def numbers(self) -> tuple[int, int]:
-        """Numbers of negative eigenvalues and of complex pairs."""
-        return len(self.negative), len(self.upper)
+        """Numbers of negative eigenvalues and of growing pairs."""
+        return len(self.negative), len(self.growing)
 
     @property
     def unstable(self) -> int:
-        """Number of eigenvalues that are negative or complex."""
-        return len(self.negative) + 2 * len(self.upper)
+        """Number of unstable eigenvalues: negative ones, and growing pairs."""
+        return len(self.negative) + 2 * len(self.growing)
 
 
 def size_of_zero(values: np.ndarray, one: float, floor: float) -> float:

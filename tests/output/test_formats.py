@@ -65,6 +65,11 @@ def on_a_plane() -> Scene:
     return replace(scenes()["euler"], ends=ends, constraints=(kept,), name="plane")
 
 
+def viscous() -> Scene:
+    """A rod without inertia in a fluid."""
+    return replace(scenes()["leipholz"], inertia=rodfem.Drag(), name="viscous")
+
+
 def loose() -> Scene:
     """Free to turn about its left end, but for a spring of stiffness 1e-10."""
     joint = replace(rodfem.pinned(), energy=lambda x, c: page()["loads"].rotational_spring(x.q, 1e-10))
@@ -79,6 +84,7 @@ RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "locus": (column, MESH, Plan((0.0, 12.0), locus=("e", -0.2, 0.2), **QUICK)),
     "planar": (lambda: scenes()["in_plane"], MESH, Plan((0.0, 1.0), **QUICK)),
     "follower": (lambda: scenes()["leipholz"], MESH, Plan((0.0, 42.0), at=(5.0,), modes=1, **QUICK)),
+    "drag": (viscous, MESH, Plan((0.0, 1.0), at=(0.5,), modes=1, **QUICK)),
     "ring": (lambda: scenes()["ring"], POINTWISE, Plan((0.0, 0.2), **QUICK)),
     "foundation": (lambda: scenes()["winkler"], MESH, Plan((0.0, 1.0), at=(0.5,), modes=1, **QUICK)),
     "stretched": (lambda: scenes()["pressed"], MESH, Plan((1.0, 0.99), at=(0.995,), modes=1, **QUICK)),

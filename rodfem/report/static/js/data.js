@@ -47,7 +47,8 @@ export function reading(branch, row, name) {
 export const unit = (name) => (data.units[name] ? ` ${data.units[name]}` : "");
 
 // What is counted at a state: its index, or under loads without potential its squared frequencies, of which none is no news.
-export const counted = (b, index) => (b.omega2 ? (index === "0" ? "" : `${index} of ω²`) : `index ${index}`);
+export const symbolOf = (b) => (b.omega2 && !b.rates ? "ω²" : "μ");
+export const counted = (b, index) => (b.omega2 ? (index === "0" ? "" : `${index} of ${symbolOf(b)}`) : `index ${index}`);
 
 // A number whose error is not estimated.
 export function rough(x, count = 6) {

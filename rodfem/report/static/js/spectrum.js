@@ -1,7 +1,7 @@
 // Left-most eigenvalues along the branch, by sign: negative ones are triangles, positive ones circles. They are those of
 // every row where a run was asked for that, else those of the states that have modes; where there are none, the index.
 
-import { data, digits, escaped, rough } from "report/data";
+import { data, digits, escaped, rough, symbolOf } from "report/data";
 import { branch, select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import { draw, layout } from "report/plotting";
@@ -79,7 +79,7 @@ function redraw() {
   const b = branch(), all = recorded(b);
   shown = b;
   if (!all.length) return counts(b);
-  const words = ({ row, value: [x, y] }) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>${b.omega2 ? "ω²" : "μ"} = ${rough(x)}${y ? ` ± ${digits(Math.abs(y))} i` : ""}`;
+  const words = ({ row, value: [x, y] }) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>${symbolOf(b)} = ${rough(x)}${y ? ` ± ${digits(Math.abs(y))} i` : ""}`;
   const traces = KINDS.map(({ name, test, marker }) => {
     const found = all.filter((each) => test(each.value));
     return {
@@ -92,7 +92,7 @@ function redraw() {
       marker,
     };
   });
-  const title = b.omega2 ? "Re ω²" : plot.clientHeight < TALL ? "μ" : "eigenvalue μ";
+  const title = b.omega2 ? `Re ${symbolOf(b)}` : plot.clientHeight < TALL ? "μ" : "eigenvalue μ";
   const how = layout(data.label, title, { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });
   how.yaxis.range = range(b, all);
   finish([...guides(b), ...traces], how);

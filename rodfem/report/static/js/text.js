@@ -1,6 +1,6 @@
 // The state in words: titles, verdict, and where the report comes from.
 
-import { counted, data, digits, reading, rough, unit } from "report/data";
+import { counted, data, digits, reading, rough, symbolOf, unit } from "report/data";
 import { branch, state, subscribe, words } from "report/store";
 
 const at = (id) => document.getElementById(id);
@@ -40,7 +40,7 @@ function values(b) {
   none.className = "quiet";
   if (!(b.spectrum || b.omega2 || known.length)) none.append("Values at every state: run with ", Object.assign(document.createElement("code"), { textContent: "--spectrum 4" }));
   none.title = "The command of this report, with this option besides: see About";
-  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : none.hasChildNodes() ? [none] : []));
+  at("values").replaceChildren(...(each.length ? [`${symbolOf(b)}:`, ...each] : none.hasChildNodes() ? [none] : []));
 }
 
 function line(list, name, text, code = false) {

@@ -1,0 +1,114 @@
+"""Rods in a viscous fluid, without inertia: rates of decay, and loads at which an oscillation or a motion grows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import rodfem
+from rodfem import Attachment, Discretization, Drag, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free
+from rodfem.errors import InputError, SceneError
+from rodfem.forms.energy import bending_and_twist
+
+FILAMENT = Scene(
+    name="filament",
+    interval=(0.0, 1.0),
+    rod="unshearable and inextensible",
+    energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
+    parameters={"F": Parameter(0.0), "part": Parameter(1.0)},
+    load="F",
+    ends=(
+        clamped(),
+        free(force=lambda c: (0.0, 0.0, (c.part - 1) * c.F), follower=lambda c: (0.0, 0.0, -c.part * c.F)),
+    ),
+    inertia=Drag(across=1.0),
+    ordinate=Ordinate("deflection", s=1.0, of=lambda r, q: r[0]),
+    span=(0.0, 60.0),
+    planar="e2",
+)
+IN_SPACE = replace(
+    FILAMENT, planar=None, span=(36.69543084032, 39.19543084032)
+)  # with the critical one among its loads
+ALONG = replace(FILAMENT, ends=(clamped(), free()), follower=lambda c: (0.0, 0.0, -c.F), span=(40.0, 100.0))
+
+
+@pytest.fixture(autouse=True)
+def few_loads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 26)
+
+
+@pytest.mark.parametrize(
+    ("scene", "load", "frequency", "number"),
+    [
+        pytest.param(FILAMENT, 37.69543084032, 191.25863576525, 2, id="end"),
+        pytest.param(IN_SPACE, 37.69543084032, 191.25863576525, 4, id="in space"),
+        pytest.param(ALONG, 76.10211907097, 196.59082309976, 2, id="along"),
+    ],
+)
+def test_a_follower_load(scene: Scene, load: float, frequency: float, number: int) -> None:
+    """By shooting; in space both planes flutter at once."""
+    (found,) = rodfem.trace(scene).special("flutter")
+    assert (found.negative_before, found.negative_after) == (0, number)
+    assert abs(found.point.load - load) < found.error_estimate + 1e-11 < 1e-8
+    assert abs(found.omega2 - frequency**2) < found.omega2_error + 1e-8 < 1e-5
+
+
+def rates(load: float, part: float, nodes: int = 32) -> Any:
+    """Least rates of ``y'''' + F y'' = mu y`` by Chebyshev's collocation, for a load that follows the end in part."""
+    k = np.arange(nodes + 1)
+    x, c = np.cos(np.pi * k / nodes), np.where(k % nodes, 1.0, 2.0) * (-1.0) ** k
+    D = np.outer(c, 1 / c) / (x[:, None] - x + np.eye(nodes + 1))
+    D = -2 * (D - np.diag(D.sum(axis=1)))  # the first node is s = 0
+    D2, mass = D @ D, np.eye(nodes + 1)
+    matrix = D2 @ D2 + load * D2
+    for row, equation in (
+        (0, np.eye(nodes + 1)[0]),
+        (1, D[0]),
+        (-2, D2[-1]),
+        (-1, (D @ D2 + (1 - part) * load * D)[-1]),
+    ):
+        matrix[row], mass[row] = equation, 0.0
+    found = scipy.linalg.eig(matrix, mass, right=False)
+    return sorted(found[np.isfinite(found)], key=abs)[:2]
+
+
+def test_a_load_that_follows_in_part() -> None:
+    """It diverges, is stable again, and flutters."""
+    diagram = rodfem.trace(FILAMENT.varying(part=0.45))
+    diverges, recovers, flutters, _ = diagram[0].special
+    assert [s.kind for s in diagram[0].special] == ["divergence", "divergence", "flutter", "end"]
+    assert [s.negative_after for s in diagram[0].special] == [1, 0, 2, 2]
+    for special in (diverges, recovers):
+        assert abs(rates(special.point.load, 0.45)[0]) < 1e-5
+    (mu, _) = rates(flutters.point.load, 0.45)
+    assert abs(mu.real) < 1e-5
+    assert abs(mu.imag) == pytest.approx(flutters.omega2**0.5, rel=1e-7)
+    assert not diagram.warnings
+    assert "flutters: an oscillation ceases to decay" in diagram.in_words()
+
+
+def test_drag_along_and_across() -> None:
+    """A bar that stretches: rates are those of bending over the drag across, and of its length over that along."""
+    bar = replace(
+        FILAMENT, rod="unshearable", ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.F))),
+        energy=lambda v, k, c: 25 * (v[2] - 1) ** 2 + bending_and_twist(k, (1.0, 1.0, 1.0)),
+        inertia=Drag(across=2.0, along=0.5),
+    )  # fmt: skip
+    diagram = rodfem.trace(bar, Discretization(elements=4), Plan((0.0, 1.0), depth=0, spectrum=3))
+    bending = [mu.real / 2 for mu in rates(0.0, 0.0)]
+    assert np.allclose(diagram[0].points[0].spectrum, [*bending, 50 * (np.pi / 2) ** 2 / 0.5], rtol=1e-6)
+
+
+def test_sentences() -> None:
+    with pytest.raises(SceneError, match=r"A mass is attached at s = 0.5 to a rod with drag"):
+        replace(FILAMENT, attachments=(Attachment(0.5, mass=1.0),))
+    with pytest.raises(SceneError, match="of -1 is negative"):
+        replace(FILAMENT, inertia=Drag(along=-1.0))
+    diagram = rodfem.trace(replace(FILAMENT, span=(35.0, 40.0)), plan=Plan(error_bars=False))
+    with pytest.raises(InputError, match="rod with drag has no locus"):
+        diagram.locus(diagram.special("flutter")[0], "part", (0.9, 1.0))
+    assert FILAMENT.inertia != Inertia()
