@@ -10,7 +10,6 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from rodfem.continuation.kinds import BRANCH_POINT, NUMBER, Kind
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, InputError, many
@@ -19,6 +18,8 @@ from rodfem.problem.arguments import SHORT
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, SoftMode, index_range, is_stable, stability
 
 if TYPE_CHECKING:
+    from petsc4py import PETSc
+
     from rodfem.continuation.branch_solver import BranchSolver
     from rodfem.fem.resultants import Profile, Reactions
     from rodfem.problem.events import Event, Level
