@@ -106,7 +106,7 @@ class Resultants:
         equal distances. Strain and curvature jump from element to element, by as much as they are accurate.
         """
         points = self.shape.from_left(self.shape.start[:, None] + self.shape.size[:, None] * self.places)
-        whole = self._table(x)
+        whole = self.table(x)
         inside, every = _basis(self.nodes[1:-1], self.places), _basis(self.nodes, self.places)
         strains = np.einsum("pn,enij->epij", inside, whole[:, 1:-1, :2])
         forces = np.einsum("pn,enij->epij", every, whole[:, :, 2:])
@@ -133,7 +133,7 @@ class Resultants:
 
     def on_elements(self, x: PETSc.Vec, s: np.ndarray, elements: np.ndarray) -> Profile:
         """The same at places of given ``elements`` (k, m), of which it is the mean."""
-        shape, sample, whole = self.shape, self.shape.sample(x), self._table(x)
+        shape, sample, whole = self.shape, self.shape.sample(x), self.table(x)
         start, size = (shape.from_left(y) for y in (shape.start, shape.size))
         degree, first = len(shape.nodes) - 1, elements[0]
         basis = _basis(shape.nodes, (s - start[first]) / size[first])
@@ -146,8 +146,11 @@ class Resultants:
             forces += np.einsum("mn,mnij->mij", _basis(self.nodes, t), whole[e, :, 2:]) / len(elements)
         return Profile(s, r, np.swapaxes(directors(q), -1, -2), *strains.swapaxes(0, 1), *forces.swapaxes(0, 1))
 
-    def _table(self, x: PETSc.Vec) -> np.ndarray:
+    def table(self, x: PETSc.Vec) -> np.ndarray:
         """All fields at the nodes of the polynomials of each element from left to right, (elements, nodes, 4, 3)."""
+        return derived(self.shape.system.at(x), "resultants", lambda: self._tabulated(x))
+
+    def _tabulated(self, x: PETSc.Vec) -> np.ndarray:
         whole = self._values(x)
         force, moment = self.ends(x)
         for i, ends in enumerate((force + whole[:, [0, -1], 4:].sum(axis=2), moment)):
@@ -226,13 +229,13 @@ class Reactions(NamedTuple):
 
 def reactions(resultants: Resultants, x: PETSc.Vec) -> Reactions:
     """All reactions at the equilibrium ``x``; collective."""
-    scene, starts = resultants.shape.system.scene, resultants.shape.from_left(resultants.shape.start)
-    s = np.array(scene.interval)
-    ends = resultants.on_elements(x, s, np.array([[0, len(starts) - 1]]))
-    contact = np.array([[-1.0], [1.0]]) * np.stack([ends.force_in_space, ends.moment_in_space])  # (2, side, 3)
+    shape = resultants.shape
+    scene, starts, sides = shape.system.scene, shape.from_left(shape.start), np.array([[-1.0], [1.0]])
+    R, whole = directors(shape.sample(x)["q"][[0, -1]]), resultants.table(x)[[0, -1], [0, -1]]
+    contact = sides * np.einsum("sij,skj->ksi", R, whole[:, 2:])  # (2, side, 3)
     surface = np.zeros((2, 3))
-    if resultants.shape.system.fields.surfaces:
-        surface = contact[0] - [[-1.0], [1.0]] * ends.in_space(resultants.ends(x)[0][[0, -1], [0, 1]])
+    if shape.system.fields.surfaces:
+        surface = contact[0] - sides * np.einsum("sij,sj->si", R, resultants.ends(x)[0][[0, -1], [0, 1]])
     left, right = (_of_support(resultants, x, i, contact[:, i]) for i in range(2))
     left, right = (r._replace(force=r.force + own) for r, own in zip((left, right), surface, strict=True))
     places = np.array(sorted({a.s for a in scene.attachments if scene.is_inside(a.s)}))

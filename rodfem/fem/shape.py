@@ -15,10 +15,11 @@ from rodfem import compat
 from rodfem.errors import InputError
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import HIGHEST, Discretization, Fields
-from rodfem.fem.state import LOAD, NodalValues
+from rodfem.fem.state import LOAD, NodalValues, State
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.contribution import Block
+from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import CONJUGATE, directors, product
 from rodfem.writhe import writhe
 
@@ -107,8 +108,12 @@ class Shape:
         ``s`` (m,), ``r`` (m, 3) and ``q`` (m, 4) at the nodes from left to right; each further field by name,
         continuous ones (m, components), discontinuous ones (elements, nodes, components); scalars by name.
         """
-        system, f, state = self.system, self.system.fields, self.system.at(x)
-        out: dict[str, Any] = {"elements": f.discretization.elements, "s": self._every_s.copy()}
+        state = self.system.at(x)
+        return dict(derived(state, "sample", lambda: self._sampled(state)))
+
+    def _sampled(self, state: State) -> dict[str, Any]:
+        system, f = self.system, self.system.fields
+        out: dict[str, Any] = {"elements": f.discretization.elements, "s": self._every_s}
         for block in f.blocks:
             values = state.local[self._natural[block.name]]
             out[block.name] = self.joined(values) if block.continuous else self.from_left(values)

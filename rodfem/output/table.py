@@ -111,7 +111,8 @@ REMARK = _entries("remarks", {"sentence": str})
 def branch_data(branch: Branch) -> dict[str, Any]:
     """A branch as ``diagram.json`` has it."""
     rows = {id(p): i for i, p in enumerate(branch.points)}
-    columns = {entry: [entry.value(point) for point in branch.points] for entry in COLUMNS}
+    values = [[entry.value(point) for entry in COLUMNS] for point in branch.points]  # a state keeps what it derives
+    columns = dict(zip(COLUMNS, map(list, zip(*values, strict=True)), strict=True))
     return {
         "name": branch.name,
         "parent": list(branch.parent) if branch.parent else None,
