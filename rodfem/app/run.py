@@ -6,9 +6,11 @@ import atexit
 import gc
 import os
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,7 +89,7 @@ def run(
     terminal = Terminal(plan, output, comm, words, quiet=quiet, verbose=verbose)
     with locked(output, comm):
         diagram = traced(scene, discretization, plan, terminal, comm)
-        _report(diagram, terminal, figures)
+        terminal.report(diagram, figures)
     return diagram
 
 
@@ -99,8 +101,7 @@ class Terminal(Report):
     ) -> None:
         """Write what the ``plan`` asks for into a folder ``output`` that there is, on the first rank of ``comm``."""
         super().__init__(comm, words=words, verbose=verbose)
-        if quiet:
-            self.on = False
+        self.on = self.on and not quiet
         self.plan, self.output, self.comm, self._saved = plan, output, comm, 0
         self.files: list[str] = []
         self.data: dict[str, Any] = {}
@@ -124,76 +125,114 @@ class Terminal(Report):
             save_run(self.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
             self._saved = len(diagram)
 
-    def warn_of(self, diagram: Diagram, trouble: Exception, branch: Branch, special: SpecialPoint) -> None:
-        """Print a warning of a special point, and keep it with the diagram."""
-        remark = Remark(str(trouble), special.point.load, branch=branch.name)
-        diagram.warnings.append(remark)
-        self.warn(remark)
-
-    def name(self, *files: str) -> None:
+    def _name(self, *files: str) -> None:
         """Name ``files`` in the diagram before they are written: the next run in the folder removes what is named."""
         self.files += [file for file in files if file not in self.files]
         on_first(self.comm, lambda: save_json(self.data | {"files": self.files}, self.output / "diagram.json"))
 
+    @contextmanager
+    def _without(self, diagram: Diagram, branch: Branch, special: SpecialPoint) -> Iterator[None]:
+        """Go on where the block fails, and keep a warning of the special point with the diagram."""
+        try:
+            yield
+        except (InputError, ConvergenceError) as trouble:
+            remark = Remark(str(trouble), special.point.load, branch=branch.name)
+            diagram.warnings.append(remark)
+            self.warn(remark)
+
+    def report(self, diagram: Diagram, figures: bool) -> None:
+        """Print tables, do what the plan asks for beyond branches, and draw the pictures if ``figures``."""
+        scene, plan, output, branches = diagram.scene, self.plan, self.output, diagram.branches
+        self.complete(diagram)
+        data = self.data = diagram.data
+        self._name()
+        self.summary(data)
+        self.table(data, branches, plan.most_branches)
+        self.spectra(branches, scene)
+        self.frequencies(branches, scene)
+        self.timing(diagram.clock, sum(len(b.points) for b in branches))
+        named = shlex.quote(str(output))
+        self.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {named} shows them)")
+        if plan.method or plan.modes:
+            self._assess(diagram, figures)
+        if plan.locus is not None:
+            self._follow(diagram, figures, plan.locus)
+        if figures:
+            self._name("diagram.png", "shape.png")
+            on_first(self.comm, lambda: draw(output, self))
+        diagram.complete = True
+        self.data = data | diagram.remarks | {"complete": True}
+        with held():
+            self._name()
+
+    def _assess(self, diagram: Diagram, figures: bool) -> None:
+        """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""
+        scene, plan, file = diagram.scene, self.plan, self.output / "modes.h5"
+        which = f"left-most {scene.inertia.words}" if scene.conservative else f"{scene.inertia.words} nearest zero"
+        self.say(f"\nIs it stable? ({which})")
+        finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
+        saved: list[tuple[str, int]] = []
+        for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
+            found: tuple[Verdict, Modes | None] | None = None
+            with self._without(diagram, branch, special):
+                found = _verdict(finder_on(special.point.mesh), special, plan)
+            if found is None:
+                continue
+            verdict, modes = found
+            self.verdict(branch.name, f"{scene.load} = {special.point.load:.10g}", verdict.at(special.point), modes)
+            if modes is not None:
+                self._name("modes.h5")
+                keep = partial(save_modes, modes, file, branch.name, special.row, _about(diagram))
+                on_first(self.comm, partial(keep, first=not saved, scene=scene))
+                saved.append((branch.name, special.row))
+        if saved:
+            self._draw_modes(saved if figures else [])
+
+    def _draw_modes(self, saved: Sequence[tuple[str, int]]) -> None:
+        """Draw the modes that were ``saved`` of rows of branches: a picture and an animation of each row."""
+        from rodfem.output.plot_modes import draw_modes
+
+        output, pictures = self.output, [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved]
+        self._name(*(f"{picture}{suffix}" for picture in pictures for suffix in (".png", ".gif")))
+        for (place, picture), suffix in product(zip(saved, pictures, strict=True), (".png", ".gif")):
+            on_first(self.comm, partial(draw_modes, output / "modes.h5", *place, output / f"{picture}{suffix}"))
+        self.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
+
+    def _follow(self, diagram: Diagram, figures: bool, asked: tuple[str, float, float]) -> None:
+        """Follow each special point that no locus passes in the plane of the load and the parameter asked for."""
+        saved: list[dict] = []
+        for branch in diagram:
+            near: list[Locus] = []
+            for special in _to_follow(branch):
+                which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
+                if any(found.passes(special, diagram.solvers[0].units) for found in near):
+                    self.say(f"\nThe {which} is on a locus above")
+                    continue
+                if self.plan.accuracy is not None:
+                    self.say(
+                        "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
+                    )
+                known = len(near)
+                with self._without(diagram, branch, special):
+                    near.append(diagram.locus(special, asked[0], asked[1:]))
+                for found in near[known:]:
+                    self.say(found.text())
+                    saved.append(found.data())
+                    self._name(f"locus-{len(saved)}.json", *["locus.png"] * figures)
+                    on_first(self.comm, partial(found.save, self.output / f"locus-{len(saved)}.json"))
+        if saved and figures:
+            from rodfem.output.plot_locus import draw_locus
+
+            on_first(self.comm, lambda: draw_locus(saved, self.output / "locus.png"))
+            self.say(f"Loci in {self.output}{os.sep}: locus-1.json ..., locus.png")
+
 
 def _files_of_a_run(folder: Path) -> list[str]:
-    """Names of the files that a diagram in a folder names; of an older one, which names none, those with numbers."""
-    older = ["modes.h5", *(path.name for path in folder.glob("locus-[0-9]*.json"))]
+    """Names of the files that a diagram in a folder names."""
     try:
-        named = load_json(folder / "diagram.json").get("files", older)
+        return [str(name) for name in load_json(folder / "diagram.json").get("files", ())]
     except InputError:
         return []
-    return [str(name) for name in named] if isinstance(named, list) else []
-
-
-def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
-    """Print tables, do what the plan asks for beyond branches, and draw the pictures if ``figures``."""
-    scene, plan, output, branches = diagram.scene, terminal.plan, terminal.output, diagram.branches
-    terminal.complete(diagram)
-    data = terminal.data = diagram.data
-    terminal.name()
-    terminal.summary(data)
-    terminal.table(data, branches, plan.most_branches)
-    terminal.spectra(branches, scene)
-    terminal.frequencies(branches, scene)
-    terminal.timing(diagram.clock, sum(len(b.points) for b in branches))
-    named = shlex.quote(str(output))
-    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {named} shows them)")
-    if plan.method or plan.modes:
-        _assess(diagram, terminal, figures)
-    if plan.locus is not None:
-        _follow(diagram, terminal, figures, plan.locus)
-    if figures:
-        terminal.name("diagram.png", "shape.png")
-        on_first(terminal.comm, lambda: draw(output, terminal))
-    diagram.complete = True
-    terminal.data = data | diagram.remarks | {"complete": True}
-    with held():
-        terminal.name()
-
-
-def _assess(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
-    """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""
-    scene, plan, output = diagram.scene, terminal.plan, terminal.output
-    which = f"left-most {scene.inertia.words}" if scene.conservative else f"{scene.inertia.words} nearest zero"
-    terminal.say(f"\nIs it stable? ({which})")
-    finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
-    saved: list[tuple[str, int]] = []
-    for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
-        where = f"{scene.load} = {special.point.load:.10g}"
-        try:
-            verdict, modes = _verdict(finder_on(special.point.mesh), special, plan)
-        except (InputError, ConvergenceError) as trouble:
-            terminal.warn_of(diagram, trouble, branch, special)
-            continue
-        terminal.verdict(branch.name, where, verdict.at(special.point), modes)
-        if modes is not None:
-            terminal.name("modes.h5")
-            keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, _about(diagram))
-            on_first(terminal.comm, partial(keep, first=not saved, scene=scene))
-            saved.append((branch.name, special.row))
-    if saved:
-        _draw_modes(saved, terminal, figures)
 
 
 def _verdict(finder: ModeFinder, special: SpecialPoint, plan: Plan) -> tuple[Verdict, Modes | None]:
@@ -208,50 +247,6 @@ def _about(diagram: Diagram) -> dict[str, Any]:
     scene, mesh = diagram.scene, asdict(diagram.solvers[0].system.fields.discretization)
     about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
     return about | {name: value for name, value in mesh.items() if name != "vertices"}
-
-
-def _draw_modes(saved: list[tuple[str, int]], terminal: Terminal, figures: bool) -> None:
-    """Draw the modes that were saved of rows of branches, if ``figures``: a picture and an animation of each row."""
-    from rodfem.output.plot_modes import draw_modes
-
-    output = terminal.output
-    pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
-    terminal.name(*(f"{picture}{suffix}" for picture in pictures for suffix in (".png", ".gif")))
-    for (name, row), picture in zip(saved, pictures, strict=False):
-        for suffix in (".png", ".gif"):
-            target = output / f"{picture}{suffix}"
-            on_first(terminal.comm, partial(draw_modes, output / "modes.h5", name, row, target))
-    terminal.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
-
-
-def _follow(diagram: Diagram, terminal: Terminal, figures: bool, asked: tuple[str, float, float]) -> None:
-    """Follow each special point that no locus passes in the plane of the load and the parameter that is asked for."""
-    saved: list[dict] = []
-    for branch in diagram:
-        near: list[Locus] = []
-        for special in _to_follow(branch):
-            which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
-            if any(found.passes(special, diagram.solvers[0].units) for found in near):
-                terminal.say(f"\nThe {which} is on a locus above")
-                continue
-            if terminal.plan.accuracy is not None:
-                terminal.say(
-                    "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
-                )
-            try:
-                near.append(diagram.locus(special, asked[0], asked[1:]))
-            except (InputError, ConvergenceError) as trouble:
-                terminal.warn_of(diagram, trouble, branch, special)
-                continue
-            terminal.say(near[-1].text())
-            saved.append(near[-1].data())
-            terminal.name(f"locus-{len(saved)}.json", *["locus.png"] * figures)
-            on_first(terminal.comm, partial(near[-1].save, terminal.output / f"locus-{len(saved)}.json"))
-    if saved and figures:
-        from rodfem.output.plot_locus import draw_locus
-
-        on_first(terminal.comm, lambda: draw_locus(saved, terminal.output / "locus.png"))
-        terminal.say(f"Loci in {terminal.output}{os.sep}: locus-1.json ..., locus.png")
 
 
 def _to_follow(branch: Branch) -> list[SpecialPoint]:

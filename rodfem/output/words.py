@@ -215,7 +215,7 @@ class Words:
 
 def words_of(branch: Data, *, planar: bool = False, leaves: str = "") -> list[Words]:
     """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it."""
-    specials, warnings, out = defaultdict(list), _warnings(branch), list[Words]()
+    specials, doubtful, out = defaultdict(list), _doubts(branch), list[Words]()
     for special in branch["special"]:
         specials[special["row"]].append(special)
     for place in range(len(branch["columns"]["load"])):
@@ -228,12 +228,12 @@ def words_of(branch: Data, *, planar: bool = False, leaves: str = "") -> list[Wo
         sentence = plain.sentence
         if planar and plain.verdict == STABLE and row.get("negative_in_space") is None:
             sentence = sentence.replace("Stable", "Stable in its plane (not examined in space)", 1)
-        doubts = [f"Warning: {words}." for words in warnings[place]]
+        doubts = [f"Warning: {words}." for words in doubtful[place]]
         out.append(Words(plain.verdict, plain.index, " ".join([sentence, *doubts])))
     return out
 
 
-def _warnings(branch: Data) -> dict[int, list[str]]:
+def _doubts(branch: Data) -> dict[int, list[str]]:
     """Doubts by rows."""
     out = defaultdict(list)
     for change in branch.get("unexplained") or ():

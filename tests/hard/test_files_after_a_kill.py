@@ -68,7 +68,7 @@ def saved_by(diagram: Diagram, folder: Path, its: int) -> None:
         terminal = Terminal(diagram.plan, folder, COMM, str, quiet=True, verbose=False)
         for n in range(1, len(diagram) + 1):
             part = Diagram(diagram.scene, diagram.plan, diagram.branches[:n], diagram.solvers)
-            part.run = diagram.run
+            part.run, part.asked = diagram.run, diagram.asked
             terminal.complete(part)
             os.write(its, b".")
 
