@@ -214,10 +214,11 @@ class Fields:
         """Local degrees of freedom that an end clamps, and of a planar rod all that would leave the plane."""
         found = [np.array([], dtype=int), *(dofs.ravel() for dofs in self.out_of_plane(self.scene.normal).values())]
         c = self.scene.constants()
-        for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
+        for side, (end, s) in enumerate(zip(self.scene.sides, self.scene.interval, strict=True)):
             for block in (b for b in self.blocks if b.continuous):
                 at_end = self.dofs[block.name][same_place(self.coordinates(block.degree), s, self.scene.length)]
-                found.append(at_end[:, np.broadcast_to(end.clamps(block, c), block.size)].ravel())
+                given = end.clamps(block, c) if block.tangent is None else block.tangent[side]
+                found.append(at_end[:, np.broadcast_to(given, block.size)].ravel())
         for block in (b for b in self.blocks if b.spare):
             ends, x = self.all_vertices(), self.coordinates(block.degree)
             a, b = ends[len(ends) // 2 - 1 :][:2]
@@ -343,7 +344,7 @@ class Fields:
     @property
     def surfaces(self) -> list[str]:
         """Names of the multipliers of surfaces."""
-        return [b.name for b in self.blocks if b.turning]
+        return [b.name for b in self.blocks if b.tangent is not None]
 
     def constraints(self) -> int:
         """Number of constraint equations: free multipliers, fields and scalars (drift scalars not counted)."""

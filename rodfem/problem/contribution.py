@@ -68,7 +68,7 @@ class Unknown:
 class Block:
     """One field; ``along`` says whether it is the multiplier of a constraint all along the rod.
 
-    That of a ``turning`` one is of rotations alone; if it is ``spare``, that of one node follows from the others.
+    On a surface ``tangent`` says which ends hold that of the rod; of a ``spare`` one that of a node follows from others.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Block:
     continuous: bool
     multiplier: bool
     along: bool = False
-    turning: bool = False
+    tangent: tuple[bool, bool] | None = None
     spare: bool = False
 
 

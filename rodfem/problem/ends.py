@@ -126,7 +126,7 @@ class End(Contribution):
         if block.name == "r":
             return held
         if block.along:  # what holds the end fulfils the constraint there
-            return [self.rotation is not None or (any(held) and not block.turning)]
+            return [self.rotation is not None or any(held)]
         return [self.fixed_rotation is not None]
 
     def contact_force(self, c: Constants) -> list[Any]:
@@ -281,7 +281,7 @@ class JoinedEnd(End):
 
     def clamps(self, block: Block, c: Constants) -> list[bool]:
         """Nothing but one multiplier of the unit norm: that of ``q(l) = +-q(0)`` is that of ``q(0)``."""
-        return [self.last and (block.name == "eta" or block.turning)]
+        return [self.last and block.name == "eta"]
 
     def contact_force(self, c: Constants) -> list[Any]:
         """No component is known."""

@@ -15,28 +15,40 @@ end holds there; of one that both ends hold a constant ``u`` is no force, and on
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import ufl
 
 from rodfem.expressions import differentiated, evaluated
+from rodfem.forms.kinematics import UNDEFORMED
+from rodfem.forms.rotation import IDENTITY
+from rodfem.problem.arguments import number_of
 from rodfem.problem.contribution import Block, Constraint, Everywhere, Group, Motion, Site, Unknown
-from rodfem.problem.functions import Constants, place, some_places
+from rodfem.problem.functions import STATES, Constants, inside, place, places_at
+from rodfem.problem.quaternions import directors
+from rodfem.problem.setting import AXIS, HELD
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
+TURNED = 1e-6
+"""Sine of the angle between the normal of a surface and that of what a hinge turns in, of parallel ones."""
 MEAN = Group("h", "mean pressure of surfaces", "surface {} of the scene", Motion.MIXED)
 
 
 @dataclass(frozen=True)
 class Surface(Everywhere):
-    """A constraint of positions alone; ``floating`` where neither end is held on it, ``spare`` where one node is."""
+    """A constraint of positions alone; ``floating`` where neither end is held on it, ``spare`` where one node is.
+
+    ``tangent`` says of each end whether that is held in the surface.
+    """
 
     floating: bool = False
     spare: bool = False
+    tangent: tuple[bool, bool] = (False, False)
 
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """Mean pressure, where no end holds the rod on the surface."""
@@ -44,7 +56,7 @@ class Surface(Everywhere):
 
     def blocks(self, number: int, degree: int) -> list[Block]:
         """Multiplier ``u`` of the tangent's constraint."""
-        return [Block(f"u{number + 1}", 1, degree, True, True, True, turning=True, spare=self.spare)]
+        return [Block(f"u{number + 1}", 1, degree, True, True, True, tangent=self.tangent, spare=self.spare)]
 
     def lagrangian(self, at: Site) -> Iterator[Any]:
         """Terms of both multipliers."""
@@ -59,16 +71,32 @@ def acting(constraint: Constraint, scene: Scene) -> Constraint:
     """A constraint as it acts on the rod of a scene."""
     if not (isinstance(constraint, Everywhere) and constraint.nodal) or {0, 1} & {*scene.free_strains}:
         return constraint
-    asked = [i for i in range(3) if _depends(constraint, scene, "r", i)]
-    if not asked or any(_depends(constraint, scene, "q", i) for i in range(4)):
+    turns, moves = (np.array([_slope(constraint, scene, x, y) for x in STATES[:2]]).any(axis=0) for y in ("q", "r"))
+    if turns.any() or not moves.any():
         return constraint
     held = [end.held(scene.constants()) for end in scene.sides]
-    on_it = [all(i == scene.normal or side[i] is not None for i in asked) for side in held]
-    return Surface(constraint.of, nodal=True, floating=not any(on_it), spare=scene.closed or all(on_it))
+    on_it = [all(i == scene.normal or side[i] is not None for i in np.flatnonzero(moves)) for side in held]
+    tangent = _in_surface(constraint, scene, 0), _in_surface(constraint, scene, 1)
+    spare = scene.closed or all(on_it)
+    return Surface(constraint.of, nodal=True, floating=not any(on_it), spare=spare, tangent=tangent)
 
 
-def _depends(constraint: Constraint, scene: Scene, name: str, i: int) -> bool:
-    """Whether a constraint depends on component ``i`` of ``r`` or ``q``."""
-    places = [some_places(scene, state, ufl.variable)[1] for state in range(2)]
-    slopes = [ufl.diff(ufl.as_ufl(constraint.of(x, scene.constants())), getattr(x, name)) for x in places]
-    return any(evaluated(differentiated(slope), (i,)) for slope in slopes)
+def _slope(constraint: Constraint, scene: Scene, state: Sequence[Any], name: str) -> np.ndarray:
+    """Derivative of a constraint in ``r`` (3,) or ``q`` (4,) at one of :data:`STATES`."""
+    x = places_at(scene.length, inside(scene.interval)[0], state, ufl.variable)[1]
+    slope = differentiated(ufl.diff(ufl.as_ufl(constraint.of(x, scene.constants())), getattr(x, name)))
+    return np.array([float(evaluated(slope, (i,))) for i in range(4 if name == "q" else 3)])
+
+
+def _in_surface(constraint: Constraint, scene: Scene, side: int) -> bool:
+    """Whether an end holds its tangent in the surface: by a clamp, or a hinge whose axis is across the surface."""
+    end, c = scene.sides[side], scene.constants()
+    if scene.closed or end.turning != AXIS:  # the right end of a ring has the tangent of the left one
+        return end.turning == HELD or (scene.closed and side == 1)
+    d = directors(np.array([number_of(x) for x in end.frame(c)]))
+    r = [0.0 if x is None else number_of(x) / scene.length for x in end.held(c)]
+    try:
+        normal = _slope(constraint, scene, (IDENTITY, r, UNDEFORMED, (0.0, 0.0, 0.0)), "r")
+    except ArithmeticError:  # at no place of the surface
+        return True
+    return abs(float(normal @ np.cross(d @ end.hinge, d[:, 2]))) <= TURNED * float(np.linalg.norm(normal))

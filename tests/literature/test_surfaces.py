@@ -60,7 +60,11 @@ def test_a_straight_rod_presses_by_its_weight(ends: str) -> None:
     assert not diagram.warnings
 
 
-def test_a_rod_pulled_over_a_sphere() -> None:
+LEFT = {"clamped": clamped(), "hinge in the surface": hinged(AXIS), "hinge across it": hinged((0.0, 1.0, 0.0))}
+
+
+@pytest.mark.parametrize("left", LEFT)
+def test_a_rod_pulled_over_a_sphere(left: str) -> None:
     """It has the curvature of the sphere to its free end, where the sphere holds it by a couple ``B / R``.
 
     That moves along the sphere with the end: it does the work of a force ``B / R^2`` against the pull.
@@ -75,7 +79,7 @@ def test_a_rod_pulled_over_a_sphere() -> None:
     tangent = np.sin(1 / R), 0.0, np.cos(1 / R)
     sphere = replace(
         TUBE, start=arc, distributed=None, span=(2.0, 3.0),
-        ends=(clamped(), free(force=lambda c: tuple(c.F * t for t in tangent))),
+        ends=(LEFT[left], free(force=lambda c: tuple(c.F * t for t in tangent))),
         constraints=(everywhere(height, strain=False),),
     )  # fmt: skip
     diagram = rodfem.trace(sphere, Discretization("pointwise", 4, 6), Plan(depth=0))
