@@ -68,7 +68,7 @@ class Unknown:
 class Block:
     """One field; ``along`` says whether it is the multiplier of a constraint all along the rod.
 
-    On a surface ``tangent`` says which ends hold that of the rod; of a ``spare`` one that of a node follows from others.
+    On a surface ``tangent`` says which ends hold that of the rod; if it is ``spare``, that of one node follows.
     """
 
     name: str
