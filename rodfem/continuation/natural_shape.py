@@ -23,6 +23,8 @@ from rodfem.problem.quaternions import CONJUGATE, directors, of_vector, product
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE
 
+FIT = 0.05
+"""Misfit of a shape that Newton's method mends."""
 STEPS = 2000
 """Steps of the integration along the rod."""
 SETTLED, STEP = 1e-8, 1e-5
@@ -34,6 +36,23 @@ def natural_shape(scene: Scene, load: float) -> tuple[np.ndarray, np.ndarray, np
 
     None if it is straight, or does not fit there at this ``load``.
     """
+    found = _between_ends(scene, load)
+    return found[0] if found is not None and found[1] < FIT else None
+
+
+def misfit(scene: Scene, load: float) -> str:
+    """Sentence on a start that is not the rod at rest, as the ends of a scene do not admit that at a ``load``."""
+    found = None if scene.start is not None else _between_ends(scene, load)
+    if found is None or found[1] < FIT:
+        return ""
+    return (
+        f"At {scene.load} = {load:g} the rod at rest, in its natural shape, does not fit its ends: it starts straight "
+        "and under stress; for another state give Scene(start=...)."
+    )
+
+
+def _between_ends(scene: Scene, load: float) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float] | None:
+    """The natural shape, and by how much it does not fit; None if it is straight."""
     if scene.closed or (strains := _natural_strains(scene, load)) is None:
         return None
     s = np.linspace(*scene.interval, STEPS + 1)
@@ -44,8 +63,8 @@ def natural_shape(scene: Scene, load: float) -> tuple[np.ndarray, np.ndarray, np
     halfway = directors(product(q[:-1], of_vector(middle[:, 3:] * np.diff(s)[:, None] / 2)))
     slopes = np.einsum("sij,sj->si", halfway, middle[:, :3])
     r = np.vstack([np.zeros(3), np.cumsum(slopes * np.diff(s)[:, None], axis=0)])
-    turned = _placed(scene, load, q, r)
-    return None if turned is None else (s, turned, strains(s)[:, :3])
+    turned, off = _placed(scene, load, q, r)
+    return (s, turned, strains(s)[:, :3]), off
 
 
 def _natural_strains(scene: Scene, load: float) -> Callable[[np.ndarray], np.ndarray] | None:
@@ -92,8 +111,8 @@ def _slope(scene: Scene, x: np.ndarray, i: int, h: float, c: Any) -> float:
     return (scene.energy_at(ahead[:3], ahead[3:], c) - scene.energy_at(back[:3], back[3:], c)) / (2 * STEP * h)
 
 
-def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> np.ndarray | None:
-    """Quaternions of a shape turned to where the ends are; None if it is more off than Newton's method mends."""
+def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> tuple[np.ndarray, float]:
+    """Quaternions of a shape turned to where the ends are, and by how much it is off, in lengths or radian."""
     (first, last), c = [rotation_of(scene, load, side) for side in range(2)], scene.constants(load)
     places = [[np.nan if x is None else plain(x) for x in side.held(c)] for side in scene.sides]
     chord = np.subtract(places[1], places[0])
@@ -105,7 +124,7 @@ def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> np.ndarr
     off = np.nanmax(abs(directors(turn) @ r[-1] - chord), initial=0.0) / scene.length
     if first is not None and last is not None:
         off = max(off, 2 * np.sqrt(max(1.0 - float(turned[-1] @ last) ** 2, 0.0)))
-    return turned if off < 0.05 else None
+    return turned, float(off)
 
 
 def _aligned(chord: np.ndarray, wanted: np.ndarray) -> np.ndarray:

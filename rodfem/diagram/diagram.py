@@ -21,6 +21,7 @@ from rodfem.continuation.branch import LAWS, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.follow import StepControl
 from rodfem.continuation.kinds import KINDS
+from rodfem.continuation.natural_shape import misfit
 from rodfem.continuation.observer import Observer, Recorder, Remark
 from rodfem.deflation.search import Coexisting, equilibria_at, with_copies
 from rodfem.diagram.equilibria import check_start
@@ -434,6 +435,8 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
             if plan.accuracy is None and (doubt := check_start(found, plan.over(scene))):
                 recorder.warn(doubt)
         asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
+        if stressed := misfit(scene, plan.over(scene)[0]):
+            recorder.note(stressed)
         recorder.system(found.system, plan.accuracy)
         plan = _with_bars(plan, found, recorder)
         if compiled and plan.error_bars and form_compiler.ALONE:

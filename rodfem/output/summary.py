@@ -242,12 +242,15 @@ def _ranges(data: Data) -> Iterator[str]:
     """Ranges of the load without a stable state, and those that are not examined."""
     if is_sweep(data):
         return
-    stable, undecided = ([_cover(x.loads) for x in _intervals(data, kind)] for kind in (STABLE, UNDECIDED))
+    kinds = STABLE, UNDECIDED, PLANAR
+    stable, undecided, planar = ([_cover(x.loads) for x in _intervals(data, kind)] for kind in kinds)
     lost = list(_unlocated(data))
     for a, b in _without(stable + lost, *sorted(data["range"])):
         doubt = any(low < b and high > a for low, high in undecided)
         but = ", but there are states of undecided stability" if doubt else ""
-        yield f"From {_between(data, a, b, 'to')} no stable state was found{but}."
+        in_plane = any(low < b and high > a for low, high in planar)
+        state = "state that is stable in space, too," if in_plane else "stable state"
+        yield f"From {_between(data, a, b, 'to')} no {state} was found{but}."
     for step in lost:
         for a, b in _without(stable, *step):
             yield f"Stability is not examined between {_between(data, a, b, 'and')}, where it changes."

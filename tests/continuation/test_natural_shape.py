@@ -8,8 +8,8 @@ import pytest
 import ufl
 from demo_cases import scene
 
-from rodfem import Attachment, Ordinate, Parameter, Scene, Solver, clamped, free, pinned, sliding
-from rodfem.continuation.natural_shape import natural_shape
+from rodfem import Attachment, Discretization, Ordinate, Parameter, Scene, Solver, clamped, free, pinned, sliding, trace
+from rodfem.continuation.natural_shape import misfit, natural_shape
 
 HALF, LENGTH = 0.6, 1.0
 RADIUS = LENGTH / (2 * HALF)
@@ -53,6 +53,10 @@ def test_what_does_not_fit_its_ends_begins_straight() -> None:
     assert natural_shape(cord, cord.span[0]) is None
     ends = clamped(), clamped(lambda c: (0.0, 0.0, 1.0))
     assert natural_shape(arch(ends), 0.0) is None
+    slack = clamped(), clamped(lambda c: (0.0, 0.0, 0.9))
+    notes = trace(arch(slack, span=(0.0, 0.1)), Discretization(elements=4, degree=3), depth=0, error_bars=False).notes
+    assert any("the rod at rest, in its natural shape, does not fit its ends" in note for note in notes)
+    assert not misfit(arch((clamped(), free())), 0.0) and not misfit(scene("ruler"), 0.0)
     assert natural_shape(scene("ruler"), 0.0) is None  # its natural shape is straight
 
 

@@ -44,6 +44,13 @@ def test_each_name_has_one_entry() -> None:
     assert all(text[-1] == "." and text == " ".join(text.split()) for text in ENTRIES.values())
 
 
+@pytest.mark.parametrize(
+    "word", ["snap", "buckle", "buckling", "hysteresis", "tipping", "eigenvalue", "moment", "pinned"]
+)
+def test_words_that_a_newcomer_tries_have_entries(word: str) -> None:
+    assert len(explanation(word)) == 1
+
+
 def test_words_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     console.main(["explain", "branch", "point"])
     assert capsys.readouterr().out.startswith("branch point, BP: An equilibrium in which branches cross")

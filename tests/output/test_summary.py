@@ -131,9 +131,10 @@ def test_no_rod_buckles_where_the_index_falls(more: dict[str, Any], verb: str) -
 def test_a_step_in_which_a_change_is_not_located_is_not_called_unstable() -> None:
     """Of a planar rod that falls out of its plane, and of one whose index changes without a special point."""
     loads, planar = [-9.0, -3.0, 2.0, 4.0], {"negative_in_space": [0, 0, 1, 1]}
-    for rod in (branch("straight", loads, [0] * 4, columns=planar), branch("straight", loads, [0, 0, 1, 1])):
+    in_plane, lost = branch("straight", loads, [0] * 4, columns=planar), branch("straight", loads, [0, 0, 1, 1])
+    for rod, state in ((in_plane, "state that is stable in space, too,"), (lost, "stable state")):
         words = said(rod, span=(-9.0, 4.0))
-        assert "From P = 2 to 4 no stable state was found." in words
+        assert f"From P = 2 to 4 no {state} was found." in words
         assert "Stability is not examined between P = -3 and 2, where it changes." in words
         stable = branch("other", loads, [0] * 4)
         assert "no stable state" not in said(rod, stable) and "not examined" not in said(rod, stable)
