@@ -21,23 +21,14 @@ finds and classifies the points where it is lost, follows what branches off, and
     run(column)                   # with files and pictures
     diagram = trace(column)       # without
 
-* **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
-  expression of the strains, the constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy`, :mod:`section
-  <rodfem.problem.section>`).
-* **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`,
-  :func:`circular_guide`, :func:`free`,
-  :func:`elastic`, :class:`Ring`, or in full :class:`End`.  **Loads**: of an :class:`End`, of a :class:`Scene`, of an
-  :class:`Attachment`.  **Constraints**: :func:`at`, :func:`integral`, :func:`everywhere`.  **Tables**:
-  :func:`tabulated`, :func:`path`.
-* **Diagram**: :func:`trace` computes without files and returns a :class:`Diagram`: ``diagram["branch 1"]``,
-  ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
-  ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.view()``, ``.save(folder)``; :func:`load` reads a saved one.
-  :func:`run` is the same with a terminal, files and pictures; :func:`many` shares a list of scenes among the ranks.
-* **One state**: a :class:`Solver` is a scene on a mesh; ``solver.rebind(A=-1.5)`` is that of other constants.  A
-  :class:`Point` has its shape, forces and reactions as arrays: ``point.r``, ``.moment``, ``.reactions``.
-
-Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
-that breaks one has a zero eigenvalue for it, which is counted as zero.
+A :class:`Scene` states a rod: any stored energy ``W(v, k, c)`` that returns a UFL expression of the strains, the
+constants and the arclength ``c.s`` (:mod:`rodfem.forms.energy`, :mod:`section <rodfem.problem.section>`), ends,
+attachments, constraints, loads, tables.  :func:`trace` returns a :class:`Diagram`: ``diagram["branch 1"]``,
+``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
+``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.view()``, ``.save(folder)``; :func:`load` reads a saved one.
+:func:`run` is the same with a terminal, files and pictures; :func:`many` shares a list of scenes among the ranks.  A
+:class:`Solver` is a scene on a mesh, for one state at a time; a :class:`Point` has its shape, forces and reactions as
+arrays.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
 Type checkers read ``__init__.pyi``.

@@ -10,11 +10,7 @@ WORK = ("assembly", "solve", "stability")  # what a point of a branch costs
 
 
 class Clock:
-    """Accumulates wall time by name; nested measurements are charged to the innermost name.
-
-    Inside :meth:`scope` everything is charged to that name instead: what locating special points costs, say,
-    is kept apart from what the points of a branch cost.
-    """
+    """Accumulates wall time by name; nested measurements are charged to the innermost name."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

@@ -128,12 +128,7 @@ class OrdinateBound:
 
 @dataclass(frozen=True)
 class Again:
-    """A point computed again on a richer mesh, its load and ordinate uncertain by ``load_left`` and ``ordinate_left``.
-
-    ``ordinate_error`` bounds the error of the first ordinate, ``rho`` is the part of the first errors that is left, and
-    ``changed`` the relative change of the strains of the state or of its null vector, the larger one.  ``last`` is a
-    change of ``x`` that its location leaves open.
-    """
+    """A point computed again on a richer mesh, and what is left open; ``rho`` is the part of the errors left there."""
 
     x: PETSc.Vec
     load: float
@@ -163,11 +158,7 @@ class Again:
 
 
 class Enriched:
-    """A second, richer mesh of the system of a solver, and its estimates.
-
-    ``origins`` are branch points that were located there, each with the special point of the first mesh, and the part
-    of the error that is left.
-    """
+    """A second, richer mesh of the system of a solver, and its estimates."""
 
     def __init__(self, solver: BranchSolver) -> None:
         self.coarse, self.system = solver, richer_system(solver.system)

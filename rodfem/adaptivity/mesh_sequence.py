@@ -158,12 +158,7 @@ class Meshes:
     def carry(
         self, history: Sequence[Point], target: BranchSolver, from_branch_point: bool
     ) -> list[tuple[Point, Point]]:
-        """Last points of a branch solved on another mesh: pairs of old and new, in order.
-
-        Points whose index is another there are left out, so that an eigenvalue that passes zero is met again.  The
-        start of a branch keeps its load; a branch point from which one leaves is not carried.  Raises
-        :class:`ConvergenceError` if no point is left.
-        """
+        """Last points of a branch solved on another mesh: pairs of old and new, in order."""
         rows, pairs = list(history), list[tuple[Point, Point]]()
         del rows[: int(from_branch_point and rows[0].arclength == 0.0)]
         while rows and len(pairs) < 4:

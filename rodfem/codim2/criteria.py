@@ -425,11 +425,7 @@ def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None
 
 
 def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
-    """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
-
-    By inverse iteration, of borders that are arbitrary at first.  Of several the left ones are turned to be along the
-    right ones of the same number: if a symmetry relates them ``G`` is a multiple of one.
-    """
+    """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there."""
     states = SingularSystem(solver, [], number, fold=False)
     metric = solver.inertia.metric
     right = left = [solver.inertia.seed(i) for i in range(number)]

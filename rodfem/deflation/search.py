@@ -213,11 +213,7 @@ class Deflation:
 
 
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
-    """Known state ``base`` turned by a smooth rotation that respects clamps, its vector of that root mean square size.
-
-    The vector, of this ``amplitude``, is a random combination of the lowest four waves along the rod that vanish where
-    directors are clamped; it depends on the nodes and the ``seed`` only.
-    """
+    """State ``base`` turned by a smooth rotation that respects clamps, of a root mean square ``amplitude``."""
     f = system.fields
     weights = np.random.default_rng(seed).normal(size=(4, 3)) / np.arange(1, 5)[:, None]
     a, b = system.scene.interval

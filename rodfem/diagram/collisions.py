@@ -214,11 +214,7 @@ class Collisions:
 
 
 def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:
-    """Collision of a ``measured`` ``cluster``, from about a ``load`` on, in pieces of the half ``width`` at first.
-
-    Round-off of the matrix counts (see :func:`locate_flutter`).  So does that pairs that
-    are taken for one may meet at loads, and at eigenvalues, of their own.  Raises :class:`ConvergenceError`.
-    """
+    """Collision of a ``measured`` ``cluster``, from about a ``load`` on, in pieces of the half ``width`` at first."""
     found = locate_flutter(measured, cluster, load, width)
     noise, clear = measured.noise(found.clear, found.cluster), measured(found.clear, found.cluster)
     moved = (noise.of_discriminant + clear.split) / abs(found.slope)
@@ -251,12 +247,7 @@ class Mean:
 
 
 def interpolated_zero(mean: Mean, load: float, one: float) -> tuple[float, float]:
-    """Load near ``load`` at which a ``mean`` of eigenvalues vanishes, and what its round-off leaves open.
-
-    At loads of natural size ``one`` it is sampled over the widest of :data:`AROUND`, and interpolated: its scatter
-    shows in the last coefficients.  Where a collision is as near, the mean is not smooth, or there is none: then over
-    a narrower one.  Raises :class:`ConvergenceError` where it does not vanish near by.
-    """
+    """Load near ``load`` at which a ``mean`` of eigenvalues vanishes, and what its round-off leaves open."""
     found = list[tuple[float, float]]()
     for half in (width * unit(load, one=one) for width in AROUND):
         try:

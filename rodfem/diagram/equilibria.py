@@ -87,11 +87,7 @@ def check_index(solver: BranchSolver, load: float, index: int) -> None:
 
 
 def check_start(solver: BranchSolver, span: tuple[float, float]) -> str:
-    """Why indices may be the mesh's at the ends of a ``span``: that of the scene's start is another on a finer mesh.
-
-    Each unstable mode has half-waves.  Of a rod that bends from the start on, only the first load is looked at.  Raises
-    :class:`InputError` where the mesh cannot hold the half-waves at all.
-    """
+    """Why indices may be the mesh's at the ends of a ``span``: that of the scene's start is another on a finer mesh."""
     system, mesh = solver.system, solver.system.fields.discretization
     nodes = mesh.elements * mesh.degree
     for load in span if solver.conservative else ():
@@ -188,11 +184,7 @@ class LoadSteps:
         )
 
     def _found(self, load: float) -> PETSc.Vec | None:
-        """Equilibrium on the path at a ``load``; None where there is none, or none that is surely on it.
-
-        The last ones tell where the path leads if it is smooth between them, whose distances are not halved; a tangent
-        at the last one tells it of steps that are short enough.
-        """
+        """Equilibrium on the path at a ``load``; None where there is none, or none that is surely on it."""
         solver, last = self.solver, self.known[-1]
         if len(self.known) > 1 and (x := self._predicted(self.known, load)) is not None:
             return x

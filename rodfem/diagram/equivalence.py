@@ -53,11 +53,7 @@ def near(a: Point, b: Point, units: Units, steps: float = 2.0) -> bool:
 
 
 def are_images(solver: BranchSolver, special: SpecialPoint, a: Point, b: Point, alike: Alike) -> bool:
-    """Whether the first points ``a``, ``b`` of branches that leave ``special`` in opposite ways are of mirror images.
-
-    They are compared at one load, by ``alike`` where the ``solver`` moves one to that of the other.  The metric need
-    not share the symmetry: points at one distance in it need not be mirror images themselves.
-    """
+    """Whether the first points ``a``, ``b`` of branches that leave ``special`` in opposite ways are mirror images."""
     if not equivalent(a, b, solver.units):
         # one that turns at a fold just next to the branch point is there as near to the other side as round-off
         load, width = special.point.load, LOCATED * special.located_to
@@ -136,11 +132,7 @@ def _sampled(branch: Branch, solver: BranchSolver) -> tuple[list[Point], float]:
 
 
 def loop_end(branch: Branch, step: Step, width: float, here: Callable[[Point], Point], alike: Alike) -> Point | None:
-    """Last point of a ``branch`` that is back at its beginning in a ``step``; None if it is not.
-
-    It is the very state that the branch begins with.  One that leaves a branch point, a singular state, comes back to
-    its first row; where loads are equal, within the ``width`` of their range, it ends with the step.
-    """
+    """Last point of a ``branch`` that is back at its beginning in a ``step``; None if it is not."""
     if len(branch.points) < 12:
         return None
     solver, a, b = step.solver, step.a, step.b

@@ -57,11 +57,7 @@ class Step(NamedTuple):
 
 
 def at_loads(step: Step, loads: Sequence[float]) -> list[SpecialPoint]:
-    """Points at these loads in a step; at its first point, too, where a branch begins there.
-
-    A row at such a load is the point itself, and the branch has it once, unless it is a special point of another kind:
-    one at which an eigenvalue vanishes, in a step, or where a branch leaves another one.
-    """
+    """Points at these loads in a step; at its first point, too, where a branch begins there."""
     found = [
         step.a if step.a.zero <= step.b.zero else replace(step.a)
         for load in loads

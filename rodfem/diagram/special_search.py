@@ -45,10 +45,7 @@ class Unresolved(Exception):
 
 
 class SpecialSearch:
-    """Special points between the rows of one branch, and bounds of its steps.
-
-    ``undecided`` eigenvalues are zero at both ends of the last piece: those stay zero along the branch.
-    """
+    """Special points between the rows of one branch, and bounds of its steps."""
 
     def __init__(self, meshes: Meshes, gaps: Gaps, observer: Observer) -> None:
         self.meshes, self.gaps, self.observer = meshes, gaps, observer
@@ -291,11 +288,7 @@ class SpecialSearch:
         return gap
 
     def _missed(self, piece: Piece, node: Node, *, resolved: bool) -> None:
-        """Look for the branch on the other side where an eigenvalue comes near zero and turns back.
-
-        An imperfection is the cause if a branch point with unfolding parameters is near by: then raises :class:`Gap`,
-        unless the bend is ``resolved`` by the rows, or the branch has ended.
-        """
+        """Look for the branch on the other side where an eigenvalue comes near zero and turns back."""
         at = of_miss(piece, node)
         found = SingularSystem(piece.solver, at.modes, at.count, fold=False).solve(at.x)
         if found is not None and found.size > found.noise:

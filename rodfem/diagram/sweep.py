@@ -401,12 +401,7 @@ class SweepErrors:
 def mesh_of_frequencies(
     scene: Scene, formulation: str, plan: Plan, accuracy: float, comm: MPI.Comm
 ) -> tuple[Discretization, float]:
-    """Discretisation on which frequencies change by less than the accuracy if it is refined, and by how much.
-
-    The change is relative (to one, for values mu = omega^2 smaller than that).  Flutter loads depend on two frequencies
-    that are near each other: these are to be ten times better.  Where refinement ceases to help, at round-off, the
-    best mesh is returned; coarse ones do not see all yet.
-    """
+    """Discretisation on which frequencies change by less than the accuracy if it is refined, and by how much."""
     loads, number = np.linspace(*plan.over(scene), 3), plan.spectrum or FREQUENCIES
     mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
     system = System(scene, mesh, comm)

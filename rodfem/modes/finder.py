@@ -177,12 +177,7 @@ class ModeFinder:
         return modes, [modes.displacement, modes.rotation, *weights], _rounded(pencil, vectors, verdict.values)
 
     def _turned(self, x: PETSc.Vec, found: Found, mass: PETSc.Mat) -> tuple[Few, list[PETSc.Vec], list[PETSc.Vec]]:
-        """Modes of a conservative state, and symmetries; the vectors of the former, and the duals of all.
-
-        Each vector is signed, and a basis of those of equal values is the same from any one: the first moves along e1
-        where it can, the next do not as far as a fixed functional shows; and so on.  Duals are products with the
-        ``mass`` or, of what moves no mass, with the metric.
-        """
+        """Modes of a conservative state, and symmetries; the vectors of the former, and the duals of all."""
         vectors = [v.copy() for v in found.vectors]
         orthonormalize(vectors, mass)
         motions = [self.motions.at(x, v) for v in vectors]

@@ -185,18 +185,19 @@ def write_typical(group: h5py.Group, typical: Sequence[Typical]) -> None:
     for name in Few._fields:
         rows = [None if each.found is None else np.asarray(getattr(each.found, name)) for each in typical]
         named = name == "motion"
-        own.create_dataset(name, data=_stacked(rows, "" if named else np.nan), **(words if named else {}))
+        own.create_dataset(name, data=stacked(rows, "" if named else np.nan), **(words if named else {}))
 
 
-def _stacked(rows: Sequence[np.ndarray | None], nothing: Any) -> np.ndarray:
+def stacked(rows: Sequence[np.ndarray | None], nothing: Any = np.nan) -> np.ndarray:
     """Arrays, some of them None, as the rows of one, filled up with ``nothing``."""
     given = [row for row in rows if row is not None]
-    shape = np.max([row.shape for row in given], axis=0).astype(int) if given else (0,)
-    dtype = object if nothing == "" else np.result_type(float, *given)
-    out = np.full((len(rows), *shape), nothing, dtype=dtype)
-    for place, row in zip(out, rows, strict=True):
+    shape = tuple(np.max([row.shape for row in given], axis=0).astype(int)) if given else (0,)
+    whole = len(given) == len(rows) and all(row.shape == shape for row in given)
+    dtype = object if nothing == "" else np.result_type(*given) if whole else np.result_type(float, *given)
+    out = np.empty((len(rows), *shape), dtype) if whole else np.full((len(rows), *shape), nothing, dtype)
+    for i, row in enumerate(rows):
         if row is not None:
-            place[tuple(map(slice, row.shape))] = row
+            out[(i, *map(slice, row.shape))] = row
     return out
 
 

@@ -27,7 +27,7 @@ from rodfem.errors import InputError
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, read_json, refusal
 from rodfem.modes.finder import Motion, Motions
-from rodfem.modes.modes import Typical, write_typical
+from rodfem.modes.modes import Typical, stacked, write_typical
 from rodfem.output.table import COLUMNS, branch_data
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path
@@ -189,7 +189,7 @@ def states_of(
         for branch, (samples, vectors), typical in zip(branches, sampled, modes or [()] * len(branches), strict=True):
             group = file.create_group(f"branches/{branch.name}")
             for name in samples[0]:
-                group[name] = _stacked([np.asarray(s[name]) for s in samples])
+                group[name] = stacked([np.asarray(s[name]) for s in samples])
             write_supports(group, system.scene, samples)
             write_typical(group, typical)
             for i, null in enumerate(vectors):
@@ -205,17 +205,6 @@ def _sampled(branch: Branch, solvers: Sequence[BranchSolver]) -> tuple[list[dict
     samples = [solvers[p.mesh].shape.sample(p.x) | solvers[p.mesh].resultants.at(p.x) for p in branch.points]
     motions = {i: Motions(solvers[i].system) for i in sorted({s.point.mesh for s in branch.special})}
     return samples, [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
-
-
-def _stacked(rows: list[np.ndarray]) -> np.ndarray:
-    """Arrays of equal or different shapes as the rows of one, filled up with nan."""
-    shape = tuple(np.max([row.shape for row in rows], axis=0).astype(int))
-    if all(row.shape == shape for row in rows):
-        return np.array(rows)
-    out = np.full((len(rows), *shape), np.nan)
-    for place, row in zip(out, rows, strict=True):
-        place[tuple(map(slice, row.shape))] = row
-    return out
 
 
 def _trimmed(row: Any) -> Any:

@@ -118,11 +118,7 @@ def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
 
 @dataclass(frozen=True)
 class FrequencyCurve:
-    """A curve of frequencies, named by its ``motion``: ``loads``, ``rows`` of the branch and ``roots``, all (n,).
-
-    Roots have a non-negative real part.  A conjugate pair is two curves, of which one has its roots left out of
-    ``real`` and ``parts``.
-    """
+    """A curve of frequencies, named by its ``motion``: ``loads``, ``rows`` of the branch and ``roots``, all (n,)."""
 
     motion: str
     loads: NDArray[np.float64]

@@ -121,12 +121,7 @@ class StableRegion(NamedTuple):
 
 
 def stable_region(one: Locus, loci: Sequence[Locus]) -> StableRegion | None:
-    """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
-
-    ``one`` is the file of the locus, whose stable side is that on which its index is zero, and ``loci`` are all of the
-    plane.  None where neither side is stable all along the locus, as where another one crosses it, where it is not
-    known which side is, or where the locus has more than one load at a value of the second parameter.
-    """
+    """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound."""
     x, y = _curve(one)
     side, crossed = one.get("lower"), CROSSES in [mark["kind"] for mark in one["marks"]]
     monotone = abs(np.sign(np.diff(x)).sum()) == len(x) - 1

@@ -363,10 +363,7 @@ def snapshot(
 
 
 def draw_shape_safely(states: Path, branch: str, row: int, path: Path, caption: str, limit: float = 120.0) -> str:
-    """Draw as `draw_shape` does, but in a process of its own, which may crash without harm, within ``limit`` seconds.
-
-    Returns a sentence that says what failed and what to do; empty where the picture was written.
-    """
+    """Draw as `draw_shape` does, in a process of its own, which may crash; returns a sentence on what failed."""
     command = [sys.executable, "-P", "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
     command += [f"--output={path}", f"--caption={caption}"]
     mpi = ("OMPI_", "PMI", "MPI_LOCAL")  # beginnings of names, PMI_ and PMIX_ alike

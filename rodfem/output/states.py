@@ -22,7 +22,7 @@ from rodfem.continuation.branch import COLUMNS, Branch
 from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.libraries import optional
-from rodfem.modes.modes import load_modes, rows_with_modes
+from rodfem.modes.modes import load_modes, rows_with_modes, stacked
 from rodfem.output.table import reactions_by_name
 from rodfem.output.words import row_of
 from rodfem.problem.quaternions import directors
@@ -289,9 +289,9 @@ def _dataset(
 ) -> Any:
     """Columns of branches by name, and fields of each row at the nodes; those of a coarser mesh end in nan."""
     columns: dict[str, Any] = {n: ("point", np.concatenate([b[n] for b in branches.values()])) for n in COLUMNS}
-    columns["s"] = ("point", "node"), _stacked([here["s"] for here in fields])
+    columns["s"] = ("point", "node"), stacked([here["s"] for here in fields])
     for name, words in VECTORS.items():
-        values = _stacked([here[name] for here in fields])
+        values = stacked([here[name] for here in fields])
         columns[name] = ("point", "node", *("director", "component")[4 - values.ndim :]), values, {"long_name": words}
     sizes = [len(b["load"]) for b in branches.values()]
     coordinates = {name: columns.pop(name) for name in ("load", "arclength", "s")}
@@ -301,11 +301,6 @@ def _dataset(
     out["load"].attrs |= {"long_name": data["parameter_words"] or data["parameter"], "units": data["parameter_unit"]}
     out["ordinate"].attrs |= {"long_name": data["ordinate"], "units": data["ordinate_unit"]}
     return out
-
-
-def _stacked(rows: Sequence[Floats]) -> Floats:
-    nodes = max(map(len, rows))
-    return np.stack([np.pad(x, [(0, nodes - len(x))] + [(0, 0)] * (x.ndim - 1), constant_values=np.nan) for x in rows])
 
 
 FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv, "netcdf": to_netcdf}

@@ -164,11 +164,7 @@ def functions_of(owner: Any, *, nested: bool = True) -> list[tuple[str, Callable
 def changes(
     owner: Any, visit: Callable[[str, Any, Role], Any], place: str = "", *, nested: bool = True
 ) -> dict[str, Any]:
-    """Fields of a dataclass with each function ``f``, and all in what they hold, replaced by ``visit(words, f, role)``.
-
-    ``place`` says in words where the dataclass is in the scene.  A field's own default is left out, and so is what is
-    replaced by itself; unless ``nested`` only the dataclass's own fields are visited.
-    """
+    """Fields of a dataclass in which functions, and all that they hold, are replaced by ``visit(words, f, role)``."""
     new = {}
     for f in fields(owner):
         value = getattr(owner, f.name)
