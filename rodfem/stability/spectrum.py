@@ -18,8 +18,8 @@ Round-off ``dT`` moves a simple eigenvalue by up to ``|dT| |z|`` for its right a
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, partial
-from typing import NamedTuple, TypeAlias
+from functools import cached_property, lru_cache, partial
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,7 +54,15 @@ Matrix: TypeAlias = np.ndarray | sp.csr_matrix
 
 
 def factors_of_mass(mass: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix, sp.csr_matrix]:
-    """Rows with mass (h,), and ``L`` and ``R`` in them (h, r): by Cholesky's method with pivots of a unit diagonal."""
+    """Rows with mass (h,), and ``L`` and ``R`` in them (h, r): see :func:`_factors`; straight rods have one mass."""
+    return _factors(mass.shape[0], *(x.tobytes() for x in (mass.data, mass.indices, mass.indptr)), mass.indices.dtype)
+
+
+@lru_cache(2)
+def _factors(n: int, data: bytes, indices: bytes, starts: bytes, kind: Any) -> tuple[Any, sp.csr_matrix, sp.csr_matrix]:
+    """The same by Cholesky's method with pivots of a unit diagonal."""
+    index = (np.frombuffer(x, kind) for x in (indices, starts))
+    mass = sp.csr_matrix((np.frombuffer(data), *index), shape=(n, n))
     size = np.sqrt(np.maximum(mass.diagonal(), 0.0))
     heavy = np.flatnonzero(size)
     if len(heavy) > 2000:  # too many for dense matrices
@@ -102,7 +110,7 @@ class Spectrum:
                 f"The pencil is singular at the shift {shift:.6g}: choose another load, or another discretisation."
             ) from trouble
         self.solve, self.solve_transposed, self.shift, self.one = lu.solve, partial(lu.solve, trans="T"), shift, one
-        self.floor, self.rows = np.inf, mass.shape[0]
+        self.floor, self.rows, self._known = np.inf, mass.shape[0], dict[float, np.ndarray]()
         self.heavy, self.lower, self.dual = factors_of_mass(mass)
         self.rank = self.lower.shape[1]
 
@@ -210,10 +218,13 @@ class Spectrum:
 
     @property
     def values(self) -> np.ndarray:
-        """Eigenvalues (k,), complex; imaginary parts that are round-off are zero."""
-        values = self.one * (self.shift + 1.0 / self.pairs.nu)
-        least = np.maximum(REAL * np.maximum(abs(values), min(self.one, self.floor)), self.noise)
-        return np.where(abs(values.imag) <= least, values.real, values).astype(complex)
+        """Eigenvalues (k,), complex; imaginary parts that are round-off, by the floor, are zero."""
+        if self.floor not in self._known:
+            values = self.one * (self.shift + 1.0 / self.pairs.nu)
+            least = np.maximum(REAL * np.maximum(abs(values), min(self.one, self.floor)), self.noise)
+            self._known[self.floor] = np.where(abs(values.imag) <= least, values.real, values).astype(complex)
+            self._known[self.floor].setflags(write=False)
+        return self._known[self.floor]
 
     @property
     def zero(self) -> float:
