@@ -190,11 +190,11 @@ def write_typical(group: h5py.Group, typical: Sequence[Typical]) -> None:
 
 def stacked(rows: Sequence[np.ndarray | None], nothing: Any = np.nan) -> np.ndarray:
     """Arrays, some of them None, as the rows of one, filled up with ``nothing``."""
-    given = [row for row in rows if row is not None]
-    shape = tuple(np.max([row.shape for row in given], axis=0).astype(int)) if given else (0,)
-    whole = len(given) == len(rows) and all(row.shape == shape for row in given)
-    dtype = object if nothing == "" else np.result_type(*given) if whole else np.result_type(float, *given)
-    out = np.empty((len(rows), *shape), dtype) if whole else np.full((len(rows), *shape), nothing, dtype)
+    given: Any = list(filter(lambda row: row is not None, rows)) or [np.empty(0)]
+    shape = tuple(np.max([row.shape for row in given], axis=0).astype(int))
+    ragged = len(given) < len(rows) or any(row.shape != shape for row in given)
+    dtype = object if nothing == "" else np.result_type(*given, *[float] * ragged)
+    out = np.full((len(rows), *shape), nothing if ragged else 0, dtype)
     for i, row in enumerate(rows):
         if row is not None:
             out[(i, *map(slice, row.shape))] = row
