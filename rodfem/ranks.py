@@ -105,7 +105,9 @@ def in_words(fault: BaseException) -> str:
     if isinstance(fault, MemoryError) or (isinstance(fault, PETSc.Error) and fault.ierr == PETSC_ERR_MEM):
         return "Memory is exhausted: use fewer elements or a lower degree."
     if isinstance(fault, PETSc.Error):
-        return f"PETSc gave up ({str(fault).splitlines()[0]}): use smaller steps or another discretisation."
+        reason = str(fault).splitlines()[-1].partition("] ")  # the last line, after the number of the rank
+        remedy = "use smaller steps, another discretisation, or other options of PETSc"
+        return f"PETSc gave up ({reason[2] or reason[0]}): {remedy}."
     return f"Numbers allow no answer ({fault}): use smaller steps or another discretisation."
 
 

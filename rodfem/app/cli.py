@@ -91,12 +91,14 @@ def sentences(parser: Parser) -> Iterator[None]:
     """Bad input, and what fails for a reason that is known, ends with one sentence and status 2."""
     from petsc4py import PETSc
 
+    from rodfem.ranks import in_words
+
     try:
         yield
     except (InputError, SetupError, ConvergenceError) as trouble:
         complain(parser.in_options(str(trouble)))
     except PETSc.Error as trouble:
-        complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")
+        complain(in_words(trouble))
 
 
 def start_petsc(options: Sequence[str]) -> None:

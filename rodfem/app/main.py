@@ -7,7 +7,7 @@ import csv
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache, partial
 from hashlib import sha256
 from inspect import Parameter, cleandoc, getdoc, isfunction, signature
@@ -110,39 +110,35 @@ class Rods:
         """Read the table; raises :class:`InputError` for a column that is none of a rod, or a table without lines."""
         self.statement, self.given = statement, given
         self.parser = parser_of(self.statement, self.statement.scene(), f"rodfem run {given.file}")
-        actions = [action for action in self.parser._actions if action.dest not in ("help", "output")]
-        self.options = {action.dest: action.option_strings[0] for action in actions}
-        self.options |= {option[2:]: option for option in self.options.values()} | {"steps": self.options["largest"]}
+        self.options = {action.dest: action for action in self.parser._actions if action.dest not in ("help", "output")}
+        self.options |= {x.option_strings[0][2:]: x for x in self.options.values()} | {"steps": self.options["largest"]}
         try:
             self.rows = list(csv.DictReader(given.table.read_text(encoding="utf-8-sig").splitlines()))
         except (OSError, ValueError) as trouble:
             raise InputError(f"{given.table} cannot be read ({trouble}): give a table of text.") from trouble
-        unknown = [name for name in (self.rows[0] if self.rows else ("",)) if name not in {*self.options, *MORE}]
+        unknown = [name for name in (self.rows[0] if self.rows else ("",)) if name not in self.options]
         if unknown:
             what = f"has a column {unknown[0]!r}" if self.rows else "has no line of a rod"
             known = ", ".join(dict.fromkeys(x.name for x in self.statement.constants))
             raise InputError(f"{given.table} {what}: {COLUMNS}; the constants are {known or 'none'}.")
 
     def stated(self, number: int) -> tuple[Scene, Discretization, Plan]:
-        """Scene, mesh and plan of a rod; raises :class:`InputError` with its line for one that cannot be traced."""
+        """Scene, mesh and plan of a line, an empty cell of which is the default; raises :class:`InputError` with it."""
+        words = [x for n, cell in self.rows[number].items() if cell and cell.strip() for x in self._words(n, cell)]
         try:
-            return self._stated(self.rows[number])
+            scene, discretization, plan = self.statement.asked(self.parser.parse_args(words))
+            plan.check(scene, discretization)
         except InputError as trouble:
             raise InputError(f"{self.given.table}, rod {number}: {trouble}") from None
-
-    def _stated(self, row: Mapping[str, str]) -> tuple[Scene, Discretization, Plan]:
-        """The same of a line, an empty cell of which is the default."""
-        filled = {name: cell.strip() for name, cell in row.items() if cell and cell.strip()}
-        words = [word for n, cell in filled.items() if n not in MORE for word in (self.options[n], *cell.split())]
-        options = self.parser.parse_args(words)
-        scene, discretization, plan = self.statement.asked(options)
-        known: dict[str, Any] = {"true": True, "false": False}
-        more: dict[str, Any] = {
-            n: int(x) if x.isdigit() else known.get(x.lower(), x) for n, x in filled.items() if n in MORE
-        }
-        plan = replace(plan, **more)
-        plan.check(scene, discretization)
         return scene, discretization, plan
+
+    def _words(self, name: str, cell: str) -> list[str]:
+        """Option of a cell, as a shell has it."""
+        option, switches = self.options[name], dict[str, str]()
+        if isinstance(option, argparse.BooleanOptionalAction):
+            switches = dict(zip(("true", "false"), option.option_strings, strict=True))
+        switch = switches.get(cell.strip().lower())
+        return [switch] if switch else [option.option_strings[0], *cell.split()]
 
     def trace(self) -> None:
         """Trace all rods that have not been traced, and write the table of their special points; collective."""
@@ -171,10 +167,6 @@ class Rods:
         on_first(MPI.COMM_WORLD, lambda: write_whole({target / "many.csv": as_csv(lines)}))
         if MPI.COMM_WORLD.rank == 0:
             print(target / "many.csv")
-
-
-MORE = ("error_bars", "most_branches")
-"""Fields of a plan that no option sets."""
 
 
 def _run(statement: Statement, options: argparse.Namespace, petsc: Sequence[str], words: Callable[[str], str]) -> None:
@@ -264,6 +256,10 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
     words = "follow what leaves from branch points of branches of a depth less than D; the first branch has depth 0, "
     words += "what leaves from it 1, and so on (default: the file's own, or 2)"
     add("--depth", type=int, metavar="D", help=words)
+    words = "follow nothing more from branch points once there are N branches; 0: no limit (default)"
+    add("--most-branches", type=int, metavar="N", help=words)
+    words = "bound the errors by a second computation on a richer mesh (default)"
+    add("--error-bars", action=argparse.BooleanOptionalAction, default=None, help=words)
     words = "also compute the K left-most eigenvalues of every state with SLEPc"
     add("--spectrum", type=int, metavar="K", help=words)
     words = "judge the states at the loads of --at, and print all that is said, by "
@@ -309,7 +305,7 @@ def plan_of(options: argparse.Namespace, own: Plan | None) -> Plan:
         except ValueError:
             what = f"{locus[1]} to {locus[2]} is no interval"
             raise InputError(f"{what}: give two numbers after {locus[0]}.") from None
-    same = ("span", "at", "depth", "spectrum", "tries", "method", "modes", "accuracy")
+    same = {x.name for x in fields(Plan)} - {"steps", "events"}
     chosen = {name: getattr(options, name) for name in same} | {"locus": locus}
     if options.largest is not None:
         own = replace(own, steps=replace(own.steps, largest=options.largest))

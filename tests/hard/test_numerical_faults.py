@@ -24,7 +24,10 @@ from rodfem.stability.nonsymmetric import NonsymmetricPencil
 MESH, PLAN = rodfem.Discretization("reduced", 8, 6), rodfem.Plan((0.0, 0.35), depth=1)
 FAULTS: list[tuple[Callable[[], Exception], str]] = [
     (lambda: ConvergenceError("MUMPS could not factor the matrix."), "MUMPS could not factor the matrix."),
-    (lambda: PETSc.Error(76), "PETSc gave up (error code 76): use smaller steps or another discretisation."),
+    (
+        lambda: PETSc.Error(76),
+        "PETSc gave up (error code 76): use smaller steps, another discretisation, or other options of PETSc.",
+    ),
     (lambda: PETSc.Error(55), "Memory is exhausted: use fewer elements or a lower degree."),
     (lambda: MemoryError(), "Memory is exhausted: use fewer elements or a lower degree."),
     (lambda: np.linalg.LinAlgError("Singular matrix"), "Numbers allow no answer (Singular matrix): use smaller steps"),
