@@ -8,6 +8,7 @@ import scipy.linalg
 from classics import ON_AXIS, column, push
 from golden_cases import cases, trace
 
+import rodfem
 from rodfem import Discretization, Solver, pinned
 from rodfem.continuation.arc import Piece
 from rodfem.continuation.crossings import Node, Zeros, fourth, roots
@@ -15,13 +16,15 @@ from rodfem.linalg.matrices import gathered
 from rodfem.stability.reduced_stiffness import Condensation, negative
 
 
-@pytest.mark.parametrize("load", [20.0, np.pi**2, np.pi**2 + 1e-9])
-def test_condensation_of_the_saddle_matrix(load: float) -> None:
-    """H is the Schur complement of S on the amplitudes, its index is that of S; also where S is singular."""
+@pytest.mark.parametrize("load", [20.0, None])
+def test_condensation_of_the_saddle_matrix(load: float | None) -> None:
+    """H is the Schur complement of S on the amplitudes, its index is that of S; also at the load of the mesh itself."""
     rod = column("euler", (pinned(), pinned(ON_AXIS, push)), (0.0, 30.0), constants={"B2": 1.3})
-    states = Solver(rod, Discretization("reduced", 4, 3))
+    mesh = Discretization("reduced", 4, 3)
+    singular = load or rodfem.trace(rod, mesh, depth=0, error_bars=False).special("branch point")[0].point.load
+    states = Solver(rod, mesh)
     solver, x = states.equilibria, states.equilibrium(5.0).x
-    solver.system.set_load(x, load)
+    solver.system.set_load(x, singular)
     condensation = Condensation(solver.inertia)
     phi = condensation.border(x)
     found = condensation.at(x, solver.axis, phi)
@@ -34,7 +37,7 @@ def test_condensation_of_the_saddle_matrix(load: float) -> None:
     above, below = scipy.linalg.eigvals(S, M, homogeneous_eigvals=True)
     kept = abs(below) > 1e-9 * abs(above)
     finite = (above[kept] / below[kept]).real
-    assert found.far + negative(found.H) == (finite < 0).sum() or abs(load - np.pi**2) < 1e-8
+    assert found.far + negative(found.H) == (finite < 0).sum() or not load
 
 
 @pytest.mark.few(1)

@@ -68,7 +68,10 @@ def test_mutations_are_caught(formulation: str) -> None:
 @pytest.mark.few(1)
 @pytest.mark.parametrize("steps", [StepControl(), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
 def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
-    """States of another branch at nearly the same load, farther than a step away, in place of the last row."""
+    """States of another branch at nearly the same load, farther than a step away, in place of the last row.
+
+    By the tangents of four rows those of the branch itself have next to none with short steps.
+    """
     diagram = trace(
         cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False, steps=steps)
     )
@@ -76,7 +79,7 @@ def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
     own = [[p for p in b.points if not any(p is s.point for s in b.special)] for b in diagram.branches]
     for branch in own:
         for i in range(2, len(branch)):
-            assert defect(system, branch[max(i - 3, 0) : i + 1]) <= most
+            assert defect(system, branch[max(i - 3, 0) : i + 1]) <= most * (0.1 if steps.largest < 0.2 else 1.0)
             last, length = branch[i], branch[i].arclength - branch[i - 1].arclength
             for other in (b for b in own if b is not branch):
                 near = min(other, key=lambda p: abs(p.load - last.load))

@@ -5,12 +5,13 @@ the special point, whose eigenvalue at a fold is as large as the square root of 
 """
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from classics import pressed_ring
 
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, pinned, trace
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, load, pinned, trace
 from rodfem.forms.energy import bending_and_twist
 
 MESH = Discretization("auto", 4, 4)
@@ -67,6 +68,12 @@ def test_what_vanishes_at_a_special_point_is_zero() -> None:
     found = singular(column())
     assert len(found) == 7 and sum(s.kind == "fold" for s in found) == 3
     assert all(is_undecided(column(), s) for s in found)
+
+
+def test_a_branch_of_a_file_begins_at_its_branch_point(tmp_path: Path) -> None:
+    """Its first state is read apart from that of the branch point, and is the same."""
+    again = load(column().save(tmp_path), bedded())
+    assert all(is_undecided(again, again[b.parent[0]].special[b.parent[1]]) for b in again.branches if b.parent)
 
 
 def test_a_state_far_away_on_the_richer_mesh_is_not_taken() -> None:

@@ -46,10 +46,11 @@ def test_euler_column(folder: Path) -> None:
         np.testing.assert_allclose(first[::6], 2**0.5 * np.sin(w[0] * s), atol=1e-5)
 
 
-@pytest.mark.long
-def test_a_double_eigenvalue_has_one_mode(folder: Path) -> None:
+@pytest.mark.usefixtures("few_loads")
+@pytest.mark.parametrize("mesh", [(4, 6), (6, 6)])
+def test_a_double_eigenvalue_has_one_mode(folder: Path, mesh: tuple[int, int]) -> None:
     """Where Beck's column flutters, P = 20.05, omega = 11.02 (Beck 1952): the one mode of the closed form there."""
-    found = recorded(classics.beck(span=(19.0, 21.0)), Plan(error_bars=False), folder, Discretization("auto", 6, 6))
+    found = recorded(classics.beck(span=(19.0, 21.0)), Plan(error_bars=False), folder, Discretization("auto", *mesh))
     branch = json.loads((folder / "diagram.json").read_text())["branches"][0]
     (special,) = [s for s in branch["special"] if s["kind"] == "flutter"]
     (few,) = [each.found for each in found[branch["name"]] if each.row == special["row"]]

@@ -6,6 +6,7 @@ import demo_cases
 import hemitropic_cases
 import numpy as np
 import pytest
+from golden_cases import cases, trace
 from rescaled import DNA as METRES_AND_NEWTONS
 from rescaled import STEEL, differences, rescaled
 
@@ -106,8 +107,8 @@ def test_frequencies_of_a_cantilever(length: float, force: float, elements: int)
 
 
 @pytest.mark.ranks
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "units"), [("cord", (7.0, 1e6)), ("hemitropic", (1e-3, 1e6))])
+@pytest.mark.few(1)
+@pytest.mark.parametrize(("name", "units"), [("cord", (1e-8, 1e12)), ("cord", (7.0, 1e6)), ("hemitropic", (1e-3, 1e6))])
 def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> None:
     """Off natural units its pivots do not tell a singular state from others: branch points are missed."""
     scene, buckling = {
@@ -143,6 +144,13 @@ def test_recorded_scenes(name: str, units: tuple[float, ...]) -> None:
     has loads of 1e7; an arch a unit of 1e-13, in which the load is as small as equations that do not feel it.
     """
     assert not differences(name, *units)
+
+
+def test_a_fold_feels_a_load_of_any_unit() -> None:
+    """In a unit of 1e-13 the derivative in the load is as small as that of equations that do not feel it."""
+    arch = cases()["classic pressed arch"]()
+    folds = [trace(rescaled(arch, 1.0, 1.0, unit), error_bars=False).special("fold")[0] for unit in (1e-13, 1e13)]
+    assert folds[1].coupling == pytest.approx(folds[0].coupling, rel=1e-6) and folds[0].coupling > 1e-3
 
 
 @pytest.mark.long
