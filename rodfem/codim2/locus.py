@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from rodfem.codim2.criteria import Interval
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.errors import InputError
-from rodfem.file_format import LOCUS, read_json, refusal
+from rodfem.file_format import LOCUS
 from rodfem.output.files import save_json
 from rodfem.output.words import number
 from rodfem.problem.arguments import finite
@@ -22,12 +22,12 @@ from rodfem.tolerances import NEGLIGIBLE, same_special
 
 COARSE = "This mesh does not resolve all states: errors of `at least` that may be larger; use more elements."
 """Under the rows of a locus of which some are not resolved."""
-AS_THEY_ARE = tuple(
-    "scene title kind ordinate_name natural start lower planar unresolved constants discretization note".split()
-)
-PAIRS, WORDS = ("bounds", "crossings"), ("labels", "words", "units", "ended")
+AS_THEY_ARE = (
+    "scene title kind ordinate_name natural start lower planar unresolved constants discretization note bounds "
+    "crossings labels words units ended"
+).split()
 COLUMNS = "ordinate", "index", "located_to", "error", "omega2"
-"""Entries of a file that are attributes of a locus: as they are, pairs of numbers, pairs of words, and tables."""
+"""Entries of a file that are attributes of a locus: as they are, and tables."""
 
 
 @dataclass
@@ -91,6 +91,7 @@ class Locus:
     ended: tuple[str, str]
     constants: dict[str, float]
     discretization: dict[str, Any]
+    solve: Callable[[int, float], list[Row]]  # rows where a parameter, 0 or 1, has a value
     states: list[PETSc.Vec] = field(default_factory=list)  # not saved
     crossings: list[tuple[float, float]] = field(default_factory=list)  # load, ordinate at the start's parameter
     words: tuple[str, str] = ("", "")
@@ -99,7 +100,6 @@ class Locus:
     natural: float = 1.0
     planar: bool = False
     unresolved: list[int] = field(default_factory=list)
-    solve: Callable[[int, float], list[Row]] | None = None
 
     def __repr__(self) -> str:
         each = zip(self.names, self.values.min(axis=0), self.values.max(axis=0), strict=True)
@@ -109,15 +109,12 @@ class Locus:
     def at(self, **value: float) -> list[Row]:
         """Rows at which one of its two parameters has a value, as ``locus.at(A=-2.0)``, each solved for; collective.
 
-        Raises :class:`InputError` for anything but one of :attr:`names`, and for a locus that a file holds: it has no
-        states.
+        Raises :class:`InputError` for anything but one of :attr:`names`.
         """
         names = [name for name in self.names if name in value]
         if len(names) != 1 or len(value) != 1:
             one = f"give {' or '.join(self.names)}, as in at({self.names[1]}=1.0)"
             raise InputError(f"{value} is not one parameter of the locus: {one}.")
-        if self.solve is None:
-            raise InputError("This locus is from a file, which has no states: follow it again, by diagram.locus(...).")
         return self.solve(self.names.index(names[0]), finite(1.0)(names[0], value[names[0]]))
 
     def passes(self, special: SpecialPoint, units: Units) -> bool:
@@ -133,31 +130,11 @@ class Locus:
         return {
             "format": LOCUS.mark(),
             **{name: getattr(self, name) for name in AS_THEY_ARE},
-            **{name: [*map(list, getattr(self, name))] for name in PAIRS},
-            **{name: list(getattr(self, name)) for name in WORDS},
             "parameters": list(self.names),
             "columns": columns,
             "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
             "marks": [{"kind": m.kind, "row": m.row} for m in self.marks],
         }
-
-    @classmethod
-    def read(cls, path: Path) -> Locus:
-        """Read what :meth:`save` has written, but for the states; raises :class:`InputError` where that is missing."""
-        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", "lower"))
-        with refusal(f"{path} is no {LOCUS.name} ({{}}): give {LOCUS.file}."):
-            columns, names = data["columns"], tuple(data["parameters"])
-            tables: dict[str, Any] = {name: np.array(columns[name], dtype=float) for name in COLUMNS}
-            tables["error"][data["without_estimate"]] = np.inf
-            tables |= {name: [*map(tuple, data[name])] for name in PAIRS}
-            tables |= {name: tuple(data.get(name, ("", ""))) for name in WORDS}
-            return cls(
-                **{name: data[name] for name in AS_THEY_ARE if name in data},
-                **(tables | {"bounds": tuple(tables["bounds"]), "index": tables["index"].astype(int)}),
-                names=names,
-                values=np.array([columns[name] for name in names]).T,
-                marks=[Mark(mark["kind"], mark["row"]) for mark in data["marks"]],
-            )
 
     def save(self, path: Path) -> None:
         """Write :meth:`data` as JSON, whole or not at all; call it on one rank."""

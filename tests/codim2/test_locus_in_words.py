@@ -2,17 +2,15 @@
 
 from dataclasses import replace
 from math import pi
-from pathlib import Path
 
 import classics
 import numpy as np
 import pytest
 
 from rodfem import Diagram, Discretization, InputError, Ordinate, Parameter, Plan, Scene, clamped, free, trace
-from rodfem.codim2.locus import COARSE, Locus
+from rodfem.codim2.locus import COARSE
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.files import save_json
 from rodfem.output.plot_locus import in_words, stable_region
 from rodfem.report.branches import _readings
 
@@ -82,17 +80,6 @@ def test_rows_have_their_bars_on_the_page() -> None:
     shown = _readings(data, zip(data["columns"]["B2"], data["columns"]["P"], strict=True))
     assert [bool(pair) for pair in shown] == np.isfinite(curve.error[:, 0]).tolist()
     assert "at least" in shown[0][1] and "at least" not in shown[-1][1] and shown[-1][1].startswith("1.23370055")
-
-
-@pytest.mark.long
-def test_files_without_these_entries_are_read(tmp_path: Path) -> None:
-    diagram = column(0.5, "e2")
-    found = diagram.locus(diagram.special("branch point")[0], "B2", (0.4, 1.2))
-    found.save(tmp_path / "locus-1.json")
-    assert Locus.read(tmp_path / "locus-1.json").planar
-    old = {name: value for name, value in found.data().items() if name not in ("planar", "unresolved", "natural")}
-    save_json(old, tmp_path / "locus-2.json")
-    assert not Locus.read(tmp_path / "locus-2.json").planar
 
 
 @pytest.mark.long
