@@ -19,6 +19,8 @@ LINK = re.compile(
     r"(?P<image>!?)\[(?P<text>[^\]\n]*(?:\n[^\]\n]+)?)\]\((?P<file>(?!https?:|#)[^)\s#]+)(?P<anchor>#[^)\s]*)?\)"
 )
 NAME = re.compile(r"`rodfem(?:\.\w+)+`")
+INCLUDED = {HOME / "README.md": PAGES / "start.md", HOME / "CONTRIBUTING.md": PAGES / "contributing.md"}
+"""Pages of the repository that pages of the site include."""
 LESSONS = re.compile(r"```{toctree}\n:hidden:\n:caption: Learn\n.*?\n```\n", re.DOTALL)
 
 project, author = "rodfem", "rodfem authors"
@@ -85,6 +87,7 @@ def _mend(source: list[str], path: Any) -> None:
 def _mended(link: re.Match[str], folder: Path) -> str:
     """Link of a page as the site has it: what is no page of the site is a name in the code, or text."""
     target = Path(os.path.normpath(folder / link["file"]))
+    target = INCLUDED.get(target, target)
     if NAME.fullmatch(link["text"]) and target.suffix == ".py":
         return f"{{py:obj}}{link['text']}"
     if target.is_dir():
