@@ -242,7 +242,7 @@ def log(store: Store, scenes: int) -> str:
 Written by `make bench` (`python -m benchmarks.robustness`) in {store.took() / 60:.0f} minutes on
 {machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread; {strftime("%Y-%m-%d")}.
 
-Each case is a series of problems with a closed form or a published value, by one parameter; `tests/hard` has them, and
+Each case is a one-parameter family of problems with a closed form or a published value; `tests/hard` has them, and
 tests some values of each. It tests a row of [the contract](resolution.md). *Right*: what is promised, to the error bars
 that the program gives itself; the last column is the largest error over its bar (or over what is promised). **said**:
 the program says in a sentence what it could not decide. **wrong**: neither; there should be none. In all: {total}.

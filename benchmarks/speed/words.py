@@ -36,7 +36,7 @@ said. `10 P6 reduced` is ten elements of degree 6 in the reduced formulation.
 """
 REFERENCES = """
 All but the hemitropic rod's bent states (multiple shooting, `tests/reference_values.py`) were computed anew in this
-run, and differ from the table by at most {deviation:.0e}: errors below that mean nothing.
+run, and differ from the table by at most {deviation:.0e}: smaller errors are meaningless.
 """
 EQUILIBRIA = """
 Time per accepted point of following a branch, index included, special points not, against the largest error of the

@@ -44,8 +44,9 @@ def main(words: Sequence[str]) -> None:
         sys.exit(0)
     file, *rest = words
     name = None
-    if rest[:1] == ["--scene"]:
-        name, rest = (rest[1] if len(rest) > 1 else ""), rest[2:]
+    if "--scene" in rest:
+        i = rest.index("--scene")
+        name, rest = " ".join(rest[i + 1 : i + 2]), rest[:i] + rest[i + 2 :]
     module = load(Path(file))
     statement = Statement(rod_of(module, name), own_of(module, "Discretization"), own_of(module, "Plan"))
     end = rest.index("--") if "--" in rest else len(rest)

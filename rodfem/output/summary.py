@@ -231,7 +231,7 @@ def _directions(special: Data, branch: Data, branches: Sequence[Data]) -> str:
     leaving = [b for b in branches if b["parent"] == [branch["name"], branch["special"].index(special)]]
     before = branch["columns"]["zero"][max(special["row"] - 1, 0)]
     if special["multiplicity"] == 2 and len(leaving) == 1 and min(leaving[0]["columns"]["zero"]) == before + 1:
-        words += f": a circle of states, as the eigenvalue that stays zero along {leaving[0]['name']} says"
+        words += f": a circle of states, hence the zero eigenvalue on {leaving[0]['name']}"
     return f" ({words})"
 
 

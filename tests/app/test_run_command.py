@@ -84,6 +84,14 @@ def test_files_with_mistakes(text: str, words: str, tmp_path: Path, capsys: pyte
     assert said.startswith("error: ") and said.count("\n") == 1 and words in said
 
 
+def test_a_scene_is_named_among_the_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(SCENE + "other = column")
+    with pytest.raises(SystemExit):
+        console.main(["run", str(file), "--depth", "0", "--scene", "third"])
+    assert "has no scene 'third': choose one of column, other" in capsys.readouterr().err
+
+
 def test_a_load_is_no_constant(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.py"
     file.write_text(SCENE)
