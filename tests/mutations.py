@@ -48,6 +48,8 @@ TABLE = {
         "bar-of-another-law": ("if again is not None and alike(again, law):", "if again is not None:", ERRORS),
         "bound-without-what-is-left": ("change + rho / (1 - rho) * max(change, about) + left", "change", ERRORS),
         "bound-of-a-place-by-itself": ("max(change, about) + left", "change + left", ERRORS),
+        "richer-meshes-leave-a-tenth": ("min(2 * last /", "min(0.2 * last /", ERRORS),
+        "ordinates-are-located-exactly": ("left = STEADY * moved + round_off(", "left = round_off(", ERRORS),
         "bound-is-a-tenth": ("change + rho / (1 - rho) * max(change, about) + left", "0.1 * change + left", ERRORS),
         "every-state-is-resolved": (
             "RESOLVED_TO = 0.1", "RESOLVED_TO = 1e9", "adaptivity/test_error_estimate.py hard/test_hard_cases.py"),
@@ -108,7 +110,7 @@ TABLE = {
         "flutter-locus-by-eigenvalues-alone": ("step = -noise.two_sided / slope", "step = 0.0", LOCI),
     },
     "rodfem/codim2/follow.py": {
-        "loci-follow-polynomials-beyond-bends": ("if failures < 2", "if failures < 200", "codim2/test_locus.py"),
+        "loci-follow-polynomials-beyond-bends": ("if failures < 2", "if failures < 200", LOCI),
         "places-of-one-mesh": (
             "there, located_to = sought.p, sought.dp", "there, located_to = node.p, sought.dp",
             "codim2/test_places.py"),
@@ -222,6 +224,9 @@ TABLE = {
             "_pitchfork(Leading(even[-1], even[-1], 0.0), hidden", "continuation/test_degenerate_pitchforks.py"),
         "pitchfork-opens-the-other-way": (
             "return NormalForm(PITCHFORK, best /", 'return NormalForm("pitchfork", -best /', ERRORS),
+        "a-slope-hides-in-no-pitchfork": (" + hidden / abs(term.best) ** power", "", MIXED),
+        "transcritical-branches-go-to-the-other-side": (
+            "side = int(np.sign(load.best))\n", "side = -int(np.sign(load.best))\n", MIXED),
         "law-of-an-ordinate-that-says-nothing": (
             "return (QUADRATIC, quadratic, hidden / abs(quadratic.best)) if turns else None",
             "return QUADRATIC, quadratic, hidden / abs(quadratic.best)", "literature/test_postbuckling.py"),

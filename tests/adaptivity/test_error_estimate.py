@@ -3,9 +3,10 @@
 from dataclasses import replace
 from functools import cache
 from io import StringIO
-from math import hypot, pi, sqrt
+from math import hypot, pi, sqrt, tan
 from typing import Any
 
+import boundary_layer
 import classics
 import hemitropic_cases
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 import reference_values
 from classics import SUPPORTS, column
 from hard.fuzz import wider
+from hard.two_freedoms import scene as two_freedoms
 from mpi4py import MPI
 from scipy.integrate import OdeSolution, solve_ivp
 from scipy.optimize import brentq
@@ -222,6 +224,30 @@ def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch)
     moved = abs(again.ordinate - stopped[0])
     assert again.ordinate_left == pytest.approx(error_estimate.STEADY * moved, rel=1e-3)
     assert moved > 1e-6
+
+
+@pytest.mark.parametrize("lam", [3.0, 3.5, 4.0])
+def test_what_a_richer_mesh_leaves_of_a_boundary_layer(lam: float) -> None:
+    """The curvature is ``2 w sin(theta/2)``, ``tan(theta/4) = tan(theta_0/4) exp(-w s)`` and the tension ``w^2``."""
+    solver, s = Solver(boundary_layer.scene(), Discretization("auto", 8, 6)), np.linspace(0.0, 0.5, 2001)
+    point, richer, w = solver.equilibrium(lam), Enriched(solver.equilibria), 10 ** (lam / 2)
+    again = richer.again(point, fixed_load=True)
+    exact = 2 * w * np.sin(2 * np.arctan(tan(boundary_layer.ANGLE / 4) * np.exp(-w * s)))
+    points = point, richer.solver.point(again.x, 0.0, None)
+    first, left = (np.linalg.norm(abs(p.profile(s).curvature[:, 1]) - exact) for p in points)
+    assert left / first <= again.rho <= 10 * left / first
+
+
+def test_the_location_of_a_branch_point_is_in_the_bar_of_its_ordinate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three times what a last correction by 1e-4 along the null vector changes."""
+    model = two_freedoms(lambda u, f2, c: u**3 / 3 - c.P * u * u / 2 + 0.5 * f2, (-0.3, 0.3))
+    diagram, solve = trace(model, Discretization("auto", 4, 3), Plan(depth=0)), error_estimate.SingularSystem.solve
+    (special,) = diagram.special(BRANCH_POINT)
+    last, system = special.null_vectors[0] * 1e-4, error_estimate.SingularSystem
+    monkeypatch.setattr(system, "solve", lambda *at: replace(x := solve(*at), last=x.vectors[0] * 1e-4))
+    Enriched(branch_solver(diagram)).estimate(special)
+    moved = abs(branch_solver(diagram).shape.ordinate(special.point.x + last) - special.point.ordinate)
+    assert special.ordinate_error == pytest.approx(3 * moved, rel=1e-3) and moved > 1e-6
 
 
 @pytest.mark.long

@@ -4,14 +4,15 @@ Of the pinned elastica with the end slope A (Euler): ``P = pi^2 (1 + A^2/8 + ...
 ``A^2/4 + ...``, its middle moves by ``A/pi + ...`` across and by ``A^2/8 + ...`` along.
 """
 
-from math import pi
+from math import cos, pi
 from typing import Any
 
 import pytest
 from classics import ON_AXIS, column, push
+from hard.two_freedoms import scene as two_freedoms
 
 import rodfem
-from rodfem import Ordinate, Plan, pinned
+from rodfem import Discretization, Ordinate, Plan, pinned
 from rodfem.continuation.branch import NormalForm
 from rodfem.forms.energy import bending_and_twist
 
@@ -75,3 +76,22 @@ def test_size_of_a_displacement_and_what_is_added_to_it() -> None:
         law = law_of(of, s=0.5)
         assert law.power == 2 and holds(law, pi**4 / 8, 2e-5)
     assert law_of(lambda r, q: abs(r[0]) + 0.01 * r[0], s=0.5).of == "distance"
+
+
+@pytest.mark.parametrize("a", [1.0, -1.0])
+def test_side_of_a_transcritical_branch(a: float) -> None:
+    """``u = a P``: the file has the sign of the load's change on the branch that begins with the first way."""
+    model = two_freedoms(lambda u, f2, c: u**3 / 3 - c.a * c.P * u * u / 2 + 0.5 * f2, (-0.3, 0.3), a=a)
+    diagram = rodfem.trace(model, Discretization("auto", 4, 3), Plan(depth=1))
+    law, end = diagram.data["branches"][0]["special"][0]["law"], diagram["branch 1"].points[-1]
+    assert (law["kind"], law["coefficient"]) == ("transcritical", pytest.approx(a, rel=1e-8))
+    assert law["side"] == (1 if end.load > 0 else -1) == (a if end.ordinate > 0 else -a)
+
+
+def test_a_slope_that_hides_in_a_pitchfork() -> None:
+    """``P = u^2 + e u``: at the least amplitude, that of the last Chebyshev node, the slope is ``e/u`` of the first."""
+    e, least = 1e-6, 0.12 * cos(7 * pi / 16)
+    model = two_freedoms(lambda u, f2, c: u**4 / 4 + c.a * u**3 / 3 - c.P * u * u / 2 + 0.5 * f2, (-0.3, 0.3), a=e)
+    (found,) = rodfem.trace(model, Discretization("auto", 4, 3), Plan(depth=1)).special("pitchfork")
+    assert found.law is not None and found.law.coefficient == pytest.approx(1.0, rel=1e-8)
+    assert found.law.uncertainty == pytest.approx(e / least, rel=1e-3)

@@ -168,7 +168,7 @@ BIFURCATIONS = (
         POINTS,
         "two to four branch points in two planes, at random", "several in a step, in either direction, at a row, or "
         "two at one load", SAID, "Euler, pi^2/4, times functions with given zeros", "number of a random draw",
-        planes.crossings, (3, 70072), tuple(range(60)),
+        planes.crossings, (70072, 3), tuple(range(60)),
     ),
     Case(
         POINTS,
@@ -237,7 +237,7 @@ LOCI = (
             "P^2 = b^2 + d^2", "d, in bounds of 0.3", partial(loci.gap, kind), few, widths,
         )
         for kind, few, widths in (
-            ("branch point", (2e-2, 0.0), (0.1, 2e-2, 0.0)),
+            ("branch point", (1e-5, 2e-2, 0.0), (0.1, 2e-2, 1e-5, 0.0)),
             ("fold", (2e-2,), (0.05, 2e-2)),
         )
     ),

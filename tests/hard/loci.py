@@ -65,7 +65,7 @@ def gap(kind: str, width: float) -> Measured:
         return Measured(float(off) if crossed and unfilled else inf, 1e-9, words(found))
     turns = [mark for mark in found.marks if mark.kind == "turns in P"]
     one = len(turns) == 1 and abs(abs(found.values[turns[0].row, 0]) - width) < 1e-9
-    one = one and bool((abs(found.values[:, 0]) > 0.999 * width).all())
+    one = one and bool((abs(found.values[:, 0]) > 0.999 * width).all()) and not words(found)
     return Measured(float(off) if one else inf, 1e-9, words(found), "" if one or words(found) else str(found.ended))
 
 
@@ -107,7 +107,10 @@ def founded(most: float) -> Measured:
         potential=lambda x, c: loads.spring(x.r, (0.0, c.w, 0.0)),
     )  # fmt: skip
     found = located(run(scene, MESH), "w", (-1.0, most), steps=LONG)
-    return Measured(beyond(found, np.full(len(found.values), BECK)), 1.0, (), "" if len(found.values) > 2 else "short")
+    values, left = found.values[:, 0], found.located_to[:, 0]
+    apart = np.ptp(values) / (2 * left.max())  # the mesh's error is that of all rows
+    error = max(beyond(found, np.full(len(values), BECK)), float(apart))
+    return Measured(error, 1.0, (), "" if len(values) > 2 else "short")
 
 
 def island(radius: float) -> Measured:
