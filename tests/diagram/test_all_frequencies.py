@@ -10,7 +10,7 @@ from golden_cases import NOT_CONSERVATIVE, cases
 from literature.test_free_rods import floating
 from scipy.linalg import eigvals
 
-from rodfem import Discretization, Inertia, Parameter, Plan, Scene, Solver, free, trace
+from rodfem import Discretization, Inertia, Parameter, Plan, Scene, Solver, clamped, free, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.equilibria import at_load
 from rodfem.forms.energy import bending_and_twist
@@ -18,7 +18,13 @@ from rodfem.linalg.matrices import gathered
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 BECK = 20.0509536189738
-SCENES: dict[str, Callable[[], Scene]] = {name: cases()[name] for name in NOT_CONSERVATIVE} | {
+SCENES: dict[str, Callable[[], Scene]] = {
+    "turned": lambda: replace(
+        classics.beck(),
+        ends=(clamped(rotation=(0.7, 0.1, -0.5, 0.5)), free(follower=classics.push)),
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1.0, 1.0, 1e-4)),
+    ),
+    **{name: cases()[name] for name in NOT_CONSERVATIVE},
     "torque": lambda: replace(classics.torque("follower_moment"), span=(0.0, 9.0)),
     "floating": lambda: floating(
         (free(), free(follower=lambda c: (0.0, 0.0, -c.P))), (0.0, 130.0), distributed=lambda c: (0.0, 0.0, c.P)
@@ -33,7 +39,7 @@ def dense(pencil: object, number: int) -> np.ndarray:
     return -10.0 + 1.0 / nu[np.argsort(-abs(nu))[:number]]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("part", [0.3, 0.9])
 def test_against_qz(name: str, part: float) -> None:
@@ -70,6 +76,10 @@ def test_two_beyond_the_fortieth_meet_first() -> None:
 
 def test_planes_that_pass_one_another_never_meet(monkeypatch: pytest.MonkeyPatch) -> None:
     """A dead thrust beside one that follows: frequencies of two planes cross, and nothing more is computed for that."""
+    at, computed = NonsymmetricSolver.at, list[object]()
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 21)
-    diagram = trace(classics.partly_following(1.0, (0.0, 19.0), 1.9), Discretization("pointwise", 4, 6), Plan())
-    assert not diagram.special("flutter") and not diagram.warnings and len(diagram[0].points) == 21
+    monkeypatch.setattr(NonsymmetricSolver, "at", lambda *given: (computed.append(given), at(*given))[1])
+    scene, plan = classics.partly_following(1.0, (0.0, 19.0), 1.9), Plan(error_bars=False)
+    diagram = trace(scene, Discretization("pointwise", 4, 6), plan)
+    assert not diagram.special("flutter") and not diagram.warnings
+    assert len(computed) == len(diagram[0].points) + 1 == 22  # the first one twice

@@ -22,6 +22,7 @@ from rodfem.kumar_healey.reduction import ReducedPencil, cayley_shift
 from rodfem.stability import METHODS, find
 from rodfem.stability.assessment import Assessor, Method
 from rodfem.stability.dependence import named, smallest_singular, weak_combinations
+from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import Blocks, Pencil
 
 SMALL = (6, 3)
@@ -211,6 +212,16 @@ def test_ten_thousand_elements() -> None:
     for load, negative in ((49.3479, 1), (49.3481, 0)):
         x, _ = solver.at_load(solver.start(load), load)
         assert Assessor(solver.system)(x, "count").negative == negative
+
+
+def test_quotients_decide_within_a_wide_band() -> None:
+    """Where round-off of the count is said to be large, signs of eigenvalues inside are those of their quotients."""
+    solver = Solver(scene("cord"), Discretization("reduced", 8, 6)).equilibria
+    solver.system.set_phase(None)
+    solver.inertia.tolerance = solver.inertia.resolution = 1e-2
+    for load, negative in ((49.3475, 1), (49.3485, 0)):
+        found = decide(solver.inertia.at(solver.at_load(solver.start(load), load)[0]))
+        assert len(found.inside) == 1 and (found.index.negative, found.index.zero) == (negative, 0)
 
 
 @pytest.mark.few(1)
