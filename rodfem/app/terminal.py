@@ -252,8 +252,8 @@ class Report(Observer):
             values = "  ".join(f"{mu:.6g}" for mu in point.spectrum)
             self.say(f"  {name:<12} {kind:<{wide}} {point.load:<13.8g} {values}")
 
-    def frequencies(self, branches: Sequence[Branch], scene: Scene, rows: int = 11) -> None:
-        """Print the square roots of the left-most eigenvalues, or rates, against the load, if the scene has them."""
+    def frequencies(self, branches: Sequence[Branch], scene: Scene) -> None:
+        """Print the square roots of the left-most eigenvalues, or rates, at about ten loads, if the scene has them."""
         points, order = [p for b in branches for p in b.points if p.omega2], scene.inertia.order
         if points:
             heads = (
@@ -261,7 +261,7 @@ class Report(Observer):
                 "Frequencies omega, the square roots of the left-most eigenvalues, against",
             )
             self.say(f"\n{heads[order - 1]} {scene.load} (errors not estimated)")
-            self._frequencies(points[:: max(1, (len(points) - 1) // (rows - 1))], scene.load, order)
+            self._frequencies(points[:: max(1, (len(points) - 1) // 10)], scene.load, order)
 
     def _frequencies(self, shown: Sequence[Point], load: str, order: int) -> None:
         table = [_roots(p, self.units.omega2 ** (1.0 / order), order) for p in shown]

@@ -15,6 +15,7 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.errors import InputError
 from rodfem.file_format import LOCUS
 from rodfem.output.files import save_json
+from rodfem.output.table import plain
 from rodfem.output.words import number
 from rodfem.problem.arguments import finite
 from rodfem.problem.units import Units
@@ -126,7 +127,7 @@ class Locus:
     def data(self) -> dict[str, Any]:
         """Plain lists, numbers and strings for a file; what was not computed is None."""
         columns = {name: self.values[:, i].tolist() for i, name in enumerate(self.names)}
-        columns |= {name: _plain(getattr(self, name)) for name in COLUMNS}
+        columns |= {name: plain(getattr(self, name)) for name in COLUMNS}
         return {
             "format": LOCUS.mark(),
             **{name: getattr(self, name) for name in AS_THEY_ARE},
@@ -158,10 +159,3 @@ class Locus:
             lines.append(f"  {pair[0]:<24} {pair[1]:<24} {ordinate:<14.8g} {index:<6} {note}".rstrip())
         lines.append(f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}")
         return "\n".join([*lines, *filter(None, [self.note, COARSE * bool(self.unresolved)])])
-
-
-def _plain(table: np.ndarray) -> list:
-    """A table as lists of numbers, None where they are not finite."""
-    out = table.astype(object)
-    out[~np.isfinite(table)] = None
-    return list(out.tolist())

@@ -48,18 +48,18 @@ PARTS = {
 """Marker and line of roots that are not real."""
 
 
-def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> Path:
+def draw_frequencies(diagram: Mapping[str, Any], path: Path) -> Path:
     """Draw the square roots of the left-most eigenvalues against the load, as in Kumar & Healey (2010), figure 11."""
-    return save(figure_of(diagram, most=most), path)
+    return save(figure_of(diagram), path)
 
 
-def figure_of(diagram: Mapping[str, Any], given: Axes | None = None, most: int = 3) -> Figure:
+def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
     """Figure of the frequencies, as :func:`draw_frequencies` writes it, or that of axes that are ``given``."""
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
     about = mesh_in_words(diagram["discretization"]) + _accuracy(branches)
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(str(diagram["title"]), about, given)
-        handles = draw_into(axes, branches, most)
+        handles = draw_into(axes, branches)
         axes.set_xlabel(axis_label(diagram))
         explain(axes, handles)
     return figure
@@ -72,10 +72,10 @@ def _accuracy(branches: Sequence[Mapping[str, Any]]) -> str:
     return f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}" if found else ""
 
 
-def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
-    """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
+def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]]) -> list[Artist]:
+    """Draw the frequencies of branches, in given axes; returns entries of a legend."""
     motions, shown, ranges = dict[str, str](), set[str](), dict[str, Artist]()
-    axes.set(ylim=(0, 1.15 * max(top(b, most) for b in branches)), ylabel=r"frequency $\omega$")
+    axes.set(ylim=(0, 1.15 * max(top(b) for b in branches)), ylabel=r"frequency $\omega$")
     for branch in branches:
         for found in ranges_of(branch):
             axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
@@ -227,12 +227,12 @@ def _unstable(interval: Interval) -> list[frozenset[str]]:
     return [a | b for a, b in pairwise(kinds)]
 
 
-def top(branch: Mapping[str, Any], most: int) -> float:
-    """Greatest of critical frequencies, imaginary parts of all roots, and real parts of the ``most`` left-most ones."""
+def top(branch: Mapping[str, Any]) -> float:
+    """Greatest of critical frequencies, imaginary parts of all roots, and real parts of the three left-most ones."""
     highest = LEAST
     for pairs in branch["columns"]["omega2"]:
         # in ascending order of the real parts of the squares
         roots = np.nan_to_num(root(np.array([complex(*pair) for pair in pairs]), bool(branch.get("rates"))))
-        highest = max([highest, *roots.imag.tolist(), *roots[:most].real.tolist()])
+        highest = max([highest, *roots.imag.tolist(), *roots[:3].real.tolist()])
     critical = [abs(complex(s["omega2"])) ** 0.5 for s in branch["special"] if s.get("omega2") is not None]
     return max([highest, *critical])

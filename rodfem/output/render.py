@@ -362,7 +362,7 @@ def snapshot(
 # --- in processes
 
 
-def draw_shape_safely(states: Path, branch: str, row: int, path: Path, caption: str, limit: float = 120.0) -> str:
+def draw_shape_safely(states: Path, branch: str, row: int, path: Path, caption: str) -> str:
     """Draw as `draw_shape` does, in a process of its own, which may crash; returns a sentence on what failed."""
     command = [sys.executable, "-P", "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
     command += [f"--output={path}", f"--caption={caption}"]
@@ -371,9 +371,9 @@ def draw_shape_safely(states: Path, branch: str, row: int, path: Path, caption: 
     home = str(Path(__file__).resolve().parents[2])
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH")]))
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120.0)
     except (OSError, subprocess.TimeoutExpired) as error:
-        return f"drawing {path} did not end within {limit:g} s ({type(error).__name__}): {LIBRARIES}"
+        return f"drawing {path} did not end within 120 s ({type(error).__name__}): {LIBRARIES}"
     if done.returncode < 0:
         return f"drawing {path} crashed with signal {-done.returncode}: {LIBRARIES}"
     reason = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]

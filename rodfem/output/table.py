@@ -37,7 +37,7 @@ def plain(value: Any) -> Any:
         return value
     if np.ndim(value):
         return [plain(each) for each in value]
-    return float(value) if np.isfinite(value) else None
+    return np.asarray(value).item() if np.isfinite(value) else None
 
 
 def _soft(attribute: str, point: Point) -> list[Any]:

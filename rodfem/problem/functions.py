@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
 T = TypeVar("T")
-Vector = Sequence[Any]
 Place = SimpleNamespace
 Quaternion = tuple[float, float, float, float]
 Given: TypeAlias = Any  # a function of the constants ``c``, or a constant in the place of one; None if there is none
@@ -225,7 +224,6 @@ class Constants(SimpleNamespace):
         raise UnnamedError(f"asks for a constant {name!r}: add it, or choose one of {', '.join(known)}.")
 
 
-OfConstants = Callable[[Constants], Vector]
 OfPlace = Callable[[Place, Constants], Any]
 
 

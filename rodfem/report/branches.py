@@ -25,6 +25,7 @@ from rodfem.output.pieces import endings, pieces_of
 from rodfem.output.plot_diagram import between
 from rodfem.output.plot_frequencies import SPECIAL, curves, ranges_of, top
 from rodfem.output.plot_locus import LINES, in_words, plane_of, stable_region
+from rodfem.output.table import plain
 from rodfem.output.words import number, readings_of, with_unit, words_of
 from rodfem.tolerances import NEGLIGIBLE, SAME_LOAD, same_special
 from rodfem.writhe import writhe
@@ -165,7 +166,7 @@ def _frequencies(branch: Data) -> dict[str, Any]:
             for special in branch["special"]
             if special["kind"] in SPECIAL
         ],
-        "top": top(branch, 3),
+        "top": top(branch),
     }
 
 
@@ -276,11 +277,6 @@ def packed(array: ArrayLike) -> dict[str, Any]:
     """Shape and values of an array, as ``data.js`` unpacks them: little-endian single precision."""
     values = np.asarray(array, dtype="<f4")
     return {"shape": list(values.shape), "f32": b64encode(values.tobytes()).decode()}
-
-
-def plain(values: ArrayLike) -> list[float | None]:
-    """Numbers (n,) as JSON has them: null where one is not finite."""
-    return [float(x) if np.isfinite(x) else None for x in np.asarray(values, dtype=float)]
 
 
 def script_json(data: Any) -> str:

@@ -22,12 +22,12 @@ from rodfem.output.plot_modes import GROWTH, drawn_size
 from rodfem.output.render import axes_of, thickness
 from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
-from rodfem.output.table import reactions_by_name
+from rodfem.output.table import plain, reactions_by_name
 from rodfem.output.words import eigenvalue_in_words
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import CONSTRAINTS, FOUNDATION, SUPPORTS, Setting
 from rodfem.problem.setting import read as read_setting
-from rodfem.report.branches import branch_data, packed, plain
+from rodfem.report.branches import branch_data, packed
 from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
 
 Floats = NDArray[np.float64]

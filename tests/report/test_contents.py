@@ -12,8 +12,9 @@ from scipy.integrate import quad
 
 from rodfem.modes.modes import RIGID
 from rodfem.output.plot_frequencies import curves
+from rodfem.output.table import plain
 from rodfem.output.words import readings_of, words_of
-from rodfem.report.branches import _spectrum, _without_noise, html_of, packed, plain, plain_of, script_json
+from rodfem.report.branches import _spectrum, _without_noise, html_of, packed, plain_of, script_json
 from rodfem.report.rods import shapes_of
 from rodfem.writhe import writhe
 
