@@ -180,33 +180,43 @@ def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]
     Each is taken once more as that in which what it finds is seen from the branch point.  The orthonormal null vectors,
     ``ways``, are returned where nothing is found.
     """
+    for reach in (CLOSE, STEEP):  # a load may change much faster than the state
+        if found := _weights(solver, special.point.x, ways, reach):
+            return [combine(list(ways), weights) for weights in found]
+    return list(ways)
+
+
+def _weights(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], reach: float) -> list[np.ndarray]:
+    """Weights (n,) of the directions; states are a ``reach`` from their predictions at most, in amplitudes."""
     n, found = len(ways), list[np.ndarray]()
     if n == 2:
         least = TOLERANCE * FIRST * solver.system.stiffness_scale
-        zeros = np.array(_zeros(lambda angle: _force(solver, special.point.x, ways, angle), least))
+        zeros = np.array(_zeros(lambda angle: _force(solver, origin, ways, angle, reach), least))
         tried = np.stack([np.cos(zeros), np.sin(zeros)], axis=1)
     else:
         tried = np.concatenate([np.eye(n), np.random.default_rng(n).normal(size=(12 * (n - 1), n))])
     for weights in tried:
-        seen = _seen(solver, special.point.x, ways, weights / np.linalg.norm(weights))
-        seen = seen if seen is None else _seen(solver, special.point.x, ways, seen)
+        seen = _seen(solver, origin, ways, weights / np.linalg.norm(weights), reach)
+        seen = seen if seen is None else _seen(solver, origin, ways, seen, reach)
         if seen is not None and all(abs(seen @ known) < 0.999 for known in found):
             found.append(seen)
-    return [combine(list(ways), weights) for weights in found] or list(ways)
+    return found
 
 
-def _seen(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], weights: np.ndarray) -> np.ndarray | None:
+def _seen(
+    solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], weights: np.ndarray, reach: float
+) -> np.ndarray | None:
     """Weights (n,) of the direction in which an equilibrium is, that is found in that of others; None without one."""
     direction = combine(list(ways), weights)
     x = origin + direction * FIRST
-    if not correct(solver.system, x, solver.row(direction), reach=CLOSE * FIRST).converged:
+    if not correct(solver.system, x, solver.row(direction), reach=reach * FIRST).converged:
         return None
     away = solver.system.metric * (x - origin)
     seen = np.array([away.dot(way) for way in ways])
     return np.asarray(seen / np.linalg.norm(seen))
 
 
-def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], angle: float) -> float:
+def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], angle: float, reach: float) -> float:
     """Force that holds the rod at an ``angle`` from the first of two ``ways``; nan where there is no such state."""
     system = solver.system
     along, across = (combine(list(ways), np.array([np.cos(t), np.sin(t)])) for t in (angle, angle + np.pi / 2))
@@ -226,7 +236,7 @@ def _force(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], a
         x.axpy(-1.0, step)
         return Correction(system.distance(x, begin), system.norm(step))
 
-    return force if newton(iteration, Limits(reach=CLOSE * FIRST)).converged else float("nan")
+    return force if newton(iteration, Limits(reach=reach * FIRST)).converged else float("nan")
 
 
 def _zeros(force: Callable[[float], float], least: float) -> list[float]:

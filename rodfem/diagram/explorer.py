@@ -193,8 +193,9 @@ class Explorer(Tracer):
         self.use(special.point.mesh)
         self.solver.damp(special.point.zero - self.solver.system.active_drifts(special.point.x) - special.multiplicity)
         ways = directions(self.solver, special)
-        before, firsts = len(self.branches), list[Point]()
-        for direction in self._lines(special, ways):
+        before, firsts, leaving = len(self.branches), list[Point](), 0
+        found = self._lines(special, ways)
+        for direction in found:
             self.use(special.point.mesh)
             self._law(special, direction)
             for sign in (1.0, -1.0):
@@ -202,9 +203,16 @@ class Explorer(Tracer):
                     break
                 self.use(special.point.mesh)
                 branch = self._leaving_along(parent, i, direction * sign, len(ways))
+                leaving += branch is not None
                 if branch is not None and self._is_new(parent, branch, firsts, before):
                     self.trace(branch)
         self._classify_from_the_side(special, self.branches[before:])
+        if len(found) > 1 and leaving > len(firsts) and not self._enough():
+            said = (
+                f"  {leaving} branches leave {parent.name} at {special.point.load:.8g} in {len(found)} directions: "
+                f"{leaving - len(firsts)} are images of the others by symmetries of the rod, and are not traced."
+            )
+            self.observer.note(Remark(said, special.point.load, branch=parent.name))
 
     def _leaving_along(self, parent: Branch, i: int, direction: PETSc.Vec, ways: int) -> Branch | None:
         """Branch that leaves the special point ``i`` of a parent along a direction, one of ``ways``, in the range."""

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from classics import column
 from problem.test_docs import scenes
 
 import rodfem
-from rodfem import Discretization, Observer, Ordinate, Plan, Ring, Scene, StepControl, trace
+from rodfem import Discretization, End, Observer, Ordinate, Plan, Ring, Scene, StepControl, clamped, trace
 from rodfem.deflation.symmetries import Mirror
 from rodfem.diagram.special_search import PARTS, SHORTER, SpecialSearch, Unresolved
 from rodfem.forms.energy import bending_and_twist
@@ -106,3 +107,16 @@ def test_no_image_without_a_symmetry() -> None:
     assert all(branch.image == "" for branch in found)  # multipliers along the rod have signs that nobody knows
     absolute = replace(PLANAR, ordinate=Ordinate("size", s=1.0, of=lambda r, q: np.hypot(r[0], r[1])))
     assert all(branch.image == "" for branch in branches(absolute))
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("n", [3, 4])
+def test_branches_by_the_symmetry_of_a_polygon_are_counted(n: int) -> None:
+    """A round column on a spring of the group D_n at its tip: 2 n half branches, of two kinds."""
+    tip = {3: lambda x: x[0] ** 3 - 3 * x[0] * x[1] ** 2, 4: lambda x: x[0] ** 4 + x[1] ** 4}[n]
+    ends = clamped(), End(force=lambda c: (0.0, 0.0, -c.P), energy=lambda u, c: tip(u.r))
+    rod = column("polygon", ends, (2.0, 3.0), constants={"B2": 1.0})
+    diagram = trace(rod, Discretization("auto", 4, 4), Plan(depth=1))
+    (said,) = diagram.notes
+    assert f"{2 * n} branches leave straight at 2.4674" in said and f"{2 * n - 2} are images of the others" in said
+    assert len(diagram.branches) == 3
