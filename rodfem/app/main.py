@@ -33,7 +33,7 @@ constants. Where the file has several, --scene names one. A function with '-> Di
 its mesh, where no option asks for another. Options that are left out are those of the file's own Discretization and
 Plan: with which it runs its rod itself, or the only ones in it.
 
-rodfem run FILE.py --help lists all options of the rod.
+rodfem run FILE.py --help lists all options of the rod. Both execute the file, as far as a run of its own.
 """
 
 

@@ -32,6 +32,14 @@ TURNED = 0.3  # angle, in radian, between neighbours that may be a jump
 
 def check_scene(scene: Scene) -> None:
     """Check places, functions, supports and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
+    try:
+        _check_scene(scene)
+    except RecursionError:
+        deep = "A function of the scene has conditionals nested deeper than UFL can follow"
+        raise SceneError(f"{deep}: give a table, as in rodfem.tabulated(s, values), or fewer of them.") from None
+
+
+def _check_scene(scene: Scene) -> None:
     if scene.planar not in (None, "e1", "e2"):
         raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
     check_places(scene)

@@ -157,7 +157,8 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
 def named(pencil: Pencil, equations: Sequence[str], w: np.ndarray) -> str:
     """Constraints whose gradients cancel with multipliers ``w`` (p,); ``equations`` are words for the scalar ones."""
     w, words = abs(w) / np.linalg.norm(w), list[str]()
-    for name, what in NAMES.items():
+    fields = {name: f"constraint {name[1:]} along the rod" for name in pencil.where if name[1:].isdigit()}
+    for name, what in (NAMES | fields).items():
         columns = pencil.where.get(name, np.zeros(0, dtype=int))
         if not (w[columns] ** 2).sum() > 0.01:
             continue

@@ -273,3 +273,19 @@ def test_numbers() -> None:
 def test_both_formulations_and_factors(mesh: Discretization) -> None:
     load, error, warnings = found(column(tabulated(np.linspace(0, 1, 1001), wave(np.linspace(0, 1, 1001)))), mesh)
     assert abs(load - 2.577330385411) <= error < 1e-9 and not warnings
+
+
+def test_a_table_as_nested_conditionals_is_refused_in_a_sentence() -> None:
+    def stiffness(s: Any) -> Any:
+        value: Any = 1.0
+        for i in range(1000):
+            value = ufl.conditional(ufl.lt(s, i / 1000), 1.0 + i, value)
+        return value
+
+    with pytest.raises(SceneError, match=r"nested deeper than UFL can follow: give a table, as in rodfem.tabulated"):
+        Scene(
+            "nested", (0.0, 1.0), "unshearable and inextensible",
+            lambda v, k, c: 0.5 * stiffness(c.s) * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
+            {"P": Parameter(0.0)}, "P", (clamped(), free(lambda c: (0.0, 0.0, -c.P))),
+            Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 1.0),
+        )  # fmt: skip
