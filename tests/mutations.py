@@ -520,7 +520,7 @@ TABLE = {
     },
     "rodfem/output/table.py": {
         "not-finite-numbers-in-a-file": (
-            "return float(value) if np.isfinite(value) else None", "return float(value)",
+            "return np.asarray(value).item() if np.isfinite(value) else None", "return np.asarray(value).item()",
             "output/test_files.py output/test_formats.py output/test_foreign_files.py"),
     },
     "rodfem/output/words.py": {
