@@ -443,9 +443,8 @@ def _check(solver: BranchSolver, special: SpecialPoint) -> None:
         raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
     if special.kind.singular and not solver.conservative:
         raise InputError("The locus of a fold or a branch point needs the solver that found it.")
-    if special.kind == FLUTTER and solver.system.scene.inertia.order == 1:
-        raise InputError(
-            "The flutter of a rod with drag has no locus yet: ask for one of divergence, or give an Inertia."
-        )
-    if special.kind == FLUTTER and (special.cluster is None or special.note):
-        raise InputError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
+    if special.kind == FLUTTER:
+        unknown = "it was not found by a sweep" * (special.cluster is None)
+        rates = ["that of a rod with drag is not followed; ask for one of divergence, or give an Inertia", ""]
+        if why := special.note or unknown or rates[solver.system.scene.inertia.order - 1]:
+            raise InputError(f"This flutter has no locus: {why}.")

@@ -112,7 +112,7 @@ class CriticalLoads:
     def _step(self, a: Side, b: Side) -> list[Critical]:
         """What happens in a step, which is parted where not all of it is clear."""
         try:
-            return self._whole(a, b)
+            return (self._whole if a.spectrum.order == 2 else self._of_rates)(a, b)
         except ConvergenceError as trouble:
             if self._parted == PARTS or abs(b.load - a.load) < CLOSEST * unit(a.load, one=self.units.load):
                 self.warn(str(trouble))
@@ -123,8 +123,6 @@ class CriticalLoads:
 
     def _whole(self, a: Side, b: Side) -> list[Critical]:
         """What happens in a step that is not parted; raises :class:`ConvergenceError` where that is not clear."""
-        if a.spectrum.order == 1:
-            return self._of_rates(a, b)
         events = self.collisions.between(a, b)
         negative = [event for event in events if event.omega2 < 0]
         first, last = len(a.spectrum.negative), len(b.spectrum.negative)
@@ -148,8 +146,8 @@ class CriticalLoads:
         common = pairs_in_common(b.spectrum, a.spectrum)
         before, after = (set(side.spectrum.growing.tolist()) for side in (a, b))
         crossing = [i for i, j in common.items() if (i in after) != (j in before)]
-        places = [[crossing[i] for i in group] for group in groups(b.spectrum.values[crossing], np.inf, MULTIPLE)]
-        events = [self._oscillating(a, b, group, 1 if group[0] in after else -1) for group in places]
+        alike = groups(b.spectrum.values[crossing], np.inf, MULTIPLE)
+        events = [self._oscillating(a, b, [crossing[i] for i in group]) for group in alike]
         met = 2 * (len(after - {*common}) - len(before - {*common.values()}))
         first, last = len(a.spectrum.negative) - met, len(b.spectrum.negative)
         if met and first != last:
@@ -159,7 +157,7 @@ class CriticalLoads:
             )
         return events if first == last else events + self._diverging(a, b, first, last)
 
-    def _oscillating(self, a: Side, b: Side, places: list[int], sign: int) -> Critical:
+    def _oscillating(self, a: Side, b: Side, places: list[int]) -> Critical:
         """Load at which the mean real part of complex pairs vanishes, by their ``places`` at ``b``."""
         cluster = cluster_at(self.eigensolver.at(b.x), b.spectrum, places)
         mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, 0)
@@ -175,6 +173,7 @@ class CriticalLoads:
         inside = min(max(load, low), high)
         found = mean.measured(inside, cluster)
         uncertainty += abs(load - inside)
+        sign = 1 if places[0] in b.spectrum.growing else -1
         return Critical(FLUTTER, inside, sign * cluster.size, uncertainty, found.frequency**2, found.cluster)
 
     def _diverging(self, a: Side, b: Side, first: int, last: int) -> list[Critical]:

@@ -15,6 +15,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,10 +46,11 @@ NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")  # numbers
 PARTS = ("assembly", "solve", "stability", "location", "error bars", "modes", "setup")
 """Parts of a run whose times stand in the file."""
 MEANING = {column.name: column.words for column in COLUMNS}
-UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
-"""Meaning of ``negative`` where loads have no potential."""
-GROWING = "number of rates of decay whose real part is negative, of those found: 0 is stable"
-"""The same of a rod with drag."""
+UNSTABLE = {
+    2: "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable",
+    1: "number of rates of decay whose real part is negative, of those found: 0 is stable",
+}
+"""Meaning of ``negative`` where loads have no potential, by the order of the equations of motion in time."""
 
 
 def as_data(
@@ -58,7 +60,7 @@ def as_data(
     """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene)."""
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
-    load, ordinate, rates = scene.parameters[scene.load], scene.ordinate, scene.inertia.order == 1
+    load, ordinate, order = scene.parameters[scene.load], scene.ordinate, scene.inertia.order
     return {
         "format": DIAGRAM.mark(),
         "scene": scene.name,
@@ -77,10 +79,10 @@ def as_data(
         "discretization": mesh_of(system),
         "accuracy": accuracy,
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
-        "meaning": MEANING | ({} if scene.conservative else {"negative": GROWING if rates else UNSTABLE}),
+        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE[order]}),
         "branch_points_not_followed": not_followed(branches),
         "meshes": list(map(_mesh_data, systems)),
-        "branches": [branch_data(branch) | ({"rates": True} if rates else {}) for branch in branches],
+        "branches": list(map(partial(branch_data, rates=order == 1), branches)),
         "timing": _timing(clock, sum(len(b.points) for b in branches)) | {"ranks": system.comm.size},
     }
 

@@ -80,7 +80,7 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]]) -> list[Artist]
         for found in ranges_of(branch):
             axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
             ranges[found.words] = Patch(color=found.shade, label=found.words)
-        for curve in curves(branch["columns"], branch["special"], rates=bool(branch.get("rates"))):
+        for curve in curves_of(branch):
             shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
         shown |= _marked(axes, branch["special"])
     looks: dict[str, dict[str, Any]] = {
@@ -170,7 +170,7 @@ def curves(
 ) -> list[FrequencyCurve]:
     """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve.
 
-    By its ``columns`` and ``special`` points; ``rates`` are smooth at these.
+    By its ``columns``, and ``special`` points that have square roots there.
     """
     found: dict[int, list[Member]] = {}
     rows = zip(*(columns[name] for name in ("load", "omega2", "motion", "curve")), strict=True)
@@ -178,14 +178,19 @@ def curves(
         for pair, motion, number in zip(*modes, strict=True):
             mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
             found.setdefault(number, []).append((load, row, mu, motion))
-    flutter = [p for p in special if p["kind"] == FLUTTER and p.get("omega2") is not None and not rates]
-    met = {p["row"]: float(p["omega2"]) for p in flutter}
+    met = {p["row"]: float(p["omega2"]) for p in special if p["kind"] == FLUTTER and p.get("omega2") is not None}
     out = []
     for each in found.values():
         loads, places, values, motions = zip(*sorted(_with_roots(each, met), key=lambda x: x[0]), strict=True)
         roots = root(np.array(values, dtype=np.complex128), rates)
         out.append(FrequencyCurve(Counter(motions).most_common(1)[0][0], np.array(loads), np.array(places), roots))
     return sorted(out, key=lambda curve: (curve.motion, np.nan_to_num(abs(curve.roots[0]))))
+
+
+def curves_of(branch: Mapping[str, Any]) -> list[FrequencyCurve]:
+    """The same of all that a branch has; rates are smooth at its special points."""
+    rates = bool(branch.get("rates"))
+    return curves(branch["columns"], () if rates else branch["special"], rates=rates)
 
 
 def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Member]:
@@ -219,11 +224,12 @@ def _unstable(interval: Interval) -> list[frozenset[str]]:
     rows = interval.branch["columns"]["omega2"][interval.first : interval.last + 1]
     values = [[complex(*v) for v in row] for row in rows]
     least, kinds = REAL * max(abs(v) for row in values for v in row), []
+    bound = (np.inf, -least)[bool(interval.branch.get("rates"))]
     for row in values:
-        bound = -least if interval.branch.get("rates") else np.inf
-        flutter = any(abs(v.imag) > REAL * abs(v) and v.real < bound for v in row)
-        divergence = any(v.real < -least and abs(v.imag) <= REAL * abs(v) for v in row)
-        kinds.append(frozenset([FLUTTER] * flutter + [DIVERGENCE] * divergence))
+        mu = np.array(row)
+        oscillates = abs(mu.imag) > REAL * abs(mu)
+        flutter, divergence = (oscillates & (mu.real < bound)).any(), (~oscillates & (mu.real < -least)).any()
+        kinds.append(frozenset([FLUTTER] * int(flutter) + [DIVERGENCE] * int(divergence)))
     return [a | b for a, b in pairwise(kinds)]
 
 

@@ -108,8 +108,8 @@ REMARK = _entries("remarks", {"sentence": str})
 # --- files
 
 
-def branch_data(branch: Branch) -> dict[str, Any]:
-    """A branch as ``diagram.json`` has it."""
+def branch_data(branch: Branch, rates: bool = False) -> dict[str, Any]:
+    """A branch as ``diagram.json`` has it, whose eigenvalues may be ``rates`` of decay."""
     rows = {id(p): i for i, p in enumerate(branch.points)}
     values = [[entry.value(point) for entry in COLUMNS] for point in branch.points]  # a state keeps what it derives
     columns = dict(zip(COLUMNS, map(list, zip(*values, strict=True)), strict=True))
@@ -122,7 +122,7 @@ def branch_data(branch: Branch) -> dict[str, Any]:
         "singular_start": branch.singular_start,
         "image": branch.image,
         "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
-    }
+    } | ({"rates": True} if rates else {})
 
 
 def reactions_by_name(values: Sequence[Any]) -> dict[str, Any]:

@@ -114,6 +114,10 @@ class Inertia:
         if self.rho_A is not _massless and self.rho_I is _unit_rotary:
             object.__setattr__(self, "rho_I", _no_rotary)
 
+    def others(self, c: Constants) -> tuple[Any, ...]:
+        """What else there is than ``rho_A``."""
+        return tuple(self.rho_I(c))
+
 
 @dataclass(frozen=True)
 class Drag:
@@ -139,6 +143,10 @@ class Drag:
     def rho_I(self) -> Given:
         """What stands in the place of a rotary inertia."""
         return self.turning
+
+    def others(self, c: Constants) -> tuple[Any, ...]:
+        """What else there is than ``rho_A``."""
+        return (*self.turning(c), *([self.along(c)] if self.along else []))
 
 
 AT_A_POINT = Role(
@@ -525,9 +533,8 @@ class Scene(Contribution, metaclass=Stated):
         """Whether a mass or a rotary inertia, along the rod or attached to it, is a function of the load."""
         c, asked = watched(self.constants())
         attached = (f for x in self.attachments for f in (x.mass, x.rotary_inertia) if f)
-        for function in (self.inertia.rho_A, self.inertia.rho_I, self.inertia.along, *attached):
-            if function:
-                function(c)
+        for function in (self.inertia.rho_A, self.inertia.others, *attached):
+            function(c)
         return self.load in asked
 
     @cached_property

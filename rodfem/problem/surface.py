@@ -74,11 +74,11 @@ def acting(constraint: Constraint, scene: Scene) -> Constraint:
     turns, moves = (np.array([_slope(constraint, scene, x, y) for x in STATES[:2]]).any(axis=0) for y in ("q", "r"))
     if turns.any() or not moves.any():
         return constraint
-    held = [end.held(scene.constants()) for end in scene.sides]
-    on_it = [all(i == scene.normal or side[i] is not None for i in np.flatnonzero(moves)) for side in held]
+    held = [[x is not None for x in end.held(scene.constants())] for end in scene.sides]
+    on_it = (np.array(held) | (np.arange(3) == scene.normal) | ~moves).all(axis=1)
     tangent = _in_surface(constraint, scene, 0), _in_surface(constraint, scene, 1)
-    spare = scene.closed or all(on_it)
-    return Surface(constraint.of, nodal=True, floating=not any(on_it), spare=spare, tangent=tangent)
+    spare = bool(scene.closed | on_it.all())
+    return Surface(constraint.of, nodal=True, floating=not on_it.any(), spare=spare, tangent=tangent)
 
 
 def _slope(constraint: Constraint, scene: Scene, state: Sequence[Any], name: str) -> np.ndarray:

@@ -51,17 +51,22 @@ def _check_scene(scene: Scene) -> None:
     check_drift(scene)
     check_reach(scene)
     check_convexity(scene)
-    heavy = [x.s for x in scene.attachments if x.mass or x.rotary_inertia]
-    if heavy and scene.inertia.order == 1:
-        raise SceneError(
-            f"A mass is attached at s = {heavy[0]:g} to a rod with drag: leave it out, or give an Inertia."
-        )
+    check_drag(scene)
     for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
         if trouble := trouble_with_inertia(scene, load):
             raise SceneError(trouble)
     if (values := ordinates(scene)) and not any(map(isfinite, values)):
         raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
     check_plane(scene)
+
+
+def check_drag(scene: Scene) -> None:
+    """Raise :class:`SceneError` where a mass is attached to a rod that has drag for its inertia."""
+    heavy = [x.s for x in scene.attachments if x.mass or x.rotary_inertia]
+    if heavy and scene.inertia.order == 1:
+        raise SceneError(
+            f"A mass is attached at s = {heavy[0]:g} to a rod with drag: leave it out, or give an Inertia."
+        )
 
 
 def check_load(scene: Scene) -> None:
@@ -164,8 +169,7 @@ def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[flo
     masses = [float(x.mass(c)) for x in scene.attachments if x.mass]
     masses += [number_of(scene.inertia.rho_A(there)) for there in along]
     rotary = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    rotary += [number_of(x) for there in along for x in scene.inertia.rho_I(there)]
-    masses += [number_of(scene.inertia.along(there)) for there in along if scene.inertia.along]
+    rotary += [number_of(x) for there in along for x in scene.inertia.others(there)]
     return masses, rotary
 
 

@@ -109,6 +109,6 @@ def test_sentences() -> None:
     with pytest.raises(SceneError, match="of -1 is negative"):
         replace(FILAMENT, inertia=Drag(along=-1.0))
     diagram = rodfem.trace(replace(FILAMENT, span=(35.0, 40.0)), plan=Plan(error_bars=False))
-    with pytest.raises(InputError, match="rod with drag has no locus"):
+    with pytest.raises(InputError, match="has no locus: that of a rod with drag is not followed"):
         diagram.locus(diagram.special("flutter")[0], "part", (0.9, 1.0))
     assert FILAMENT.inertia != Inertia()
