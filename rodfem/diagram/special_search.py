@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import chain
@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes
 from rodfem.continuation.arc import Piece
-from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.crossings import Node, Zeros, fourth
 from rodfem.continuation.kinds import IMPERFECT
 from rodfem.continuation.observer import Observer, Remark
@@ -58,6 +58,7 @@ class SpecialSearch:
         self._phi: np.ndarray | None = None
         self._mesh = -1
         self._known: dict[int, tuple[Point, ReducedStiffness]] = {}
+        self._lost: list[tuple[Point, Point]] = []
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
@@ -201,10 +202,17 @@ class SpecialSearch:
         return sorted(out, key=lambda special: special.point.arclength)
 
     def _missing(self, a: Point, b: Point, *, ended: bool) -> None:
-        """Ask for shorter steps where a crossing has no singular state, or say so."""
+        """Ask for shorter steps where a crossing has no singular state, or remember it."""
         if not ended:
             self._shorten(a, b)
-        self.observer.warn(Remark(missing(a.load, b.load), a.load, b.load))
+        self._lost.append((a, b))
+
+    def unlocated(self, branch: Branch) -> Iterator[Remark]:
+        """Yield a sentence on each step with a crossing that was not located, on no mesh of the ``branch``."""
+        loads, lost, self._lost = [s.point.load for s in branch.special if s.kind.singular], self._lost, []
+        for a, b in lost:
+            if not any((x - a.load) * (x - b.load) <= 0 for x in loads):
+                yield Remark(missing(a.load, b.load), a.load, b.load)
 
     def _dip(self, piece: Piece, p: Node, q: Node, *, found: bool) -> None:
         """Look for a branch point taken apart where the eigenvalue nearest zero is least at a row."""
@@ -273,7 +281,7 @@ class SpecialSearch:
         return special
 
     def _imperfect(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> SpecialPoint:
-        """The branch point at a state whose unfolding parameters are not round-margin."""
+        """The branch point at a state whose unfolding parameters are not round-off."""
         gap = self._open_gap(piece, at, found, ended=ended)
         special = special_point(piece, at, found, fold=False)
         if gap is not None:
@@ -281,7 +289,7 @@ class SpecialSearch:
         return special
 
     def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> Gap | None:
-        """The gap at a singular state whose unfolding parameters are not round-margin; raised unless it is known."""
+        """The gap at a singular state whose unfolding parameters are not round-off; raised unless it is known."""
         gap = self.gaps.examine(special_point(piece, at, found, fold=False), found)
         if gap is not None and not ended and self.gaps.open(gap, piece.solver):
             raise gap

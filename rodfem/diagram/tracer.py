@@ -363,8 +363,9 @@ class Tracer:
         self._soft_modes(branch)
         self.quadrature.examine(branch)
         branch.image = image_of(branch, self.solver)
-        for change in branch.unexplained:
-            self.observer.warn(Remark(str(change), change.a.load, change.b.load))
+        changes = (Remark(str(change), change.a.load, change.b.load) for change in branch.unexplained)
+        for remark in (*self.specials.unlocated(branch), *changes):
+            self.observer.warn(remark)
         self.observer.finished(branch)
         self.control.summary(branch, self.observer)
         self.finished()
