@@ -271,6 +271,8 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
     add("--search", dest="tries", type=int, metavar="TRIES", help=words)
     words = "follow every special point in the plane of the load and the constant NAME from LOW to HIGH"
     add("--locus", nargs=3, metavar=("NAME", "LOW", "HIGH"), help=words)
+    words = "compute how fast the load of each special point changes with each constant"
+    add("--sensitivity", action="store_true", default=None, help=words)
 
     add = parser.add_argument_group("output").add_argument
     words = f"folder for files and pictures (default {output})"

@@ -33,6 +33,7 @@ from rodfem.modes.modes import Modes, save_modes
 from rodfem.output.files import load_json, save_json, save_run
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
+from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
 from rodfem.stability.assessment import Assessor, Verdict
@@ -144,10 +145,13 @@ class Terminal(Report):
         """Print tables, do what the plan asks for beyond branches, and draw the pictures if ``figures``."""
         scene, plan, output, branches = diagram.scene, self.plan, self.output, diagram.branches
         self.complete(diagram)
+        if plan.sensitivity:
+            self._derive(diagram)
         data = self.data = diagram.data
         self._name()
         self.summary(data)
         self.table(data, branches, plan.most_branches)
+        self.derivatives(branches, scene)
         self.spectra(branches, scene)
         self.frequencies(branches, scene)
         self.timing(diagram.clock, sum(len(b.points) for b in branches))
@@ -164,6 +168,14 @@ class Terminal(Report):
         self.data = data | diagram.remarks | {"complete": True}
         with held():
             self._name()
+
+    def _derive(self, diagram: Diagram) -> None:
+        """Find the derivative of the load of each special point in each constant that the equations depend on."""
+        asked = asked_for(diagram.scene) - {diagram.scene.load, "s"}
+        for branch in diagram:
+            for special, name in product(_to_follow(branch), sorted(asked)):
+                with self._without(diagram, branch, special):
+                    diagram.derivative(special, name)
 
     def _assess(self, diagram: Diagram, figures: bool) -> None:
         """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""

@@ -26,7 +26,17 @@ from rodfem.forms.kinematics import RODS
 from rodfem.modes.modes import Modes
 from rodfem.output.summary import called, in_sentences
 from rodfem.output.table import row_data, special_data
-from rodfem.output.words import COUNT, INDEX, in_decimals, index_in_words, is_estimated, rounded_up, table_of, with_unit
+from rodfem.output.words import (
+    COUNT,
+    INDEX,
+    in_decimals,
+    index_in_words,
+    is_estimated,
+    number,
+    rounded_up,
+    table_of,
+    with_unit,
+)
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -239,6 +249,16 @@ class Report(Observer):
         self.say("\nIn words (rodfem explain WORD has more)")
         for sentence in in_sentences(data):
             self.say(fill(sentence, WIDTH, initial_indent="  ", subsequent_indent="    "))
+
+    def derivatives(self, branches: Sequence[Branch], scene: Scene) -> None:
+        """Print the derivatives of the loads of special points in the constants, if they were asked for."""
+        rows = [(b.name, s) for b in branches for s in b.special if s.derivatives]
+        if rows:
+            self.say(f"\nHow fast the critical {scene.load} changes (d{scene.load}/dNAME)")
+        for name, special in rows:
+            pairs = special.derivatives.items()  # what is less than its bar is zero
+            values = "  ".join(f"{c}: {0 if abs(value) <= bar else number(value, bar)}" for c, (value, bar) in pairs)
+            self.say(f"  {name:<12} {special.kind.words:<13} {special.point.load:<13.8g} {values}")
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""

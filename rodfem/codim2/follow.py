@@ -209,7 +209,7 @@ class RicherMesh:
         """Bounds of the errors of both parameters, and whether the mesh resolves the state; or ConvergenceError."""
         near, resolved = self._transferred(node), True
         if node.sought is None:
-            found = self.criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
+            found = self.again(node)
             there, located_to = found.p, found.located_to
             resolved = self._changed(near, found) <= RESOLVED_TO
         else:
@@ -217,6 +217,11 @@ class RicherMesh:
             there, located_to = sought.p, sought.dp
         each = zip(node.p, there, node.located_to + located_to, strict=True)
         return [bound(*pair, self.rho) for pair in each], resolved
+
+    def again(self, node: LocusPoint) -> LocusPoint:
+        """The point of the richer mesh across the curve; raises :class:`ConvergenceError`."""
+        near = self._transferred(node)
+        return self.criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
 
     def _transferred(self, node: LocusPoint) -> LocusPoint:
         x, dx = self.richer.transfer(node.x, state=True), self.richer.transfer(node.dx, state=False)
@@ -249,7 +254,7 @@ def locus(
     """
     plane = Plane(solver.system, parameter, bounds)
     with solver.system.clock.scope("locus"), plane.kept():
-        curve = _Curve(solver, special, plane, doubtful=doubtful or special.resolved is False)
+        curve = Curve(solver, special, plane, doubtful=doubtful or special.resolved is False)
         curve.follow(steps)
         found = curve.locus(*curve.errors(error_bars))
         found.crossings = [(n.load, n.ordinate) for n in curve.rows(1, float(curve.first.p[1]))]
@@ -258,7 +263,7 @@ def locus(
     return found
 
 
-class _Curve:
+class Curve:
     """The curve of a special point of a diagram, the ``first`` one, in a plane: ``nodes`` with ``marks`` by number."""
 
     def __init__(self, solver: BranchSolver, special: SpecialPoint, plane: Plane, *, doubtful: bool) -> None:

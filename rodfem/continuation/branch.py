@@ -255,6 +255,9 @@ class SpecialPoint:
     cluster: Cluster | None = None  #: the eigenvalues that collide
     event: Event | Level | None = None  #: the event that happens here, of those that the plan asks for
     bounds: Callable[[], dict[str, np.ndarray]] = dict  #: computes :attr:`errors`, once
+    derivatives: dict[str, tuple[float, float]] = field(
+        default_factory=dict
+    )  #: of the load, and bounds of their errors
 
     @property
     def errors(self) -> dict[str, np.ndarray]:

@@ -174,6 +174,17 @@ class SingularSystem:
         sides, *_ = self._modes(self.inertia.at(x).matrix)
         return sides[0], sides[-1]
 
+    def adjoint(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], PETSc.Vec | None, float]:
+        """Null vectors ``v`` at a solution, ``y`` with ``S y = -sum D(S v) v``, and the rate of the eigenvalues' sum.
+
+        Of a fold, which has no ``y``, the rate is the work of the load along the null vector.
+        """
+        at = self._linear(x, 0.0, sharp=True)
+        null = [combine(at.V, z) for z in at.Z.T]
+        if self.fold:
+            return null, None, float(at.columns[0].dot(null[0]))
+        return null, self._bordered[0].solve(-at.y, np.zeros(len(self.psi)))[0], float(at.rows[-1, 1])
+
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
         found = self._newton(x, section)
@@ -248,7 +259,7 @@ class SingularSystem:
         solved = [bordered.modes() for bordered in self._bordered]
         return [V for V, _ in solved], solved[0][1], counts[0]
 
-    def _linear(self, x: PETSc.Vec, t: float, old: _Linear | None = None) -> _Linear:
+    def _linear(self, x: PETSc.Vec, t: float, old: _Linear | None = None, *, sharp: bool = False) -> _Linear:
         """Factor the bordered matrix, and solve with it; derivatives of an ``old`` linearisation serve again."""
         system, none = self.system, np.zeros(len(self.psi))
         columns = [] if self._section is None or old else [self._second(x, t)]
@@ -266,7 +277,7 @@ class SingularSystem:
             Z, N = self._split(G)
             null, left = ([combine(side, z) for z in Z.T] for side in (V, sides[-1]))
             border = np.column_stack([c, *(b for _, b in responses), G])
-            y, f = self._along_null(x, t, null, left)
+            y, f = self._along_null(x, t, null, left, sharp=sharp)
             at = _Linear([s, *(w for w, _ in responses), *V], border, columns, Z, N, left, y, f, border)
         return replace(at, rows=self._equations(x, at))
 
@@ -287,12 +298,18 @@ class SingularSystem:
         trace[0] -= np.trace(at.Z.T @ at.G @ at.Z)
         return np.vstack([forces, *([] if self.fold else [self._work(x, at, trace)]), trace])
 
-    def _along_null(self, x: PETSc.Vec, t: float, null: Vectors, lefts: Vectors) -> tuple[PETSc.Vec, np.ndarray]:
-        """Sums over the null vectors, and the left ones, of ``y`` and of ``f`` (parameters,)."""
+    def _along_null(
+        self, x: PETSc.Vec, t: float, null: Vectors, lefts: Vectors, *, sharp: bool
+    ) -> tuple[PETSc.Vec, np.ndarray]:
+        """Sums over the null vectors, and the left ones, of ``y`` and of ``f`` (parameters,).
+
+        They are central differences, of the fourth order if ``sharp``.
+        """
         y, f = self.system.new_vector(), np.zeros(1 if self._section is None else 2)
+        steps = ((1.0, 4 / 3), (-1.0, -4 / 3), (2.0, -1 / 6), (-2.0, 1 / 6)) if sharp else ((1.0, 1.0), (-1.0, -1.0))
         for v, left in zip(null, lefts, strict=True):
-            for sign in (1.0, -1.0):
-                there, share = x + v * (sign * DIFFERENCE), sign / (2 * DIFFERENCE)
+            for step, weight in steps:
+                there, share = x + v * (step * DIFFERENCE), weight / (2 * DIFFERENCE)
                 if self._section is not None:
                     f[1] += share * left.dot(self._second(there, t))
                 found = self._at(there, t, moved=True)
@@ -361,7 +378,7 @@ class SingularSystem:
         (last, share), curve, k = step, None, self.count
         changes = [1.0, *share]
         if self._section is not None:  # the derivatives so far are those of an iterate
-            at, changes = self._linear(x, t), [1.0, *np.zeros(len(share))]
+            at, changes = self._linear(x, t, sharp=True), [1.0, *np.zeros(len(share))]
         matrix = self._at(x, t).matrix
         (modes, *_), *_ = self._modes(matrix)  # of this very state
         null = [combine(modes, z) for z in at.Z.T]

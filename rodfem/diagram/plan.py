@@ -64,6 +64,8 @@ class Plan:
         Number of deflated iterations at each load of ``at``, which look for equilibria that no branch has reached.
     locus
         ``(parameter, low, high)``: every special point is followed in the plane of the load and that parameter.
+    sensitivity
+        Whether the derivatives of the loads of special points in all constants are computed.
     method
         Name of the method by which states at the loads ``at`` are assessed; empty for none.
     modes
@@ -87,6 +89,7 @@ class Plan:
     spectrum: int = 0
     tries: int = 0
     locus: tuple[str, float, float] | None = None
+    sensitivity: bool = False
     method: str = ""
     modes: int = 0
     accuracy: float | None = None
@@ -104,6 +107,7 @@ class Plan:
             spectrum=whole(4),
             tries=whole(24),
             locus=optional(_locus),
+            sensitivity=yes_or_no,
             method=a(str, "the name of one, as in method='auto'"),
             modes=whole(3),
             accuracy=optional(real(ACCURACY)),

@@ -62,6 +62,7 @@ OF_SPECIAL: dict[str, Source] = {
     **{name: attrgetter(f"point.{name}") for name in ("load", "ordinate", "energy", "zero")},
     "kind": lambda special: str(special.kind),
     "errors": lambda special: {name: plain(bar) for name, bar in special.errors.items()} or None,
+    "derivatives": lambda special: {name: [*map(plain, pair)] for name, pair in special.derivatives.items()} or None,
     "meets": lambda special: list(special.connects_to) if special.connects_to else None,
     "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
 }
@@ -164,7 +165,8 @@ def special_values(entry: Data) -> dict[str, Any]:
     """Attributes of a special point of a file, as :class:`~rodfem.continuation.branch.SpecialPoint` takes them."""
     read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")]
     values = {ATTRIBUTES.get(name, name): _number(entry.get(name)) for name in read}
-    values |= {"resolved": entry.get("resolved"), "note": entry.get("note") or ""}
+    pairs = {name: tuple(map(_number, pair)) for name, pair in (entry.get("derivatives") or {}).items()}
+    values |= {"derivatives": pairs, "resolved": entry.get("resolved"), "note": entry.get("note") or ""}
     values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
     return values | {"law": _law(entry["law"]) if entry["law"] else None}
 

@@ -1,4 +1,4 @@
-"""The programs of docs/trades and docs/how-to.md assert the numbers of others that they print."""
+"""The programs of docs/trades, docs/how-to.md and docs/design.md assert the numbers of others that they print."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from rodfem import Diagram
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / "how-to.md", *sorted((DOCS / "trades").glob("[a-z]*.md"))]
+PAGES = [DOCS / "how-to.md", DOCS / "design.md", *sorted((DOCS / "trades").glob("[a-z]*.md"))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

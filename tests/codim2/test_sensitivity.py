@@ -1,0 +1,90 @@
+"""Derivatives of critical loads, against closed forms and loads of other rods located."""
+
+from __future__ import annotations
+
+import json
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import demo_cases
+import hemitropic_cases
+import rodfem
+from rodfem import Ordinate, Parameter, Plan, Scene, clamped, sliding
+from rodfem.errors import ConvergenceError, InputError
+from rodfem.forms.energy import bending_and_twist
+
+PLAN = Plan(depth=0, error_bars=False)
+
+
+def column(push: float = 0.0) -> Scene:
+    """A column between clamps with two bending stiffnesses, and a force across its end."""
+    return Scene(
+        name="column",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (c.A, c.B, 1.0)),
+        parameters={"P": Parameter(0.0), "A": Parameter(1.0), "B": Parameter(3.0), "H": Parameter(push)},
+        load="P",
+        ends=(clamped(), sliding(lambda c: (None, 0.0, None), force=lambda c: (c.H, 0.0, -c.P))),
+        ordinate=Ordinate("shortening", s=1.0, of=lambda r, q: 1 - r[2]),
+        span=(0.0, 45.0),
+    )
+
+
+def test_of_a_column_and_along_it() -> None:
+    """w = 1 - cos 2 pi s of A at 4 pi^2 A, 1 - cos pi s of B at pi^2 B: density w''^2 / int w'^2."""
+    diagram = rodfem.trace(column(), depth=0)
+    for special, waves, name, other in zip(diagram.special("branch point"), (1, 2), "BA", "AB", strict=False):
+        found = diagram.derivative(special, name, along_the_rod=True)
+        a, b, k = found.ends[:-1], found.ends[1:], waves * pi
+        means = 2 * k**2 * (0.5 + (np.sin(2 * k * b) - np.sin(2 * k * a)) / (4 * k * (b - a)))
+        assert abs(found.value - k**2) <= found.error < 1e-7
+        assert abs(found.density - means).max() <= found.density_error < 1e-4
+        assert abs(diagram.derivative(special, other).value) < 1e-12
+    with pytest.raises(ConvergenceError, match="has no derivative: H is an imperfection"):
+        diagram.derivative(diagram.special("branch point")[0], "H")
+    with pytest.raises(InputError, match="not at"):
+        diagram.derivative(diagram.special("end")[0], "A", along_the_rod=True)
+
+
+@pytest.mark.parametrize("name", ["hemitropic", "cord"])
+def test_against_differences_of_located_loads(name: str) -> None:
+    """Of the fourth order, over a hundredth of the constant; at a double point and at single ones."""
+    scene = hemitropic_cases.scene() if name == "hemitropic" else demo_cases.scene(name)
+    parameter = {"hemitropic": "C", "cord": "k0"}[name]
+    value, h = scene.parameters[parameter].value, 1e-3 * abs(scene.parameters[parameter].value)
+
+    def loads(at: float) -> np.ndarray:
+        traced = rodfem.trace(scene.varying(**{parameter: at}), plan=PLAN)
+        return np.array([special.point.load for special in traced.special("branch point")])
+
+    diagram = rodfem.trace(scene, depth=0)
+    near = [loads(value + i * h) for i in (-2, -1, 1, 2)]
+    differences = (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / (12 * h)
+    for special, slope in zip(diagram.special("branch point"), differences, strict=True):
+        found = diagram.derivative(special, parameter)
+        assert abs(found.value - slope) <= 1e-10 * abs(slope) + found.error < 1e-6
+
+
+def test_of_a_fold_is_the_sum_along_the_rod() -> None:
+    """The tangent of the singular system, and the work of each element along the null vector."""
+    diagram = rodfem.trace(hemitropic_cases.scene(), depth=1)
+    fold = diagram.special("fold")[0]
+    for name in "AC":
+        found = diagram.derivative(fold, name, along_the_rod=True)
+        assert abs(found.density @ np.diff(found.ends) - found.value) <= found.error
+
+
+def test_of_flutter_in_the_stiffness(tmp_path: Path) -> None:
+    """Beck's load is proportional to the stiffness; printed, saved, and loaded again."""
+    scene = demo_cases.scene("follower")
+    diagram = rodfem.run(scene, plan=Plan(sensitivity=True), output=tmp_path, figures=False, quiet=True)
+    (flutter,) = diagram.special("flutter")
+    value, error = flutter.derivatives["B1"]
+    assert abs(value - flutter.point.load) <= error < 1e-6
+    saved = json.loads((tmp_path / "diagram.json").read_text())
+    assert [value, error] in [s["derivatives"]["B1"] for s in saved["branches"][0]["special"] if s["derivatives"]]
+    assert rodfem.load(tmp_path, scene).special("flutter")[0].derivatives["B1"] == (value, error)
