@@ -151,10 +151,8 @@ class CriticalLoads:
         met = 2 * (len(after - {*common}) - len(before - {*common.values()}))
         first, last = len(a.spectrum.negative) - met, len(b.spectrum.negative)
         if met and first != last:
-            raise ConvergenceError(
-                f"What becomes of the rates between {self._load} = {a.load:.6g} and {b.load:.6g} is not clear: use a "
-                "smaller range."
-            )
+            where = f"{self._load} = {a.load:.6g} and {b.load:.6g}"
+            raise ConvergenceError(f"What becomes of the rates between {where} is not clear: use a smaller range.")
         return events if first == last else events + self._diverging(a, b, first, last)
 
     def _oscillating(self, a: Side, b: Side, places: list[int]) -> Critical:
@@ -164,11 +162,9 @@ class CriticalLoads:
         low, high = sorted((a.load, b.load))
         near = min((low, high), key=lambda load: abs(mean(load)))
         if abs(mean(near)) > a.spectrum.zero:
-            try:
-                near = zero_between(mean, low, high, CLOSEST * (high - low))
-            except ValueError as trouble:
-                words = f"A pair was lost between {low:.6g} and {high:.6g}: use a smaller range."
-                raise ConvergenceError(words) from trouble
+            if mean(low) * mean(high) > 0.0:
+                raise ConvergenceError(f"A pair was lost between {low:.6g} and {high:.6g}: use a smaller range.")
+            near = zero_between(mean, low, high, CLOSEST * (high - low))
         load, uncertainty = interpolated_zero(mean, near, self.units.load)
         inside = min(max(load, low), high)
         found = mean.measured(inside, cluster)

@@ -46,10 +46,10 @@ NATURAL = ("load", "ordinate", "length", "force", "moment", "energy")  # numbers
 PARTS = ("assembly", "solve", "stability", "location", "error bars", "modes", "setup")
 """Parts of a run whose times stand in the file."""
 MEANING = {column.name: column.words for column in COLUMNS}
-UNSTABLE = {
-    2: "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable",
-    1: "number of rates of decay whose real part is negative, of those found: 0 is stable",
-}
+UNSTABLE = (
+    "number of rates of decay whose real part is negative, of those found: 0 is stable",
+    "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable",
+)
 """Meaning of ``negative`` where loads have no potential, by the order of the equations of motion in time."""
 
 
@@ -79,7 +79,7 @@ def as_data(
         "discretization": mesh_of(system),
         "accuracy": accuracy,
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
-        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE[order]}),
+        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE[order - 1]}),
         "branch_points_not_followed": not_followed(branches),
         "meshes": list(map(_mesh_data, systems)),
         "branches": list(map(partial(branch_data, rates=order == 1), branches)),

@@ -134,15 +134,8 @@ class Drag:
     along: Given = role_field(Role("drag along the rod per length", "f(c)", 0, along=True))
     turning: Given = role_field(Role("drag of turning per length", "f(c)", 3, along=True), _no_rotary)
 
-    @property
-    def rho_A(self) -> Given:
-        """What stands in the place of a mass."""
-        return self.across
-
-    @property
-    def rho_I(self) -> Given:
-        """What stands in the place of a rotary inertia."""
-        return self.turning
+    rho_A = property(lambda self: self.across)  # in the place of a mass, and of a rotary inertia
+    rho_I = property(lambda self: self.turning)
 
     def others(self, c: Constants) -> tuple[Any, ...]:
         """What else there is than ``rho_A``."""

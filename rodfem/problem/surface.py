@@ -27,15 +27,14 @@ from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY
 from rodfem.problem.arguments import number_of
 from rodfem.problem.contribution import Block, Constraint, Everywhere, Group, Motion, Site, Unknown
-from rodfem.problem.functions import STATES, Constants, inside, place, places_at
+from rodfem.problem.functions import STATES, inside, place, places_at
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD
+from rodfem.tolerances import SAME_PLACE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-TURNED = 1e-6
-"""Sine of the angle between the normal of a surface and that of what a hinge turns in, of parallel ones."""
 MEAN = Group("h", "mean pressure of surfaces", "surface {} of the scene", Motion.MIXED)
 
 
@@ -60,9 +59,9 @@ class Surface(Everywhere):
 
     def lagrangian(self, at: Site) -> Iterator[Any]:
         """Terms of both multipliers."""
-        x, r, s = at.x, ufl.variable(at.x.r), ufl.variable(at.c.s)
-        g = ufl.as_ufl(self.of(place(x.q, x.R, s, r, length=x.length), Constants(**vars(at.c) | {"s": s})))
-        yield at.y[-1] * (ufl.dot(ufl.diff(g, r), x.tangent) + ufl.diff(g, s))
+        x, r = at.x, ufl.variable(at.x.r)
+        g = ufl.as_ufl(self.of(place(x.q, x.R, x.s, r, length=x.length), at.c))
+        yield at.y[-1] * (g.dx(0) + ufl.dot(ufl.diff(g, r), x.tangent - at.x.r.dx(0)))
         if self.floating:
             yield at.y[0] * g / x.length
 
@@ -99,4 +98,4 @@ def _in_surface(constraint: Constraint, scene: Scene, side: int) -> bool:
         normal = _slope(constraint, scene, (IDENTITY, r, UNDEFORMED, (0.0, 0.0, 0.0)), "r")
     except ArithmeticError:  # at no place of the surface
         return True
-    return abs(float(normal @ np.cross(d @ end.hinge, d[:, 2]))) <= TURNED * float(np.linalg.norm(normal))
+    return abs(float(normal @ np.cross(d @ end.hinge, d[:, 2]))) <= SAME_PLACE * float(np.linalg.norm(normal))

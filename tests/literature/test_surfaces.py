@@ -8,7 +8,20 @@ import pytest
 import ufl
 
 import rodfem
-from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped, everywhere, free, hinged, pinned, sliding
+from rodfem import (
+    Discretization,
+    Ordinate,
+    Parameter,
+    Plan,
+    Scene,
+    clamped,
+    everywhere,
+    free,
+    hinged,
+    pinned,
+    sliding,
+    tabulated,
+)
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.ranks
@@ -90,6 +103,26 @@ def test_a_rod_pulled_over_a_sphere(left: str) -> None:
     assert np.allclose(point.moment, (0.0, 1 / R, 0.0), atol=1e-7)
     assert np.allclose(point.reactions.left.force, (0.0, 0.0, -tension), atol=1e-7)
     assert np.allclose(point.reactions.right.force, -np.multiply(tangent, 1 / R**2), atol=1e-7)
+
+
+WAVE, ROWS = 0.05, np.linspace(0.0, 1.0, 41)
+TABLE = tabulated(ROWS, WAVE * np.sin(np.pi * ROWS) ** 2, order=3)
+HEIGHTS = {"formula": (lambda s: WAVE * ufl.sin(np.pi * s) ** 2, 1e-6), "table": (TABLE, 2e-3)}
+
+
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_a_surface_along_the_rod(height: str) -> None:
+    """Its curvature at the crest, where the height has no slope, is the second derivative of that."""
+    of, accuracy = HEIGHTS[height]
+    origin = (0.0, 0.0, 0.0)
+    bent = replace(
+        TUBE, distributed=None, ends=(clamped(origin), sliding((0.0, 0.0, None), force=push)), span=(0.0, 1.0),
+        constraints=(everywhere(lambda x, c: x.r[0] - of(c.s), strain=False),),
+    )  # fmt: skip
+    point = rodfem.trace(bent, Discretization("pointwise", 8, 4), Plan(depth=0))[0].points[-1]
+    middle = len(point.s) // 2
+    assert point.r[middle, 0] == pytest.approx(WAVE, rel=accuracy)
+    assert point.moment[middle, 1] == pytest.approx(-2 * np.pi**2 * WAVE, rel=accuracy)
 
 
 @pytest.mark.parametrize("ends", ("pinned", "hinged"))
