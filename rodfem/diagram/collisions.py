@@ -31,9 +31,8 @@ from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
 from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricPencil, NonsymmetricSolver, groups
 from rodfem.stability.spectrum import SHIFT, Spectrum, inside
-from rodfem.tolerances import TINY, round_off, unit
+from rodfem.tolerances import SAME_LOAD, TINY, round_off, unit
 
-SAME = 1e-9  # loads, or eigenvalues, that differ by less than this, relative to them, are one
 JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
 MOVED, OUTSIDE = 0.3, 0.2
@@ -148,7 +147,7 @@ class Collisions:
 
     def _add(self, events: list[Critical], event: Critical) -> None:
         """Take a collision together with others at its load; none is to be found twice."""
-        near = SAME * unit(event.load, one=self.units.load)
+        near = SAME_LOAD * unit(event.load, one=self.units.load)
         known = next((e for e in events if e.cluster and event.cluster and abs(e.load - event.load) < near), None)
         if known is None:
             events.append(event)

@@ -49,12 +49,10 @@ from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricSolver, groups
 from rodfem.stability.spectrum import Spectrum, times
-from rodfem.tolerances import ROUND_OFF, unit
+from rodfem.tolerances import ROUND_OFF, SAME_SPECIAL, unit
 
 PARTS, PART = 100, 0.47
 """Times that steps of a sweep are parted, at most, and where: not in the middle, which is likely to be special."""
-TOGETHER = 1e-6
-"""Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
 NEARER, CLOSEST = 10, 1e-6  # loads at which a meeting is looked for, at most, and their least distance, over a step
 SMALL, CLEAR, ONE = 0.3, 100.0, 0.9
 """Relative distance of two eigenvalues that do not meet in a step; products of changes, over their noise, that are none
@@ -177,7 +175,7 @@ class CriticalLoads:
         numbers = range(min(first, last), max(first, last))
         loads = [self._vanishing(a, b, number) for number in numbers]
         found = np.sort([load for load in loads if not isnan(load)])
-        apart = np.diff(found) >= TOGETHER * unit(a.load, one=self.units.load)
+        apart = np.diff(found) >= SAME_SPECIAL * unit(a.load, one=self.units.load)
         sign, bounds = 1 if last > first else -1, sorted((a.load, b.load))
         self.poles += [sign] * (len(loads) - len(found))
         groups = np.split(found, np.flatnonzero(apart) + 1)

@@ -31,7 +31,6 @@ READ = {"load": "error_estimate", "ordinate": "ordinate_error_estimate"}
 FINEST, LARGEST = 9e-15, 1e12  # least error, and greatest number, that are written without an exponent
 NO_ESTIMATE, GIVEN = " (no estimate)", " (given)"
 """Behind a number without an error bar, and behind a load that was asked for."""
-WHOLE = 1e-9  # round-off of the logarithm of a power of ten
 
 
 # --- numbers
@@ -53,7 +52,7 @@ def number(value: float, error: float, resolved: bool | None = True, scale: floa
     """
     if not isfinite(error):
         return f"{0.0 if abs(value) <= NEGLIGIBLE * scale else value:.8g}{NO_ESTIMATE}"
-    digits = min(max(-floor(log10(rounded_up(error)) + WHOLE), 0), 13) if error > 0 else 13
+    digits = min(max(-floor(log10(rounded_up(error)) + NEGLIGIBLE), 0), 13) if error > 0 else 13
     least = "at least " if resolved is False else ""
     if (error > 0 and error < FINEST) or abs(value) >= LARGEST:  # of a rod whose units are far from its own size
         significant = floor(log10(abs(value))) - floor(log10(error)) if abs(value) > error > 0 else 0
