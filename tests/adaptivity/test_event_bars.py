@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from classics import ON_AXIS, column, push
 from scipy.integrate import quad, simpson, solve_ivp, trapezoid
 from scipy.optimize import brentq, root
 
 import rodfem
 from rodfem import Diagram, Discretization, Event, Ordinate, Plan, Scene, clamped, pinned
-from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.ranks
 
@@ -19,26 +19,13 @@ Curve = Callable[[float], np.ndarray]
 MESHES = [(5, 3), *(pytest.param(mesh, marks=pytest.mark.alone) for mesh in [(8, 6), (3, 4), (7, 2)])]
 
 
-def push(c: Any) -> tuple[float, float, Any]:
-    """Load at the upper end."""
-    return (0.0, 0.0, -c.P)
-
-
 def rod() -> Scene:
     """A planar column, clamped and pinned, under a load across it that grows along it."""
-    return Scene(
-        "column across which the wind blows",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-        parameters={"P": 0.0},
-        load="P",
-        ends=(clamped(), pinned(lambda c: (0.0, 0.0, None), push)),
-        distributed=lambda c: (2.0 + 3 * c.s, 0.0, 0.0),
+    return column(
+        "column across which the wind blows", (clamped(), pinned(ON_AXIS, push)), (0.0, 20.0), planar="e2",
+        constants={"B2": 1.0}, distributed=lambda c: (2.0 + 3 * c.s, 0.0, 0.0),
         ordinate=Ordinate("aside", s=0.37, of=lambda r, q: r[0]),
-        span=(0.0, 20.0),
-        planar="e2",
-    )
+    )  # fmt: skip
 
 
 @cache

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import classics
 import demo_cases
 import hemitropic_cases
 import numpy as np
@@ -18,7 +19,7 @@ from hemitropic_cases import run_demo
 from mpi4py import MPI
 
 import rodfem
-from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, run
+from rodfem import Discretization, Plan, Scene, run
 from rodfem.app.terminal import Report
 
 HOME = Path(__file__).parents[2]
@@ -39,19 +40,12 @@ def printed(capfd: pytest.CaptureFixture[str]) -> Iterator[Any]:
 
 def compressed(rod: str = "flexible") -> Scene:
     """A column whose stretch and shear have an energy: haringx of docs/rods.md."""
-    return Scene(
-        name="column",
-        interval=(0.0, 1.0),
-        rod=rod,
+    return classics.column(
+        "column", classics.SUPPORTS["clamped-free"], (0.0, 1.0), rod=rod,
         energy=lambda v, k, c: (
             25.0 * (v[0] ** 2 + v[1] ** 2) + 100.0 * (v[2] - 1) ** 2 + 0.5 * (k[0] ** 2 + 2 * k[1] ** 2 + k[2] ** 2)
         ),
-        parameters={"P": 0.0},
-        load="P",
-        ends=(clamped(), free(lambda c: (0.0, 0.0, -c.P))),
-        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        span=(0.0, 1.0),
-    )
+    )  # fmt: skip
 
 
 # --- what an energy is, and what it does without ---------------------------------------------------------------------

@@ -28,8 +28,8 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_locus import _about, draw_locus, stable_region
-from rodfem.problem.ends import clamped, free, pinned
-from rodfem.problem.scene import Ordinate, Parameter, Scene
+from rodfem.problem.ends import pinned
+from rodfem.problem.scene import Ordinate, Scene
 from rodfem.report.branches import loci_of
 
 PLANE = ((0.01, 0.9), (-3.1, 1.0))
@@ -106,17 +106,12 @@ def test_each_special_point_has_its_locus_where_loads_are_small(tmp_path: Path) 
     """
     length, stiffness = 1e-8, 2e-28
     force = stiffness / length**2
-    rod = Scene(
-        name="DNA",
-        interval=(0.0, length),
-        rod="unshearable and inextensible",
+    rod = classics.column(
+        "DNA", classics.SUPPORTS["clamped-free"], (0.0, 6.0 * force), interval=(0.0, length),
         energy=lambda v, k, c: bending_and_twist(k, tuple(c.thickness * stiffness * x for x in (1, 1.5, 1))),
-        parameters={"P": Parameter(0.0), "thickness": Parameter(1.0)},
-        load="P",
-        ends=(clamped(), free(lambda c: (0.0, 0.0, -c.P))),
+        constants={"thickness": 1.0},
         ordinate=Ordinate("deflection of the tip", s=length, of=lambda r, q: float(r[0])),
-        span=(0.0, 6.0 * force),
-    )
+    )  # fmt: skip
     plan = Plan(depth=0, error_bars=False, locus=("thickness", 0.9, 1.1))
     run(rod, Discretization("reduced", 4, 5), plan, tmp_path, figures=False, quiet=True)
     found = [json.loads((tmp_path / f"locus-{number}.json").read_text())["columns"] for number in (1, 2)]

@@ -4,6 +4,7 @@ from dataclasses import replace
 from math import pi
 from typing import Any
 
+import classics
 import numpy as np
 import pytest
 from classics import ON_AXIS, SUPPORTS, Found, column, deep_arch, push, turned
@@ -14,7 +15,6 @@ from rodfem import (
     Attachment,
     Discretization,
     Ordinate,
-    Parameter,
     Plan,
     Scene,
     Solver,
@@ -204,18 +204,11 @@ def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
 
 def test_the_other_sides_are_found_with_long_steps() -> None:
     """A column with a lateral force at a spring: its rows resolve the bends, and an eigenvalue turns back near zero."""
-    rod = Scene(
-        name="imperfect",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.3, 1.0)),
-        parameters={"P": Parameter(0.0), "h": 0.05},
-        load="P",
-        ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))),
+    rod = classics.column(
+        "imperfect", classics.SUPPORTS["clamped-clamped"], (0.0, 90.0), constants={"h": 0.05, "B2": 1.3},
         attachments=(Attachment(0.35, force=lambda c: (c.h, 0.7 * c.h, 0.0), energy=lambda x, c: 10.0 * x.r[0] ** 2),),
         ordinate=Ordinate("mid", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1]))),
-        span=(0.0, 90.0),
-    )
+    )  # fmt: skip
     steps = StepControl(first=0.03, largest=0.15)
     found = trace(rod, Discretization("auto", 8, 6), Plan(depth=1, steps=steps, error_bars=False))
     folds = [s.point.load for branch in found for s in branch.special if s.kind == FOLD]

@@ -84,18 +84,11 @@ def test_a_column_buckles_in_any_units(stiffness: float, push: float) -> None:
     Reactions that vanish are round-off of forces of the size of the stiffness.
     """
     one = stiffness / push
-    scene = Scene(
-        "column",
-        (0.0, 1.0),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (9 * stiffness, stiffness, stiffness)),
-        {"P": 0.0},
-        "P",
-        (pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P * push))),
-        Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
-        (8 * one, 11 * one),
-        planar="e2",
-    )
+    scene = classics.column(
+        "column", (pinned(), pinned(classics.ON_AXIS, lambda c: (0.0, 0.0, -c.P * push))), (8 * one, 11 * one),
+        energy=lambda v, k, c: bending_and_twist(k, (9 * stiffness, stiffness, stiffness)), planar="e2",
+        ordinate=Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
+    )  # fmt: skip
     found = trace(scene, plan=Plan(depth=1))
     (special,) = found.special("branch point")
     assert abs(special.point.load - pi**2 * one) <= special.error_estimate < 1e-8 * one

@@ -4,13 +4,13 @@ from functools import cache
 from itertools import pairwise
 from math import hypot
 
+import classics
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, pinned, trace
-from rodfem.forms.energy import bending_and_twist
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, trace
 
 LEAN = 0.05
 HIGH = 6.0
@@ -18,33 +18,14 @@ HIGH = 6.0
 
 def column() -> Scene:
     """Pinned ends: of its Euler loads ``pi^2`` and ``2 pi^2``, in its two planes, are below 20."""
-    return Scene(
-        "column",
-        (0.0, 1.0),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
-        {"P": 0.0},
-        "P",
-        (pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("q", s=0.3, of=lambda r, q: hypot(r[0], r[1])),
-        (0.0, 20.0),
-    )
+    aside = Ordinate("q", s=0.3, of=lambda r, q: hypot(r[0], r[1]))
+    return classics.column("column", classics.SUPPORTS["pinned-pinned"], (0.0, 20.0), ordinate=aside)
 
 
 def cantilever(high: float = HIGH) -> Scene:
     """In its plane ``2 a'' = -(P sin a + LEAN cos a)``, ``a(0) = a'(1) = 0``, with the slope ``a`` of the rod."""
-    return Scene(
-        "cantilever",
-        (0.0, 1.0),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
-        {"P": 0.0},
-        "P",
-        (clamped(), free(lambda c: (LEAN, 0.0, -c.P))),
-        Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        (0.0, high),
-        planar="e2",
-    )
+    ends, tip = (clamped(), free(lambda c: (LEAN, 0.0, -c.P))), Ordinate("tip", s=1.0, of=lambda r, q: r[0])
+    return classics.column("cantilever", ends, (0.0, high), ordinate=tip, planar="e2")
 
 
 @cache

@@ -102,18 +102,12 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
     eigenvalues of the infinite ones.
     """
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 2)
-    scene = Scene(
-        name="pinned",
-        interval=(0.0, length),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (c.EI, c.EI, c.EI)),
-        parameters={"P": 0.0, "EI": stiffness},
-        load="P",
-        ends=(End(position=lambda c: (0.0, 0.0, 0.0)), free(follower=lambda c: (0.0, 0.0, -c.P))),
+    ends = End(position=lambda c: (0.0, 0.0, 0.0)), free(follower=lambda c: (0.0, 0.0, -c.P))
+    scene = classics.column(
+        "pinned", ends, (0.0, stiffness / length**2), interval=(0.0, length), inertia=classics.BEAM,
+        energy=lambda v, k, c: bending_and_twist(k, (c.EI, c.EI, c.EI)), constants={"EI": stiffness},
         ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
-        span=(0.0, stiffness / length**2),
-        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
-    )
+    )  # fmt: skip
     branch = trace(scene, Discretization(elements=5, degree=7), Plan(error_bars=False))[0]
     measured = np.array([mu for mu, _ in branch.points[0].omega2]) * length**4 / stiffness
     b = TURNING, brentq(lambda x: np.tan(x) - np.tanh(x), 7.0, 7.1)

@@ -3,29 +3,24 @@
 from dataclasses import replace
 from itertools import pairwise
 
+import classics
 import numpy as np
 import pytest
 from problem.test_docs import scenes
 
 import rodfem
-from rodfem import Discretization, Parameter, Scene, Solver
+from rodfem import Discretization, Scene, Solver
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.states import Profiles
 from rodfem.problem.quaternions import directors
 
 ELEMENTS, DEGREE, LOAD = 6, 5, 2.0
 FORCE = (0.6 * LOAD, 0.8 * LOAD, -LOAD)
-BOWED = Scene(
-    "bowed",
-    interval=(0.0, 1.0),
-    rod="unshearable and inextensible",
+BOWED = classics.column(
+    "bowed", (rodfem.clamped(), rodfem.free(lambda c: (0.6 * c.P, 0.8 * c.P, -c.P))), (0.0, 2.0),
     energy=lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 2.0, 0.7)),
-    parameters={"P": Parameter(0.0)},
-    load="P",
-    ends=(rodfem.clamped(), rodfem.free(lambda c: (0.6 * c.P, 0.8 * c.P, -c.P))),
     ordinate=scenes()["heavy"].ordinate,
-    span=(0.0, 2.0),
-)
+)  # fmt: skip
 """Bent in one plane where no load acts, and pulled out of it at its tip: it twists."""
 SCENES = {
     "bowed": BOWED,

@@ -1,7 +1,8 @@
 """Continuous symmetries that are found from the equations, first equilibria far from the start, and linking numbers."""
 
-from math import hypot, pi, sqrt
+from math import hypot, sqrt
 
+import classics
 import numpy as np
 import pytest
 import ufl
@@ -31,21 +32,10 @@ def sheared(v: ufl.core.expr.Expr, stiffness: float) -> ufl.core.expr.Expr:
 
 
 def column(left: End, right: End, B: float = 2.0, rod: str = "unshearable and inextensible") -> Scene:
-    return Scene(
-        name="column",
-        interval=(0.0, 1.0),
-        rod=rod,
+    return classics.column(
+        "column", (left, right), (0.0, 30.0), rod=rod, constants={"B": B}, ordinate=MIDDLE,
         energy=lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)) + (sheared(v, 25.0) if rod == "flexible" else 0),
-        parameters={"P": Parameter(0.0), "B": Parameter(B)},
-        load="P",
-        ends=(left, right),
-        ordinate=MIDDLE,
-        span=(0.0, 30.0),
-    )
-
-
-def circle(s: np.ndarray) -> np.ndarray:
-    return np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
+    )  # fmt: skip
 
 
 def ring(twisting: float = 1.5, B: float = 1.0, shearing: float = 0.0) -> Scene:
@@ -53,18 +43,10 @@ def ring(twisting: float = 1.5, B: float = 1.0, shearing: float = 0.0) -> Scene:
         out = bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, c.B, twisting))
         return out + sheared(v, shearing) if shearing else out
 
-    return Scene(
-        name="ring",
-        interval=(0.0, 2 * pi),
-        rod="flexible" if shearing else "unshearable and inextensible",
-        energy=energy,
-        parameters={"t": Parameter(0.0), "B": Parameter(B)},
-        load="t",
-        ends=Ring(),
-        ordinate=Ordinate("width", s=pi, of=lambda r, q: float(np.linalg.norm(r))),
-        span=(0.0, 3.0),
-        start=circle,
-    )
+    return classics.column(
+        "ring", Ring(), (0.0, 3.0), rod="flexible" if shearing else classics.RIGID, energy=energy, load="t",
+        constants={"t": 0.0, "B": B}, start=classics.circle, **classics.ROUND,
+    )  # fmt: skip
 
 
 SLIDING = pinned(lambda c: (0.0, 0.0, None), push)
@@ -140,17 +122,11 @@ def test_round_rods_that_shear() -> None:
 @pytest.mark.long
 def test_first_equilibrium_far_from_the_start() -> None:
     """A coiled rod let go from straight: Newton's method alone does not get there, going downhill does."""
-    coiled = Scene(
-        name="coiled",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
+    coiled = classics.column(
+        "coiled", (clamped(), free(lambda c: (0.0, 0.0, c.T))), (0.0, 20.0), load="T",
         energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2] - 1.0), (1.0, 1.0, 0.7)),
-        parameters={"T": Parameter(0.0), "k0": Parameter(6.0)},
-        load="T",
-        ends=(clamped(), free(lambda c: (0.0, 0.0, c.T))),
-        ordinate=MIDDLE,
-        span=(0.0, 20.0),
-    )
+        constants={"T": 0.0, "k0": 6.0}, ordinate=MIDDLE,
+    )  # fmt: skip
     solver = Solver(coiled, Discretization("reduced", 8, 6)).equilibria
     x, outcome = first_equilibrium(solver, 0.0)
     assert outcome.converged

@@ -11,10 +11,9 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipk
 
-from rodfem import Branch, Discretization, Ordinate, Plan, Scene, pinned, trace
+from rodfem import Branch, Discretization, Ordinate, Plan, trace
 from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.forms import loads
-from rodfem.forms.energy import bending_and_twist
 
 AT = (0.2, 0.325, 0.5, 0.7, 0.9)
 RICH = (16, 8)
@@ -154,18 +153,9 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
     """
     m = brentq(lambda m: 2 * ellipe(m) - ellipk(m), 0.5, 0.99)
     P0 = 4 * ellipk(m) ** 2
-    column = Scene(
-        name="pinned",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
-        parameters={"P": 0.0},
-        load="P",
-        ends=(pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
-        ordinate=Ordinate("middle", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1]))),
-        span=(0.0, 25.0),
-    )
-    found = trace(column, Discretization("reduced", 8, 6), Plan(error_bars=False))
+    middle = Ordinate("middle", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1])))
+    rod = column("pinned", SUPPORTS["pinned-pinned"], (0.0, 25.0), ordinate=middle)
+    found = trace(rod, Discretization("reduced", 8, 6), Plan(error_bars=False))
     system = found.solvers[0].system
     (loop,) = [s for b in found if b.name == "branch 1" for s in b.special if s.kind == "branch point"]
     assert loop.point.load == pytest.approx(P0, rel=1e-9)

@@ -2,11 +2,12 @@
 
 from math import pi
 
+import classics
 import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Discretization, InputError, Ordinate, Parameter, Plan, Scene, clamped, free, section
+from rodfem import Discretization, InputError, Plan, section
 
 STEEL = {"E": 210e9, "nu": 0.3, "density": 7850.0}
 
@@ -87,18 +88,8 @@ def test_a_column_in_metres_and_newtons(rod: str) -> None:
     """Euler's load of a steel strip, 30 mm by 2 mm, one metre long, of an unshearable one pi^2 E I / 4; no warning."""
     strip = section.rectangle(0.030, 0.002, **STEEL)
     euler = pi**2 / 4 * 210e9 * 0.030 * 0.002**3 / 12
-    scene = Scene(
-        name="strip",
-        interval=(0.0, 1.0),
-        rod=rod,
-        energy=strip.energy(rod),
-        parameters={"P": Parameter(0.0)},
-        load="P",
-        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
-        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: float(np.hypot(r[0], r[1]))),
-        span=(0.0, 1.5 * euler),
-        inertia=strip.inertia(),
-    )
+    supports, span = classics.SUPPORTS["clamped-free"], (0.0, 1.5 * euler)
+    scene = classics.column("strip", supports, span, rod=rod, energy=strip.energy(rod), inertia=strip.inertia())
     diagram = rodfem.trace(scene, Discretization(elements=4, degree=6), Plan(depth=0, error_bars=False))
     assert not diagram.warnings and not scene.ignored_strains
     (found,) = diagram.special("branch point")

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import classics
 import demo_cases
 import hemitropic_cases
 import numpy as np
@@ -11,7 +12,7 @@ from rescaled import DNA as METRES_AND_NEWTONS
 from rescaled import STEEL, differences, rescaled
 
 import rodfem
-from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free, sliding
+from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.functions import Constants
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -30,17 +31,11 @@ def column(length: float, stiffness: float, rod: str) -> Scene:
             out += 0.5e4 * c.EI / length**2 * (v[0] ** 2 + v[1] ** 2 + 2 * (v[2] - 1) ** 2)
         return out
 
-    return Scene(
-        name="column",
-        interval=(0.0, length),
-        rod=rod,
-        energy=energy,
-        parameters={"P": 0.0, "EI": stiffness},
-        load="P",
-        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+    return classics.column(
+        "column", classics.SUPPORTS["clamped-free"], (0.0, 10 * stiffness / length**2), interval=(0.0, length), rod=rod,
+        energy=energy, constants={"EI": stiffness},
         ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0] ** 2 + r[1] ** 2),
-        span=(0.0, 10 * stiffness / length**2),
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.ranks
@@ -54,19 +49,13 @@ def test_index_where_the_stiffness_is_lost_beside_the_constraints(units: tuple[f
     """
     length, stiffness = units
     force = stiffness / length**2
-    rod = Scene(
-        name="held straight",
-        interval=(0.0, length),
-        rod="unshearable and inextensible",
+    rod = classics.column(
+        "held straight", classics.SUPPORTS["clamped-clamped"], (0.0, 60 * force), interval=(0.0, length),
         energy=lambda v, k, c: bending_and_twist(
             (k[0] - 0.3 / length, k[1], k[2]), tuple(stiffness * x for x in (1, 2, 0.8))
         ),
-        parameters={"P": 0.0},
-        load="P",
-        ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))),
         ordinate=Ordinate("middle", s=length / 2, of=lambda r, q: r[0]),
-        span=(0.0, 60 * force),
-    )
+    )  # fmt: skip
     solver = rodfem.Solver(rod, Discretization("pointwise", elements=8, degree=6))
     for beside in (1e-2, 1e-3, 1e-4, 1e-5):
         loads = (4 * np.pi**2 * (1 + sign * beside) * force for sign in (-1, 1))
@@ -75,18 +64,12 @@ def test_index_where_the_stiffness_is_lost_beside_the_constraints(units: tuple[f
 
 def pushed(length: float, stiffness: float, mass: float) -> Scene:
     """Rod under a follower load."""
-    return Scene(
-        name="pushed",
-        interval=(0.0, length),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (c.EI, 1.3 * c.EI, 0.8 * c.EI)),
-        parameters={"P": 0.0, "EI": stiffness},
-        load="P",
-        ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))),
+    return classics.column(
+        "pushed", (clamped(), free(follower=classics.push)), (0.0, 24 * stiffness / length**2), interval=(0.0, length),
+        energy=lambda v, k, c: bending_and_twist(k, (c.EI, 1.3 * c.EI, 0.8 * c.EI)), constants={"EI": stiffness},
         inertia=Inertia(rho_A=lambda c: mass, rho_I=lambda c: (0.0, 0.0, 0.0)),
         ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
-        span=(0.0, 24 * stiffness / length**2),
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.few(1)
