@@ -6,11 +6,11 @@ import json
 from math import pi
 from pathlib import Path
 
+import demo_cases
+import hemitropic_cases
 import numpy as np
 import pytest
 
-import demo_cases
-import hemitropic_cases
 import rodfem
 from rodfem import Ordinate, Parameter, Plan, Scene, clamped, sliding
 from rodfem.errors import ConvergenceError, InputError
