@@ -56,7 +56,7 @@ class SpecialSearch:
         self._short: list[tuple[float, float, float]] = []  # from one arclength to another steps of at most this length
         self._condensation = cache(lambda mesh: Condensation(meshes.solvers[mesh].inertia))
         self._phi: np.ndarray | None = None
-        self._mesh = -1
+        self._made = -1, 0  # mesh of the border, and number of phase conditions there
         self._known: dict[int, tuple[Point, ReducedStiffness]] = {}
         self._lost: list[tuple[Point, Point]] = []
 
@@ -153,9 +153,15 @@ class SpecialSearch:
         return piece, p, q
 
     def _prepare(self, row: Point) -> np.ndarray:
-        """The border, on the mesh of a row, made there unless there is one."""
-        if self._mesh != row.mesh or self._phi is None:
-            self._mesh, self._nearest = row.mesh, -inf
+        """The border, on the mesh of a row, made there unless there is one of as many phase conditions.
+
+        A state of more symmetry has modes that one turns into each other, of which a phase condition here is one.
+        """
+        system = self.meshes.solvers[row.mesh].system
+        system.set_phase(row.x)
+        made = row.mesh, system.phase.count
+        if self._made != made or self._phi is None:
+            self._made, self._nearest = made, -inf
             self._border(self._condensation(row.mesh).border(row.x))
         assert self._phi is not None
         return self._phi
@@ -237,7 +243,7 @@ class SpecialSearch:
     def _fourth(self, piece: Piece, p: Node, q: Node) -> np.ndarray | None:
         """Size of the fourth derivative in a piece, by the row before it; None at the begin of a branch."""
         row = self._before
-        if row is None or row.mesh != self._mesh or row.tangent is None:
+        if row is None or row.mesh != self._made[0] or row.tangent is None:
             return None
         before = piece.node(row.x, row.tangent, self._reduced(row))
         return fourth(before, p, q) if before.s < p.s else None
