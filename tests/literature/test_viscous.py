@@ -57,6 +57,19 @@ def test_a_follower_load(scene: Scene, load: float, frequency: float, number: in
     assert abs(found.omega2 - frequency**2) < found.omega2_error + 1e-8 < 1e-5
 
 
+def test_an_oscillation_between_two_loads() -> None:
+    """The push rises above the critical one for a third of a step of the sweep, between its loads."""
+
+    def pull(c: Any) -> tuple[float, float, Any]:
+        return (0.0, 0.0, 4e4 * (c.F - 0.503) ** 2 - 37.69543084032 - 0.004)
+
+    rod = replace(FILAMENT, ends=(clamped(), free(follower=pull)))
+    first, last, _ = rodfem.trace(rod, plan=Plan((0.48, 0.53), error_bars=False))[0].special
+    assert (first.negative_after, last.negative_after) == (2, 0)
+    for special, load in ((first, 0.503 - 1e-7**0.5), (last, 0.503 + 1e-7**0.5)):
+        assert abs(special.point.load - load) < 1e-11
+
+
 def rates(load: float, part: float, nodes: int = 32) -> Any:
     """Least rates of ``y'''' + F y'' = mu y`` by Chebyshev's collocation, for a load that follows the end in part."""
     k = np.arange(nodes + 1)
