@@ -61,6 +61,7 @@ _HOMES = {
         "diagram.solver": "Solver",
         "continuation.observer": "Observer",
         "continuation.branch": "Branch Point SpecialPoint",
+        "app.family": "family",
         "app.many": "many",
         "modes.modes": "Modes load_modes",
         "errors": "InputError SceneError ConvergenceError SetupError",

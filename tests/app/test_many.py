@@ -8,11 +8,12 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from demo_cases import scene
 from mpi4py import MPI
 
-from rodfem import InputError, Scene, SceneError, many
+from rodfem import InputError, Plan, Scene, SceneError, family, many
 from rodfem.app.console import main
 
 COMM = MPI.COMM_WORLD
@@ -108,3 +109,16 @@ def test_a_table_is_refused_before_any_rod_is_traced(
     with pytest.raises(SystemExit):
         main(["many", str(folder / "strut.py"), str(folder / "rods.csv"), "--output", str(folder / "many")])
     assert re.search(sentence, capsys.readouterr().err) and not (folder / "many").exists()
+
+
+def test_a_family_has_the_critical_loads_of_every_rod(folder: Path) -> None:
+    """The cord of N turns: 4 pi^2 (N^2 - 1); one has a second point, where the other has nan."""
+    pytest.importorskip("xarray")
+    turns, plan = np.array([1.2, 1.5]), Plan(depth=0, error_bars=False)
+    found = family(scene("cord"), {"k0": 2 * pi * turns}, folder, plan)
+    assert np.allclose(found.first_loss, 4 * pi**2 * (turns**2 - 1), rtol=1e-10)
+    assert np.isfinite(found.critical_load).sum("point").values.tolist() == [1, 2]
+    again = family(scene("cord"), {"k0": 2 * pi * turns}, folder, plan)
+    assert again.identical(found)
+    with pytest.raises(InputError, match="constants other than the load"):
+        family(scene("cord"), {"lam": (1.0,)}, folder)
