@@ -24,7 +24,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import ROWS, BranchSolver, cubic_weights, lagrange
-from rodfem.continuation.singular import Curve, Section, SingularState, SingularSystem
+from rodfem.continuation.singular import SPLIT, Curve, Section, SingularState, SingularSystem
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.state import Line, line
 from rodfem.fem.system import System
@@ -37,9 +37,6 @@ from rodfem.tolerances import NEGLIGIBLE, ROUND_OFF, TINY
 VANISHED = "another eigenvalue has vanished since the row before, seen from the start"
 UNSTABLE = "another frequency has become unstable, or stable, since the row before, seen from the start"
 """Marks of a row where their number has changed, with a potential and without one."""
-SPLIT = 1.1
-"""Times what eigenvalues, or the ``D`` of pairs, that are equal by a symmetry differ by that each may be off: to first
-order."""
 IMPERFECT = 1e-7
 """Over the lowest bending eigenvalue, or over the terms that cancel: a larger imperfection is not one of the mesh."""
 FEWER = 1e-5

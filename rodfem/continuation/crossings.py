@@ -70,6 +70,7 @@ class Crossing:
     rest: int  # the index at it, but for these
     piece: tuple[Node, Node]
     width: float  # distance of the first from the last of them
+    uneven: float  # their mean rate over the slowest
 
 
 def coefficients(a: Node, b: Node) -> list[np.ndarray]:
@@ -164,9 +165,10 @@ def _passed(a: Node, b: Node, groups: list[list[float]]) -> list[Crossing]:
     between = [a.far + negative(at(a, b, (p[-1] + q[0]) / 2)) for p, q in pairwise(groups)]
     sides, out, h = pairwise([a.index, *between, a.far + negative(b.H)]), list[Crossing](), b.s - a.s
     for group, (before, after) in zip(groups, sides, strict=False):
-        own, others, _ = _passing(a, b, group)
+        own, others, rates = _passing(a, b, group)
         rest, s = a.far + int((others < 0).sum()), a.s + float(np.mean(group)) * h
-        out.append(Crossing(s, own, before, after, rest, (a, b), (group[-1] - group[0]) * h))
+        uneven = float(abs(rates).mean() / max(abs(rates).min(), TINY))
+        out.append(Crossing(s, own, before, after, rest, (a, b), (group[-1] - group[0]) * h, uneven))
     return out
 
 

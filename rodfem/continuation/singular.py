@@ -61,6 +61,8 @@ from rodfem.tolerances import TINY
 
 FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""
+SPLIT = 1.1
+"""Times what eigenvalues, or the ``D`` of pairs, that vanish as one differ by that each may be off: to first order."""
 Vectors = Sequence[PETSc.Vec]
 
 
@@ -469,5 +471,5 @@ class SingularSystem:
 def load_uncertainty(solver: BranchSolver, found: SingularState) -> float:
     """Uncertainty of the load of a branch point, by round-off and by what several eigenvalues differ."""
     matrix = solver.inertia.at(found.x)
-    doubt = max(matrix.noise(v) for v in found.vectors) + found.spread
+    doubt = max(matrix.noise(v) for v in found.vectors) + SPLIT * found.spread
     return abs(solver.system.scalar(found.last)) + doubt / max(abs(found.rate), TINY)

@@ -71,6 +71,7 @@ class Candidate:
     length: float  # of the piece
     crossing: bool = True  # whether eigenvalues pass zero there; else they touch it
     width: float = 0.0  # distance of several crossings
+    uneven: float = 1.0  # mean rate of these over the slowest
 
     @property
     def null(self) -> list[PETSc.Vec]:
@@ -88,7 +89,9 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     before, after, count = crossing.before, crossing.after, crossing.vectors.shape[1]
     near = [i for i in order[count:] if abs(values[i]) < 0.01 * piece.solver.inertia.scale]
     modes = _modes(piece, reduced, own[:, [*order[:count], *near]])
-    return Candidate(x, slope, modes, count, before, after, crossing.rest, q.s - p.s, width=crossing.width)
+    return Candidate(
+        x, slope, modes, count, before, after, crossing.rest, q.s - p.s, width=crossing.width, uneven=crossing.uneven
+    )
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
@@ -138,8 +141,7 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
     system.set_phase(x)
     index = Index(at.negative, system.phase.count + len(null) + piece.still)
     point = solver.point(x, piece.begin + piece.place(x), tangent, index=index)
-    between = at.width * abs(system.scalar(at.slope))  # loads of several crossings, whose mean is solved for
-    left = (0.0 if fold else max(load_uncertainty(solver, found), between)) + round_off(point.load, solver.units.load)
+    left = (0.0 if fold else at.uneven * load_uncertainty(solver, found)) + round_off(point.load, solver.units.load)
     coupling = max(coupling_of(solver, x, v) for v in null)
     nearby = across(solver.inertia.metric, found.modes, null)
     special = SpecialPoint(FOLD if fold else BRANCH_POINT, point, at.before, at.after, left, null, nearby, coupling)
@@ -150,7 +152,7 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
         special.null_vectors, special.nearby = null + nearby[:more], nearby[more:]
         point.zero += more
         apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
-        special.located_to += 2 * max(apart, between)
+        special.located_to += 2 * max(apart, at.width * abs(system.scalar(at.slope)))
     return special
 
 
