@@ -2,7 +2,7 @@
 
 __version__: str
 
-from rodfem.app.family import family as family
+from rodfem.app.many import family as family
 from rodfem.app.many import many as many
 from rodfem.app.run import run as run
 from rodfem.codim2.locus import Locus as Locus

@@ -8,24 +8,33 @@ compared: if one of them has changed, choose another folder.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import product, zip_longest
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from rodfem.app.interrupts import held
+from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem.diagram.diagram import MESH, PLAN, trace
+from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.fields import Discretization
 from rodfem.file_format import RESULT
+from rodfem.libraries import optional
 from rodfem.output.files import save_json
-from rodfem.problem.arguments import checked, each, function, path
+from rodfem.problem.arguments import checked, each, function, path, reals
 from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, end_together, on_first
 from rodfem.whole_files import locked
 
 Work = Callable[[Scene], dict[str, Any]]
+NUMBERS = ("critical_load", "error", "ordinate", "index_before", "index_after")
+"""What a family has of a special point."""
 
 
 def key_of(scene: Scene) -> dict[str, Any]:
@@ -127,3 +136,88 @@ def _contents(file: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return data if isinstance(data, dict) else {}
+
+
+# --- a family
+
+
+@checked(scene=SCENE, folder=path("results/family"), plan=PLAN, discretization=MESH)
+def family(
+    scene: Scene,
+    over: Mapping[str, Sequence[float]],
+    folder: Path | str,
+    plan: Plan | None = None,
+    discretization: Discretization | None = None,
+    **sharing: Any,
+) -> Any:
+    """Critical loads of a ``scene`` for every combination of values of constants, an ``xarray.Dataset``.
+
+    ``over`` has the values by name, as in ``{"A": np.linspace(-2, 0, 41)}``: the dimensions of the dataset.  Of each
+    rod the special points of its first branch, or of all that the ``plan`` asks for, are along the dimension ``point``,
+    by their loads: ``kind``, ``critical_load``, its ``error``, ``ordinate``, ``index_before`` and ``index_after``, nan
+    beyond their number.  ``first_loss`` is the load at which the first branch loses its stability, nan if it does not
+    or begins unstable.  Where a rod fails, ``trouble`` is the sentence.
+
+    ``folder``, and ``comm`` and ``progress`` of ``sharing``, are as for :func:`many`, which keeps each rod in a file:
+    an interrupted family goes on, and ranks share it; another plan or ``discretization`` wants another folder.  Raises
+    :class:`~rodfem.errors.InputError` for what is no constant of the scene, and
+    :class:`~rodfem.errors.SetupError` without xarray.
+    """
+    xarray = optional("xarray", "tables")
+    values = {name: np.array(reals(f"over[{name!r}]", column, (0.5, 1.0))) for name, column in over.items()}
+    if not values or scene.load in values or not all(map(len, values.values())):
+        raise InputError(
+            f"over is {over!r}: give values of constants other than the load, as in {{'A': (-1.5, -1.0)}}."
+        )
+    rods = [scene.varying(**dict(zip(values, map(float, each), strict=True))) for each in product(*values.values())]
+    work = partial(_critical, plan=plan or Plan(depth=0), discretization=discretization or Discretization())
+    found = many(rods, work, folder, **sharing)
+    shape = tuple(map(len, values.values()))
+    data = {name: ([*values], column.reshape(shape)) for name, column in _of_rods(found).items()}
+    data |= {name: ([*values, "point"], table.reshape(*shape, -1)) for name, table in _of_points(found).items()}
+    return xarray.Dataset(data, values, {"scene": scene.name, "load": scene.load})
+
+
+def _of_rods(found: Sequence[dict[str, Any]]) -> dict[str, np.ndarray]:
+    """Where each rod loses its stability, and what failed."""
+    losses = [rod.get("first_loss") for rod in found]
+    return {
+        "first_loss": np.array([np.nan if load is None else load for load in losses]),
+        "trouble": np.array([rod.get("error", "") for rod in found]),
+    }
+
+
+def _of_points(found: Sequence[dict[str, Any]]) -> dict[str, np.ndarray]:
+    """Tables (rods, points) of what special points have, filled up where a rod has fewer."""
+    points = [rod.get("points", []) for rod in found]
+    rows = list(zip(*zip_longest(*points, fillvalue={}), strict=True)) or [()] * len(points)
+    kinds = {"kind": np.array([[point.get("kind", "") for point in row] for row in rows])}
+    return kinds | {
+        name: np.array([[np.nan if point.get(name) is None else point[name] for point in row] for row in rows])
+        for name in NUMBERS
+    }
+
+
+def _critical(rod: Scene, plan: Plan, discretization: Discretization) -> dict[str, Any]:
+    """Special points of a rod, by their loads, and where its first branch loses its stability."""
+    diagram = trace(rod, discretization, plan, comm=MPI.COMM_SELF)
+    points = sorted(diagram.special(), key=lambda special: special.point.load)
+    return {"points": [_entry(special) for special in points], "first_loss": _first_loss(diagram[0])}
+
+
+def _entry(special: SpecialPoint) -> dict[str, Any]:
+    bar = special.error_estimate
+    return {
+        "kind": str(special.kind),
+        "critical_load": special.point.load,
+        "error": bar if np.isfinite(bar) else None,
+        "ordinate": special.point.ordinate,
+        "index_before": special.negative_before,
+        "index_after": special.negative_after,
+    }
+
+
+def _first_loss(branch: Branch) -> float | None:
+    """Load of the first special point of a branch that begins stable beyond which it is not."""
+    lost = (s for s in branch.special if s.negative_after > s.negative_before == 0)
+    return None if branch.points[0].negative else next((s.point.load for s in lost), None)
