@@ -1,7 +1,5 @@
 """Derivatives of critical loads, against closed forms and loads of other rods located."""
 
-from __future__ import annotations
-
 import json
 from math import pi
 from pathlib import Path

@@ -109,7 +109,6 @@ def test_no_image_without_a_symmetry() -> None:
     assert all(branch.image == "" for branch in branches(absolute))
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("n", [3, 4])
 def test_branches_by_the_symmetry_of_a_polygon_are_counted(n: int) -> None:
     """A round column on a spring of the group D_n at its tip: 2 n half branches, of two kinds."""

@@ -1,7 +1,5 @@
 """Rods in a viscous fluid, without inertia: rates of decay, and loads at which an oscillation or a motion grows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
