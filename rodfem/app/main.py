@@ -104,6 +104,14 @@ def many_main(words: Sequence[str]) -> None:
 COLUMNS = "a column is a constant, an option of rodfem run without its dashes (elements), or a field of Plan (steps)"
 
 
+def _lines(table: Path) -> list[dict[str, str]]:
+    """Lines of a table by their columns; raises :class:`InputError` where it cannot be read."""
+    try:
+        return list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
+    except (OSError, ValueError) as trouble:
+        raise InputError(f"{table} cannot be read ({trouble}): give a table of text.") from trouble
+
+
 class Rods:
     """Rods of a table: values of constants and options of one that a file states."""
 
@@ -113,11 +121,8 @@ class Rods:
         self.parser = parser_of(self.statement, self.statement.scene(), f"rodfem run {given.file}")
         self.options = {action.dest: action for action in self.parser._actions if action.dest not in ("help", "output")}
         self.options |= {x.option_strings[0][2:]: x for x in self.options.values()} | {"steps": self.options["largest"]}
-        try:
-            self.rows = list(csv.DictReader(given.table.read_text(encoding="utf-8-sig").splitlines()))
-        except (OSError, ValueError) as trouble:
-            raise InputError(f"{given.table} cannot be read ({trouble}): give a table of text.") from trouble
-        unknown = [name for name in (self.rows[0] if self.rows else ("",)) if name not in self.options]
+        self.rows = _lines(given.table)
+        unknown = [name for name in next(iter(self.rows), {"": ""}) if name not in self.options]
         if unknown:
             what = f"has a column {unknown[0]!r}" if self.rows else "has no line of a rod"
             known = ", ".join(dict.fromkeys(x.name for x in self.statement.constants))
@@ -204,15 +209,18 @@ def own_of(module: ModuleType, kind: str) -> Callable[..., Any] | None:
 
     A function that returns one comes before the one of its own run, and that before one with a name.
     """
-    named = {n: x for n, x in vars(module).items() if type(x).__name__ == kind}
-    run = {n: x for n, x in enumerate(vars(module).get(RUN, ())) if type(x).__name__ == kind}
-    found = _returning(module, kind) or run or named
+    run = dict(enumerate(vars(module).get(RUN, ())))
+    found = _returning(module, kind) or _of_kind(run, kind) or _of_kind(vars(module), kind)
     if len(found) > 1:
         raise InputError(
             f"{module.__file__} has more than one {kind} ({', '.join(map(str, found))}): keep one of them."
         )
     (one,) = found.values() or (None,)
     return one if one is None or isfunction(one) else lambda **_: one
+
+
+def _of_kind(named: Mapping[Any, Any], kind: str) -> dict[Any, Any]:
+    return {name: x for name, x in named.items() if type(x).__name__ == kind}
 
 
 def _returning(module: ModuleType, kind: str) -> dict[str, Callable[..., Any]]:

@@ -44,8 +44,8 @@ PIECES = 4
 """Pieces of each element on which a density is known."""
 DIFFERENCES = ((-2.0, 1 / 12), (-1.0, -2 / 3), (1.0, 2 / 3), (2.0, -1 / 12))
 """Places and weights of a central difference of the fourth order."""
-MOTION, CHANGE = 1e-3, 1e-3
-"""Steps of the differences along a null vector, and in a parameter over its size."""
+STEP = 1e-3
+"""Step of the differences: along a null vector, and in a parameter over its size."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _along(
     system, shape, known = solver.system, solver.shape, solver.system.scene.parameters[parameter]
     states = SingularSystem(solver, node.modes[: node.multiplicity], node.multiplicity, fold=fold)
     null, y, rate = states.adjoint(node.x)
-    step = CHANGE * (abs(known.value) or 1.0)
+    step = STEP * (abs(known.value) or 1.0)
     parts = sum(
         weight / step * _work(system, (node.x, null, y), {parameter: known.value + place * step}, pieces)
         for place, weight in DIFFERENCES
@@ -139,6 +139,6 @@ def _work(
         return np.asarray(sum(product(x, v) for v in null))
     out = product(x, y)
     for v in null:
-        step = MOTION / system.norm(v)
+        step = STEP / system.norm(v)
         out += sum(weight / step * product(x + v * (place * step), v) for place, weight in DIFFERENCES)
     return out

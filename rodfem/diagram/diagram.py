@@ -445,10 +445,7 @@ def trace(
 
 def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: Observer, comm: MPI.Comm) -> Diagram:
     """Trace a ``scene`` as :func:`trace` does: the diagram is not yet ``complete``, as a run has more to do."""
-    end_together()
-    if comm.size > 1:
-        agree(comm, scene=statement(scene), discretisation=discretization, plan=entries(plan, scene))
-    plan.check(scene, discretization)
+    _check(scene, discretization, plan, comm)
     recorder, clock = Recorder(observer), Clock()
     with form_compiler.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
@@ -480,6 +477,14 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
                 trouble.add_note("The branches traced before are in the attribute `diagram` of this error.")
             raise
     return diagram
+
+
+def _check(scene: Scene, discretization: Discretization, plan: Plan, comm: MPI.Comm) -> None:
+    """Raise :class:`InputError` for a plan that does not fit, or ranks that were given different ones."""
+    end_together()
+    if comm.size > 1:
+        agree(comm, scene=statement(scene), discretisation=discretization, plan=entries(plan, scene))
+    plan.check(scene, discretization)
 
 
 def _with_bars(plan: Plan, solver: BranchSolver, observer: Observer) -> Plan:

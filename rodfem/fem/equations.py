@@ -171,10 +171,14 @@ class Equations:
         others = {"energy": W * dx, "metric": self._metric(a, b) * dx, "kinetic": kinetic}
         if scene.conservative:
             others |= {"potential": potential} | ({"loads": sum(loads)} if loads else {})
-        if not scene.ordinate.places:
-            others["ordinate"] = (0.0 * c.s + scene.ordinate.of(along, c)) * dx
+        others |= self._ordinate(along, dx)
         derivatives = {"jacobian": ufl.derivative(first, u, trial), "residual": first}
         return derivatives | {name: self.compilable(x) for name, x in others.items()}
+
+    def _ordinate(self, along: Place, dx: Any) -> dict[str, Any]:
+        """Ordinate of a scene that has an integral for one."""
+        ordinate, c = self.fields.scene.ordinate, self.constants
+        return {} if ordinate.places else {"ordinate": (0.0 * c.s + ordinate.of(along, c)) * dx}
 
     def _nodal(self, sites: list[Any]) -> Any:
         """Constraints at nodes, zero at an equilibrium.

@@ -246,10 +246,8 @@ def _ranges(data: Data) -> Iterator[str]:
     stable, undecided, planar = ([_cover(x.loads) for x in _intervals(data, kind)] for kind in kinds)
     lost = list(_unlocated(data))
     for a, b in _without(stable + lost, *sorted(data["range"])):
-        doubt = any(low < b and high > a for low, high in undecided)
-        but = ", but there are states of undecided stability" if doubt else ""
-        in_plane = any(low < b and high > a for low, high in planar)
-        state = "state that is stable in space, too," if in_plane else "stable state"
+        but = ", but there are states of undecided stability" if _overlap(undecided, a, b) else ""
+        state = "state that is stable in space, too," if _overlap(planar, a, b) else "stable state"
         yield f"From {_between(data, a, b, 'to')} no {state} was found{but}."
     for step in lost:
         for a, b in _without(stable, *step):
@@ -258,6 +256,10 @@ def _ranges(data: Data) -> Iterator[str]:
 
 def _intervals(data: Data, kind: str) -> list[Interval]:
     return [x for branch in data["branches"] for x in intervals_of(branch) if x.kind == kind]
+
+
+def _overlap(ranges: Sequence[tuple[float, float]], a: float, b: float) -> bool:
+    return any(low < b and high > a for low, high in ranges)
 
 
 def _cover(loads: Sequence[float]) -> tuple[float, float]:

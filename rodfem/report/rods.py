@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
-from rodfem.modes.modes import RIGID, SYMMETRY, Few, exponent, load_modes, rows_with_modes, typical_of
+from rodfem.modes.modes import RIGID, SYMMETRY, Few, Typical, exponent, load_modes, rows_with_modes, typical_of
 from rodfem.output.glyphs import Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
@@ -84,7 +84,12 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
         if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
             shown = [mode._replace(rates=bool(branch.get("rates"))) for mode in shown]
             modes[row] = motions_of(shown, shapes, row, read_setting(group, row), stage.look)
-    return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items() if each.trouble}}
+    return {"modes": modes, "missed": _troubles(typical.values())}
+
+
+def _troubles(typical: Iterable[Typical]) -> dict[int, str]:
+    """Why rows have no modes."""
+    return {each.row: each.trouble for each in typical if each.trouble}
 
 
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
