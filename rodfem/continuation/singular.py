@@ -279,7 +279,7 @@ class SingularSystem:
             Z, N = self._split(G)
             null, left = ([combine(side, z) for z in Z.T] for side in (V, sides[-1]))
             border = np.column_stack([c, *(b for _, b in responses), G])
-            y, f = self._along_null(x, t, null, left, sharp=sharp)
+            y, f = self._along_null(x, t, (null, left), sharp=sharp)
             at = _Linear([s, *(w for w, _ in responses), *V], border, columns, Z, N, left, y, f, border)
         return replace(at, rows=self._equations(x, at))
 
@@ -301,15 +301,15 @@ class SingularSystem:
         return np.vstack([forces, *([] if self.fold else [self._work(x, at, trace)]), trace])
 
     def _along_null(
-        self, x: PETSc.Vec, t: float, null: Vectors, lefts: Vectors, *, sharp: bool
+        self, x: PETSc.Vec, t: float, sides: tuple[Vectors, Vectors], *, sharp: bool
     ) -> tuple[PETSc.Vec, np.ndarray]:
-        """Sums over the null vectors, and the left ones, of ``y`` and of ``f`` (parameters,).
+        """Sums over the null vectors, and the left ones, the ``sides``, of ``y`` and of ``f`` (parameters,).
 
         They are central differences, of the fourth order if ``sharp``.
         """
         y, f = self.system.new_vector(), np.zeros(1 if self._section is None else 2)
         steps = ((1.0, 4 / 3), (-1.0, -4 / 3), (2.0, -1 / 6), (-2.0, 1 / 6)) if sharp else ((1.0, 1.0), (-1.0, -1.0))
-        for v, left in zip(null, lefts, strict=True):
+        for v, left in zip(*sides, strict=True):
             for step, weight in steps:
                 there, share = x + v * (step * DIFFERENCE), weight / (2 * DIFFERENCE)
                 if self._section is not None:
