@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rodfem.fem.fields import Discretization
 
 Mesh = Callable[..., "Discretization"]
+Asked = tuple[Scene, "Discretization", "Plan"]
 HELP = """usage: rodfem run FILE.py [--scene NAME] [OPTIONS]
 
 Trace the rod of a file: a Scene, or a function with '-> Scene' whose arguments have defaults and are the rod's
@@ -47,8 +48,7 @@ def main(words: Sequence[str]) -> None:
     if "--scene" in rest:
         i = rest.index("--scene")
         name, rest = " ".join(rest[i + 1 : i + 2]), rest[:i] + rest[i + 2 :]
-    module = load(Path(file))
-    statement = Statement(rod_of(module, name), own_of(module, "Discretization"), own_of(module, "Plan"))
+    statement = Statement.of(load(Path(file)), name)
     end = rest.index("--") if "--" in rest else len(rest)
     ours, petsc = rest[:end], rest[end + 1 :]
     usual = statement.scene()
@@ -85,94 +85,82 @@ def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
     return parser
 
 
+COLUMNS = "a column is a constant, an option of rodfem run without its dashes (elements), or a field of Plan (steps)"
+
+
 def many_main(words: Sequence[str]) -> None:
-    """State the rods of a table, all before any computation, trace each, and write what is special of them."""
+    """Trace the rods of a table, all stated before any is traced, and write the table of what is special of them."""
     parser = Parser(prog="rodfem many", description="Trace a rod of a file once for each line of a table.")
     parser.add_argument("file", type=Path, help="as rodfem run has it")
     parser.add_argument("table", type=Path, help=f"CSV with a line for each rod; {COLUMNS}")
     parser.add_argument("--scene", metavar="NAME", help="of several in the file")
     parser.add_argument("--output", type=folder, default=Path("results/many"), metavar="DIR", help="for all files")
     given = parser.parse_args(words)
-    module = load(given.file)
-    own = own_of(module, "Discretization"), own_of(module, "Plan")
-    rods = Rods(Statement(rod_of(module, given.scene), *own), given)
+    statement = Statement.of(load(given.file), given.scene)
+    options = parser_of(statement, statement.scene(), f"rodfem run {given.file}")
     start_petsc([])
-    with sentences(rods.parser):
-        rods.trace()
+    with sentences(options):
+        rows = _rows(given.table, options)
+        _trace(given, rows, [_asked(row, statement, options, f"{given.table}, rod {i}") for i, row in enumerate(rows)])
 
 
-COLUMNS = "a column is a constant, an option of rodfem run without its dashes (elements), or a field of Plan (steps)"
+def _named(options: Parser) -> dict[str, argparse.Action]:
+    """Options by the names that a column may have."""
+    found = {action.dest: action for action in options._actions if action.dest not in ("help", "output")}
+    return found | {x.option_strings[0][2:]: x for x in found.values()} | {"steps": found["largest"]}
 
 
-def _lines(table: Path) -> list[dict[str, str]]:
-    """Lines of a table by their columns; raises :class:`InputError` where it cannot be read."""
+def _rows(table: Path, options: Parser) -> list[dict[str, str]]:
+    """Lines of a table; raises :class:`InputError` for one without lines, or with a column that no rod has."""
     try:
-        return list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
+        rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
     except (OSError, ValueError) as trouble:
         raise InputError(f"{table} cannot be read ({trouble}): give a table of text.") from trouble
+    if unknown := [name for name in (rows or [{"": ""}])[0] if name not in _named(options)]:
+        what = f"has a column {unknown[0]!r}" if rows else "has no line of a rod"
+        raise InputError(f"{table} {what}: {COLUMNS}; {options.prog} --help lists them.")
+    return rows
 
 
-class Rods:
-    """Rods of a table: values of constants and options of one that a file states."""
+def _asked(row: Mapping[str, str], statement: Statement, options: Parser, where: str) -> Asked:
+    """Scene, mesh and plan of a line, of which an empty cell is the default; raises :class:`InputError` with it."""
+    words = list[str]()
+    for name, cell in row.items():
+        action, values = _named(options)[name], (cell or "").split()
+        if isinstance(action, argparse.BooleanOptionalAction) and cell.lower() in ("true", "false"):
+            words.append(action.option_strings[cell.lower() == "false"])
+        elif values:
+            words += [action.option_strings[0], *values]
+    try:
+        scene, discretization, plan = statement.asked(options.parse_args(words))
+        plan.check(scene, discretization)
+    except InputError as trouble:
+        raise InputError(f"{where}: {trouble}") from None
+    return scene, discretization, plan
 
-    def __init__(self, statement: Statement, given: argparse.Namespace) -> None:
-        """Read the table; raises :class:`InputError` for a column that is none of a rod, or a table without lines."""
-        self.statement, self.given = statement, given
-        self.parser = parser_of(self.statement, self.statement.scene(), f"rodfem run {given.file}")
-        self.options = {action.dest: action for action in self.parser._actions if action.dest not in ("help", "output")}
-        self.options |= {x.option_strings[0][2:]: x for x in self.options.values()} | {"steps": self.options["largest"]}
-        self.rows = _lines(given.table)
-        unknown = [name for name in next(iter(self.rows), {"": ""}) if name not in self.options]
-        if unknown:
-            what = f"has a column {unknown[0]!r}" if self.rows else "has no line of a rod"
-            known = ", ".join(dict.fromkeys(x.name for x in self.statement.constants))
-            raise InputError(f"{given.table} {what}: {COLUMNS}; the constants are {known or 'none'}.")
 
-    def stated(self, number: int) -> tuple[Scene, Discretization, Plan]:
-        """Scene, mesh and plan of a line, an empty cell of which is the default; raises :class:`InputError` with it."""
-        words = [x for n, cell in self.rows[number].items() if cell and cell.strip() for x in self._words(n, cell)]
-        try:
-            scene, discretization, plan = self.statement.asked(self.parser.parse_args(words))
-            plan.check(scene, discretization)
-        except InputError as trouble:
-            raise InputError(f"{self.given.table}, rod {number}: {trouble}") from None
-        return scene, discretization, plan
+def _trace(given: argparse.Namespace, rows: Sequence[dict[str, str]], asked: Sequence[Asked]) -> None:
+    """Trace all rods that have not been traced, and write the table of their special points; collective."""
+    from mpi4py import MPI
 
-    def _words(self, name: str, cell: str) -> list[str]:
-        """Option of a cell, as a shell has it."""
-        option, switches = self.options[name], dict[str, str]()
-        if isinstance(option, argparse.BooleanOptionalAction):
-            switches = dict(zip(("true", "false"), option.option_strings, strict=True))
-        switch = switches.get(cell.strip().lower())
-        return [switch] if switch else [option.option_strings[0], *cell.split()]
+    from rodfem.app.many import key_of, shared
+    from rodfem.diagram.diagram import trace
+    from rodfem.output.states import as_csv
+    from rodfem.ranks import on_first
+    from rodfem.whole_files import write_whole
 
-    def trace(self) -> None:
-        """Trace all rods that have not been traced, and write the table of their special points; collective."""
-        from mpi4py import MPI
+    def work(number: int) -> dict[str, Any]:
+        diagram = trace(*asked[number], comm=MPI.COMM_SELF)
+        diagram.save(given.output / f"rod-{number:05d}")
+        return {"special": [{"branch": b["name"]} | s for b in diagram.data["branches"] for s in b["special"]]}
 
-        from rodfem.app.many import key_of, shared
-        from rodfem.diagram.diagram import trace
-        from rodfem.output.states import as_csv
-        from rodfem.ranks import on_first
-        from rodfem.whole_files import write_whole
-
-        target, text = self.given.output, sha256(self.given.file.read_bytes()).hexdigest()
-
-        def work(number: int) -> dict[str, Any]:
-            diagram = trace(*stated[number], comm=MPI.COMM_SELF)
-            diagram.save(target / f"rod-{number:05d}")
-            return {"special": [{"branch": b["name"]} | s for b in diagram.data["branches"] for s in b["special"]]}
-
-        stated, lines = [*map(self.stated, range(len(self.rows)))], list[dict[str, Any]]()
-        keys = [key_of(x[0]) | {"row": row, "file": text} for x, row in zip(stated, self.rows, strict=True)]
-        works = [partial(work, number) for number in range(len(keys))]
-        results = shared(keys, works, target, MPI.COMM_WORLD, lambda done, whole: None)
-        for number, (row, result) in enumerate(zip(self.rows, results, strict=True)):
-            found = result.get("special") or [{"error": result["error"]}]
-            lines += [row | {"rod": number} | entry for entry in found]
-        on_first(MPI.COMM_WORLD, lambda: write_whole({target / "many.csv": as_csv(lines)}))
-        if MPI.COMM_WORLD.rank == 0:
-            print(target / "many.csv")
+    target, text, comm = given.output / "many.csv", sha256(given.file.read_bytes()).hexdigest(), MPI.COMM_WORLD
+    keys = [key_of(scene) | {"row": row, "file": text} for (scene, *_), row in zip(asked, rows, strict=True)]
+    results = shared(keys, [partial(work, i) for i in range(len(rows))], given.output, comm, lambda done, whole: None)
+    found = [(row | {"rod": i}, r.get("special") or [r]) for i, (row, r) in enumerate(zip(rows, results, strict=True))]
+    on_first(comm, lambda: write_whole({target: as_csv([rod | entry for rod, each in found for entry in each])}))
+    if comm.rank == 0:
+        print(target)
 
 
 def _run(statement: Statement, options: argparse.Namespace, petsc: Sequence[str], words: Callable[[str], str]) -> None:
@@ -379,7 +367,12 @@ class Statement:
             raise InputError(f"{getattr(self._of, '__name__', 'it')} returns {scene!r}: let it return a Scene.")
         return scene
 
-    def asked(self, options: argparse.Namespace) -> tuple[Scene, Discretization, Plan]:
+    @classmethod
+    def of(cls, module: ModuleType, name: str | None) -> Statement:
+        """The rod of a module, by its name if there are several, with the mesh and the plan of the module."""
+        return cls(rod_of(module, name), own_of(module, "Discretization"), own_of(module, "Plan"))
+
+    def asked(self, options: argparse.Namespace) -> Asked:
         """Scene, mesh and plan of parsed options: what these leave out is the file's own."""
         constants = self.values(options)
         mesh, plan = self.mesh and self.mesh(**constants), self.plan and self.plan(**constants)

@@ -95,7 +95,7 @@ def test_a_table_has_a_rod_in_each_line(folder: Path, capsys: pytest.CaptureFixt
     [
         (
             "B,elemnts\n1,4\n",
-            "has a column 'elemnts': a column is a constant, an option of rodfem run .* constants are B",
+            "has a column 'elemnts': a column is a constant, an option of rodfem run .* --help lists them",
         ),
         ("B,at\n1,3\n1,77\n", "rod 1: The load 77 asked for is outside the range 2 to 4"),
         ("B\n", "has no line of a rod"),
