@@ -57,14 +57,19 @@ def main(words: Sequence[str]) -> None:
         complain(f"{usual.load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
     options = parser.parse_args(ours)
     start_petsc(petsc)
-    kept = f"the branches that were finished are in {options.output}"
+    earlier = _written(options.output)
+
+    def kept() -> str:
+        done = _written(options.output) != earlier
+        return f"the branches that were finished are in {options.output}" if done else "no branch was finished"
+
     try:
         with sentences(parser):
             _run(statement, options, petsc, parser.in_options)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {kept}: rodfem.load reads them") from None
+        raise KeyboardInterrupt(f"interrupted; {kept()}") from None
     except MemoryError:
-        complain(f"Memory is exhausted: use fewer elements or a lower degree; {kept}.")
+        complain(f"Memory is exhausted: use fewer elements or a lower degree; {kept()}.")
 
 
 def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
@@ -83,6 +88,12 @@ def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
             raise InputError(f"The constant {constant.name} has the name of an option of all rods: choose another.")
         constant.declare(group)
     return parser
+
+
+def _written(output: Path) -> int:
+    """When the diagram in a folder was written, 0 without one."""
+    file = output / "diagram.json"
+    return file.stat().st_mtime_ns if file.is_file() else 0
 
 
 COLUMNS = "a column is a constant, an option of rodfem run without its dashes (elements), or a field of Plan (steps)"

@@ -17,7 +17,7 @@ from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
 from rodfem.errors import many
 from rodfem.output.pieces import MEETS, Interval, intervals_of
-from rodfem.output.words import is_sweep
+from rodfem.output.words import is_sweep, with_unit
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, on_kink
 from rodfem.tolerances import NEGLIGIBLE, SAME_SPECIAL
 
@@ -107,7 +107,7 @@ def _names(branches: Sequence[Data]) -> str:
 
 def _of_branch(branch: Data, data: Data) -> str:
     """What is stable along a branch, what happens where that changes, and how it ends."""
-    intervals, load, name, ended = intervals_of(branch), data["parameter"], _subject(branch, data), branch["ended"]
+    intervals, load, name, ended = intervals_of(branch), _load(data), _subject(branch, data), branch["ended"]
     end = f"it ends where it {ended.rstrip('.')}" if ended.startswith(MEETS) else f"it ends there: {ended.rstrip('.')}"
     if not intervals:
         return f"{name} has one state only; {end}."
@@ -143,7 +143,7 @@ def _changes(intervals: Sequence[Interval], data: Data, stop: str) -> Iterator[t
         yield _state(shown[-1], data), f"to {stop}"
     else:
         more = many(len(intervals) - 1 - len(shown), "time")
-        yield "its stability", f"changes {more} more before {data['parameter']} = {stop}"
+        yield "its stability", f"changes {more} more before {_load(data)} = {stop}"
 
 
 def _state(interval: Interval, data: Data) -> str:
@@ -342,7 +342,12 @@ def _open(branches: Sequence[Data], data: Data) -> Iterator[str]:
 def _between(data: Data, a: float, b: float, word: str) -> str:
     """Two loads with a word between them."""
     first, last = distinct_digits(a, b, width=_width(data))
-    return f"{data['parameter']} = {first} {word} {last}"
+    return f"{_load(data)} = {first} {word} {last}"
+
+
+def _load(data: Data) -> str:
+    """Name of the load, with its unit."""
+    return with_unit(data["parameter"], str(data.get("parameter_unit") or ""))
 
 
 def _width(data: Data) -> float:
