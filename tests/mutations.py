@@ -110,7 +110,7 @@ TABLE = {
         "flutter-locus-by-eigenvalues-alone": ("step = -noise.two_sided / slope", "step = 0.0", LOCI),
     },
     "rodfem/codim2/follow.py": {
-        "loci-follow-polynomials-beyond-bends": ("if failures < 2", "if failures < 200", LOCI),
+        "loci-follow-polynomials-beyond-bends": ("if failures < 2", "if failures < 200", "codim2/test_locus.py"),
         "places-of-one-mesh": (
             "there, located_to = sought.p, sought.dp", "there, located_to = node.p, sought.dp",
             "codim2/test_places.py"),

@@ -237,7 +237,7 @@ LOCI = (
             "P^2 = b^2 + d^2", "d, in bounds of 0.3", partial(loci.gap, kind), few, widths,
         )
         for kind, few, widths in (
-            ("branch point", (1e-5, 2e-2, 0.0), (0.1, 2e-2, 1e-5, 0.0)),
+            ("branch point", (2e-2, 0.0), (0.1, 2e-2, 0.0)),
             ("fold", (2e-2,), (0.05, 2e-2)),
         )
     ),
