@@ -351,11 +351,12 @@ def test_files_say_what_they_are(copied: Path) -> None:
     assert [reader() for reader in read(copied)][-1] == [{"any": 1}]
 
 
-@pytest.mark.parametrize("change", [1, -1])
-def test_files_of_another_version_are_refused(change: int, copied: Path) -> None:
+def test_files_of_a_newer_version_are_refused(copied: Path) -> None:
     for form in FORMATS:
-        marked(copied / NAMES[form], form.version + change)
-    sentence = rf"was written by rodfem 9\.1, in version [0-3] of the format 'rodfem \w+', and {PROGRAM} reads version"
+        marked(copied / NAMES[form], form.version + 1)
+    sentence = (
+        rf"was written by rodfem 9\.1, in version [23] of the format 'rodfem \w+', and {PROGRAM} reads versions up to"
+    )
     for reader in read(copied):
         with pytest.raises(InputError, match=sentence):
             reader()
