@@ -658,7 +658,7 @@ TABLE = {
             "np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))",
             "rounded * np.linalg.norm(left, axis=1)", "codim2/test_locus.py"),
         "slepc-sorts-all-eigenvalues": (
-            "                if self.rank > ALL:", "                if True:", "literature/test_joss_paper.py"),
+            "                if self.rank > ALL:", "                if True:", "diagram/test_all_frequencies.py"),
         "mass-of-a-quaternions-own-length": ("RANK = 1e-13", "RANK = 1e-3", "diagram/test_all_frequencies.py"),
     },
     "rodfem/tolerances.py": {

@@ -10,7 +10,7 @@ from golden_cases import NOT_CONSERVATIVE, cases
 from literature.test_free_rods import floating
 from scipy.linalg import eigvals
 
-from rodfem import Discretization, Inertia, Parameter, Plan, Scene, Solver, clamped, free, trace
+from rodfem import ConvergenceError, Discretization, Inertia, Parameter, Plan, Scene, Solver, clamped, free, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.equilibria import at_load
 from rodfem.forms.energy import bending_and_twist
@@ -53,6 +53,19 @@ def test_against_qz(name: str, part: float) -> None:
     for one, other in ((found, exact), (exact, found)):
         nu, all_others = 1.0 / (one[:18] + 10.0), 1.0 / (other + 10.0)
         assert abs(nu[:, None] - all_others).min(axis=1).max() < 1e-9 * abs(nu).max()
+
+
+def test_slepc_may_give_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At times it cannot sort equal complex eigenvalues: up to a rank of a thousand LAPACK finds them."""
+
+    def giving_up(*_: object) -> None:
+        raise ConvergenceError("SLEPc cannot sort.")
+
+    solver = Solver(classics.beck(), Discretization("pointwise", 8, 6)).equilibria
+    spectrum = NonsymmetricSolver(solver.system).at(at_load(solver, solver.start(10.0), 10.0)).spectrum
+    expected = spectrum.greatest(5).nu
+    monkeypatch.setattr("rodfem.stability.spectrum.krylov", giving_up)
+    np.testing.assert_allclose(spectrum.greatest(5).nu, expected, rtol=1e-9)
 
 
 def test_two_beyond_the_fortieth_meet_first() -> None:
