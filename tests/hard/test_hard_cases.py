@@ -38,7 +38,8 @@ def test_a_hard_case(case: Case, value: Any) -> None:
     assert found.right or (case.promised == SAID and found.said), f"{found.error:.3g} {found.wrong} {found.said}"
 
 
-def test_a_branch_goes_on_beyond_a_bend_of_a_fifth_of_a_step() -> None:
+@pytest.mark.parametrize("width", [1e-2, 7e-3, 3e-3])
+def test_a_branch_goes_on_beyond_a_bend_of_a_fifth_of_a_step(width: float) -> None:
     """The polynomial through its last rows has another tangent there."""
-    found = bifurcations.dent(1e-2)
+    found = bifurcations.dent(width)
     assert found.right and not found.said, f"{found.error:.3g} {found.wrong} {found.said}"
