@@ -38,14 +38,10 @@ from rodfem.problem.functions import derived
 from rodfem.problem.scene import Parameter
 from rodfem.tolerances import unit
 
-ROUNDED = 1e-9
-"""Round-off of a derivative, relative to it."""
 PIECES = 4
 """Pieces of each element on which a density is known."""
-DIFFERENCES = ((-2.0, 1 / 12), (-1.0, -2 / 3), (1.0, 2 / 3), (2.0, -1 / 12))
-"""Places and weights of a central difference of the fourth order."""
-STEP = 1e-3
-"""Step of the differences: along a null vector, and in a parameter over its size."""
+DIFFERENCES = ((-2e-3, 1e3 / 12), (-1e-3, -2e3 / 3), (1e-3, 2e3 / 3), (2e-3, -1e3 / 12))
+"""Places and weights of a central difference of the fourth order: along a null vector, in a parameter over its size."""
 
 
 @dataclass(frozen=True)
@@ -93,13 +89,11 @@ def derivative(
         if error_bar:
             richer = RicherMesh(curve.criterion, special.kind, node)
             there = richer.again(node)
-            error = bound(value, float(there.dp[0] / there.dp[1]), ROUNDED * abs(value), richer.rho)
+            rounded = 1e-9 * abs(value)  # of the differences, at most
+            error = bound(value, float(there.dp[0] / there.dp[1]), rounded, richer.rho)
         if error_bar and along_the_rod:
-            finer, largest = (
-                _along(richer.richer.solver, there, parameter, PIECES // 2, fold=fold)[1],
-                abs(along[1]).max(),
-            )
-            along[2] = bound(0.0, abs(finer - along[1]).max(), ROUNDED * largest, richer.rho)
+            finer = _along(richer.richer.solver, there, parameter, PIECES // 2, fold=fold)[1]
+            along[2] = bound(0.0, abs(finer - along[1]).max(), 1e-9 * abs(along[1]).max(), richer.rho)
     return Derivative(value, error, *along)
 
 
@@ -110,9 +104,9 @@ def _along(
     system, shape, known = solver.system, solver.shape, solver.system.scene.parameters[parameter]
     states = SingularSystem(solver, node.modes[: node.multiplicity], node.multiplicity, fold=fold)
     null, y, rate = states.adjoint(node.x)
-    step = STEP * (abs(known.value) or 1.0)
+    size = abs(known.value) or 1.0
     parts = sum(
-        weight / step * _work(system, (node.x, null, y), {parameter: known.value + place * step}, pieces)
+        weight / size * _work(system, (node.x, null, y), {parameter: known.value + place * size}, pieces)
         for place, weight in DIFFERENCES
     )
     start, length = (shape.from_left(each)[:, None] for each in (shape.start, shape.size))
@@ -139,6 +133,5 @@ def _work(
         return np.asarray(sum(product(x, v) for v in null))
     out = product(x, y)
     for v in null:
-        step = STEP / system.norm(v)
-        out += sum(weight / step * product(x + v * (place * step), v) for place, weight in DIFFERENCES)
+        out += sum(weight * product(x + v * place, v) for place, weight in DIFFERENCES)
     return out

@@ -23,10 +23,8 @@ from rodfem.problem.quaternions import CONJUGATE, directors, of_vector, product
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE
 
-FIT = 0.05
-"""Misfit of a shape that Newton's method mends."""
-STEPS = 2000
-"""Steps of the integration along the rod."""
+FIT, STEPS = 0.05, 2000
+"""Misfit of a shape that Newton's method mends; steps of the integration along the rod."""
 SETTLED, STEP = 1e-8, 1e-5
 """Change of the natural strains, in natural units, at which Newton's method ends; step of its difference quotients."""
 

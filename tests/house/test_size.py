@@ -12,13 +12,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31809,
-    "files of Python": 144,
+    "lines of Python": 31760,
+    "files of Python": 145,
     "lines of C": 957,
     "module constants with a number": 237,
-    "functions of a complexity above 10": 1,
+    "functions of a complexity above 10": 0,
     "functions of six parameters or more": 18,
-    "places that warn": 28,
+    "places that warn": 24,
     "files that import internals of UFL and FFCx": 2,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
