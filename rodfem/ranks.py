@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 RANK = ("PMIX_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK")  # variables of the environment, one of which every rank has
-ADDRESS = re.compile(r" at 0x\w+|(?<=\bvar)\d+|(?<=\bi_\{)\d+")
-"""In the text of an object, its place in the memory of a rank, and numbers that UFL counts on each rank."""
+ADDRESS = re.compile(r" at 0x\w+|(?<=\bvar)\d+|(?<=\bi_\{)\d+")  # an object's place in memory, and numbers of UFL
 PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
 """Seconds after which a rank that others do not join failed alone; between two looks for them at last, and at first."""
 

@@ -89,11 +89,11 @@ def derivative(
         if error_bar:
             richer = RicherMesh(curve.criterion, special.kind, node)
             there = richer.again(node)
-            rounded = 1e-9 * abs(value)  # of the differences, at most
-            error = bound(value, float(there.dp[0] / there.dp[1]), rounded, richer.rho)
+            rounded = 1e-9  # round-off of the differences, relative
+            error = bound(value, float(there.dp[0] / there.dp[1]), rounded * abs(value), richer.rho)
         if error_bar and along_the_rod:
             finer = _along(richer.richer.solver, there, parameter, PIECES // 2, fold=fold)[1]
-            along[2] = bound(0.0, abs(finer - along[1]).max(), 1e-9 * abs(along[1]).max(), richer.rho)
+            along[2] = bound(0.0, abs(finer - along[1]).max(), rounded * abs(along[1]).max(), richer.rho)
     return Derivative(value, error, *along)
 
 
