@@ -43,6 +43,8 @@ PIECES = 4
 DIFFERENCES = ((-2e-3, 1e3 / 12), (-1e-3, -2e3 / 3), (1e-3, 2e3 / 3), (2e-3, -1e3 / 12))
 """Places and weights of a central difference of the fourth order: along a null vector, in a parameter over its size."""
 
+Adjoint = tuple[PETSc.Vec, list[PETSc.Vec], PETSc.Vec | None]  # a state, its null vectors, and ``y``
+
 
 @dataclass(frozen=True)
 class Derivative:
@@ -114,12 +116,7 @@ def _along(
     return ends, (-shape.from_left(np.transpose(parts)) / rate * pieces / length).ravel()
 
 
-def _work(
-    system: System,
-    point: tuple[PETSc.Vec, list[PETSc.Vec], PETSc.Vec | None],
-    constants: dict[str, float],
-    number: int,
-) -> np.ndarray:
+def _work(system: System, point: Adjoint, constants: dict[str, float], number: int) -> np.ndarray:
     """Parts (pieces, cells) of ``sum v . S v + y . F``, or without ``y`` of ``sum v . F``, with other constants."""
     (x, null, y), scene, equations = point, system.scene, system.equations
     pieces = derived(equations, Pieces, lambda: Pieces(equations))

@@ -137,7 +137,8 @@ class Point:
         """Size of the curvature at the middle of the rod, bending alone; None without a solver."""
         if self.solver is None:
             return None
-        k = self.solver.resultants.strains(self.x, sum(self.solver.system.scene.interval) / 2)[1]
+        place = np.array([sum(self.solver.system.scene.interval) / 2])
+        k = self.solver.resultants.strains(self.x, place)[0, 1]
         return float(np.hypot(k[0], k[1]))
 
     @property

@@ -118,18 +118,23 @@ class Resultants:
 
         Where two elements meet it is the mean of both: force and moment have half of what acts there.
         """
-        ends = self.shape.from_left(self.shape.start)
         s = self.shape.sample(x)["s"] if s is None else np.asarray(s, dtype=float)
-        lower, upper = (np.clip(np.searchsorted(ends, s, side) - 1, 0, None) for side in ("left", "right"))
-        return self.on_elements(x, s, np.array([lower, upper]))
+        return self.on_elements(x, s, self._elements(s))
 
-    def strains(self, x: PETSc.Vec, s: float) -> np.ndarray:
-        """Strain and curvature at an arclength ``s`` of the state ``x``, as :meth:`profile` has them, (2, 3)."""
+    def strains(self, x: PETSc.Vec, s: np.ndarray) -> np.ndarray:
+        """Strain and curvature at arclengths ``s`` (m,) of the state ``x``, as :meth:`profile` has them, (m, 2, 3)."""
+        return self._mean(self.nodes[1:-1], self._values(x)[:, 1:-1, :2], s, self._elements(s))
+
+    def _elements(self, s: np.ndarray) -> np.ndarray:
+        """Elements (2, m) to the left and to the right of arclengths."""
+        starts = self.shape.from_left(self.shape.start)
+        return np.array([np.clip(np.searchsorted(starts, s, side) - 1, 0, None) for side in ("left", "right")])
+
+    def _mean(self, nodes: np.ndarray, table: np.ndarray, s: np.ndarray, elements: np.ndarray) -> np.ndarray:
+        """Mean of what the polynomials of ``elements`` (k, m) through a ``table`` at their ``nodes`` are at ``s``."""
         start, size = (self.shape.from_left(y) for y in (self.shape.start, self.shape.size))
-        values = self._values(x)
-        elements = np.clip(np.searchsorted(start, s, "left") - 1, 0, None), np.searchsorted(start, s, "right") - 1
-        places = [(e, _basis(self.nodes[1:-1], np.array([(s - start[e]) / size[e]]))[0]) for e in elements]
-        return np.mean([np.tensordot(basis, values[e, 1:-1, :2], 1) for e, basis in places], axis=0)
+        each = [np.einsum("mn,mnij->mij", _basis(nodes, (s - start[e]) / size[e]), table[e]) for e in elements]
+        return np.asarray(np.mean(each, axis=0))
 
     def on_elements(self, x: PETSc.Vec, s: np.ndarray, elements: np.ndarray) -> Profile:
         """The same at places of given ``elements`` (k, m), of which it is the mean."""
@@ -139,11 +144,8 @@ class Resultants:
         basis = _basis(shape.nodes, (s - start[first]) / size[first])
         own = degree * first[:, None] + np.arange(degree + 1)
         r, q = (np.einsum("mn,mni->mi", basis, sample[name][own]) for name in ("r", "q"))
-        strains, forces = np.zeros((2, len(s), 2, 3))
-        for e in elements:
-            t = (s - start[e]) / size[e]
-            strains += np.einsum("mn,mnij->mij", _basis(self.nodes[1:-1], t), whole[e, 1:-1, :2]) / len(elements)
-            forces += np.einsum("mn,mnij->mij", _basis(self.nodes, t), whole[e, :, 2:]) / len(elements)
+        strains = self._mean(self.nodes[1:-1], whole[:, 1:-1, :2], s, elements)
+        forces = self._mean(self.nodes, whole[:, :, 2:], s, elements)
         return Profile(s, r, np.swapaxes(directors(q), -1, -2), *strains.swapaxes(0, 1), *forces.swapaxes(0, 1))
 
     def table(self, x: PETSc.Vec) -> np.ndarray:
