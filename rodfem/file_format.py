@@ -9,7 +9,6 @@ each entry, group and column.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -84,7 +83,6 @@ LOCUS = Format("rodfem locus", f"a locus-1.json, locus-2.json ... of a run with 
 RESULT = Format("rodfem result", "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
-CONTROL = re.compile(r"(?<!\\)\\u00[0189]|[\x80-\x9f]")  # as JSON has them, a line's end otherwise
 UNREADABLE = (
     *(OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, MemoryError, ArithmeticError),
     np.linalg.LinAlgError,
@@ -107,14 +105,11 @@ def refusal(unfit: str) -> Iterator[None]:
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
     """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
     try:
-        content = path.read_text(encoding="utf-8")
-        data: dict[str, Any] = json.loads(content)
+        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as trouble:
         also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""
         raise InputError(f"There is no {path}: give {form.file}{also}.") from trouble
     except (OSError, ValueError, RecursionError) as trouble:
         raise InputError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
-    if CONTROL.search(content):
-        raise InputError(f"{path} has control characters in its texts, which would steer a terminal: give {form.file}.")
     form.check(data, path, needs)
     return data

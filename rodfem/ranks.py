@@ -1,7 +1,8 @@
 """Ranks of one job: what they do together, how they fail, and how they end, with each other and with mpirun.
 
 A fault of a numerical library that all ranks have is a failure, as that of an iteration which does not converge; one
-that a rank has alone ends all of them.
+that a rank has alone ends all of them.  An interrupt of a program is one sentence and status 130, whichever rank gets
+it.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from rodfem.errors import INTERRUPTED, ConvergenceError, InputError
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+KEPT = "interrupted; what was finished is kept"
 RANK = ("PMIX_RANK", "OMPI_COMM_WORLD_RANK", "PMI_RANK")  # variables of the environment, one of which every rank has
 ADDRESS = re.compile(r" at 0x\w+|(?<=\bvar)\d+|(?<=\bi_\{)\d+")  # an object's place in memory, and numbers of UFL
 PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
@@ -126,7 +128,42 @@ def end_with_launcher() -> None:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def first_of_job(word: str) -> bool:
+def listen() -> None:
+    """Interrupt this program where it is asked to end, as by Ctrl-C; to be called before anything that takes time."""
+    end_with_launcher()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    report = sys.excepthook
+
+    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if issubclass(kind, KeyboardInterrupt):
+            leave(str(error) or KEPT)
+        report(kind, error, trace)
+
+    sys.excepthook = hook
+
+
+def leave(sentence: str) -> NoReturn:
+    """Print a sentence, once, and leave with status 130; other ranks, which may know of nothing, end, too."""
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_IGN)  # once is enough
+    if _is_first("interrupted"):
+        sys.stderr.write(f"\n{sentence}\n")
+        sys.stderr.flush()
+    if launched():
+        if "mpi4py.MPI" in sys.modules:
+            from mpi4py import MPI
+
+            MPI.COMM_WORLD.Abort(INTERRUPTED)
+        os._exit(INTERRUPTED)  # the end of MPI would wait for ranks that do not come
+    sys.exit(INTERRUPTED)
+
+
+def end_quietly() -> None:
+    """Have the system end this process if nobody reads what it prints, as ``head``; PETSc has no handler of its own."""
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+
+
+def _is_first(word: str) -> bool:
     """Whether no other rank of this job, on this machine, has asked so for ``word``; yes where that is unknown."""
     if not launched():  # a variable may be left from the job of a parent
         return True

@@ -9,9 +9,9 @@ from typing import Any
 
 from lesson.answers import answer_to, answers
 from rodfem.app.cli import Parser, complain
-from rodfem.app.interrupts import end_quietly
 from rodfem.app.persons_file import load
 from rodfem.errors import InputError
+from rodfem.ranks import end_quietly
 
 WRONG = 1
 """Status of the program where the answer is wrong."""

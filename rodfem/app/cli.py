@@ -1,7 +1,7 @@
 """Command lines: their parser, and how they end.
 
 Importing this module checks the installation first: a script gets one sentence, and leaves with status 2, where a
-module is missing.  From then on an interrupt is one sentence and status 130 (:mod:`rodfem.app.interrupts`).
+module is missing.  From then on an interrupt is one sentence and status 130 (:mod:`rodfem.ranks`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rodfem.app.interrupts import listen
 from rodfem.errors import ConvergenceError, InputError, SetupError
+from rodfem.ranks import all_come, in_words, listen
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
@@ -91,8 +91,6 @@ def sentences(parser: Parser) -> Iterator[None]:
     """Bad input, and what fails for a reason that is known, ends with one sentence and status 2."""
     from petsc4py import PETSc
 
-    from rodfem.ranks import in_words
-
     try:
         yield
     except (InputError, SetupError, ConvergenceError) as trouble:
@@ -114,8 +112,6 @@ def start_petsc(options: Sequence[str]) -> None:
 def complain(sentence: str) -> NoReturn:
     """Print one sentence on rank 0 and leave with status 2 on every rank; one that complains alone ends the others."""
     from mpi4py import MPI
-
-    from rodfem.ranks import all_come
 
     comm = MPI.COMM_WORLD
 

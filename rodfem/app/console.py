@@ -17,8 +17,8 @@ from textwrap import fill
 
 import rodfem
 from rodfem.app.cli import Parser, complain, folder
-from rodfem.app.interrupts import end_quietly
 from rodfem.errors import InputError, SetupError
+from rodfem.ranks import end_quietly
 
 HELP = """usage: rodfem COMMAND [ARGUMENTS]
 
@@ -107,7 +107,7 @@ def info(words: Sequence[str]) -> None:
     """Special points, meshes and accuracy of a saved diagram."""
     from rodfem.file_format import DIAGRAM, read_json, refusal
     from rodfem.output.summary import in_sentences
-    from rodfem.output.words import table_of
+    from rodfem.output.words import special_lines
 
     parser = Parser(prog="rodfem info", description=_summary(info))
     parser.add_argument("folder", type=folder, help="that of a run, as results/cord")
@@ -119,11 +119,8 @@ def info(words: Sequence[str]) -> None:
         lines = [f"{data.get('title', data['scene'])}: {constants or 'no constants'}"]
         for mesh in data["meshes"]:
             lines.append(f"  {mesh['elements']} elements of degree {mesh['degree']}, {mesh['unknowns']} unknowns")
-        lines.append(f"  {'branch':<12} {'kind':<13} {data['parameter']:<24} {data['ordinate'][:24]:<24} index")
-        rows = [*table_of(data)]
+        lines += special_lines(data)
         for branch in data["branches"]:
-            for name, kind, load, ordinate, index, _ in (row for row in rows if row[0] == branch["name"]):
-                lines.append(f"  {name:<12} {kind:<13} {load:<24} {ordinate:<24} {index}")
             lines.append(f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}")
         print("\n".join([*lines, *(f"  {sentence}" for sentence in in_sentences(data))]))
 

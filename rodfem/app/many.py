@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.app.interrupts import held
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.diagram.diagram import MESH, PLAN, trace
 from rodfem.diagram.plan import Plan
@@ -87,8 +86,7 @@ def shared(
             for done, i in enumerate(range(comm.rank, len(keys), comm.size), start=1):
                 if _saved(files[i], keys[i]) is None:
                     result = _result(works[i])
-                    with held():
-                        save_json({"format": RESULT.mark(), "key": keys[i], "result": result}, files[i])
+                    save_json({"format": RESULT.mark(), "key": keys[i], "result": result}, files[i])
                 if comm.rank == 0:
                     progress(min(done * comm.size, len(keys)), len(keys))
         except InputError as error:  # a result or a file cannot be written: the other ranks go on with theirs

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
-from rodfem.app.interrupts import held
 from rodfem.app.persons_file import leave_the_run
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, SpecialPoint
@@ -119,7 +118,7 @@ class Terminal(Report):
             return
         new = diagram.branches[self._saved :]
         modes = typical_modes(new, diagram.solvers)
-        with diagram.clock("files"), held():
+        with diagram.clock("files"):
             if not self._saved:
                 on_first(self.comm, lambda: remove_earlier(self.output, _files_of_a_run(self.output)))
             self.data = diagram.data | {"files": self.files}
@@ -166,8 +165,7 @@ class Terminal(Report):
             on_first(self.comm, lambda: draw(output, self))
         diagram.complete = True
         self.data = data | diagram.remarks | {"complete": True}
-        with held():
-            self._name()
+        self._name()
 
     def _derive(self, diagram: Diagram) -> None:
         """Find the derivative of the load of each special point in each constant that the equations depend on."""

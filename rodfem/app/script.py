@@ -12,7 +12,7 @@ import os
 import sys
 
 from rodfem.app import console
-from rodfem.app.interrupts import end_quietly
+from rodfem.ranks import end_quietly
 
 
 def lesson(name: str) -> bool:

@@ -6,7 +6,7 @@ A verbose one has what is technical, too: unknowns, meshes, special points as th
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
 from textwrap import fill
 from time import monotonic
@@ -26,17 +26,7 @@ from rodfem.forms.kinematics import RODS
 from rodfem.modes.modes import Modes
 from rodfem.output.summary import called, in_sentences
 from rodfem.output.table import row_data, special_data
-from rodfem.output.words import (
-    COUNT,
-    INDEX,
-    in_decimals,
-    index_in_words,
-    is_estimated,
-    number,
-    rounded_up,
-    table_of,
-    with_unit,
-)
+from rodfem.output.words import COUNT, INDEX, in_decimals, index_in_words, number, rounded_up, special_lines
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -217,19 +207,7 @@ class Report(Observer):
 
     def table(self, data: Mapping[str, Any], branches: Sequence[Branch], most: int = 0) -> None:
         """Print every special point of the ``data`` of diagram.json, and what was not followed of its ``branches``."""
-        load, ordinate = (with_unit(data[x], data.get(f"{x}_unit") or "") for x in ("parameter", "ordinate"))
-        rows = list(table_of(data))
-        bars = "in parentheses a bound of the error" if is_estimated(data) else "no estimate of the errors"
-        self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
-        wide = max([len("branch point"), *(len(row[1]) for row in rows)])
-        self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
-        for name, kind, *numbers, index, remarks in rows:
-            self.say(f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}")
-            self._indented(remarks)
-        self._not_followed(branches, most)
-
-    def _not_followed(self, branches: Sequence[Branch], most: int) -> None:
-        """Say how many branch points were not followed, why, and what would follow them."""
+        self.say("\n" + "\n".join(special_lines(data)))
         if missed := not_followed(branches):
             deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
             more = Argument("Plan", "depth", deepest + 1)
@@ -238,11 +216,6 @@ class Report(Observer):
                 more, limit = Argument("Plan", "most_branches", 2 * most), f"as there are {len(branches)} branches"
             points = many(missed, "branch point was", "branch points were")
             self.say(f"  {points} not followed, {limit}: {more} follows what leaves there")
-
-    def _indented(self, remarks: Iterable[str]) -> None:
-        """Print lines that belong to the one before."""
-        for remark in remarks:
-            self.say(f"    {remark}")
 
     def summary(self, data: Mapping[str, Any]) -> None:
         """Print a diagram, the contents of ``diagram.json``, in sentences."""
@@ -299,8 +272,8 @@ class Report(Observer):
         """Print what was ``found`` of the branch ``name`` at a ``load``, with its ``modes`` if there are some."""
         zero = f", {found.zero} zero" if found.zero else ""
         self.say(f"  {name}, {load}: {self._stability(found)}{zero}")
-        self._indented(map(str, found.soft))
-        self._indented(_eigenvalues(found, modes))
+        for line in (*map(str, found.soft), *_eigenvalues(found, modes)):
+            self.say(f"    {line}")
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
         self.say(f"    {found.method} ({found.reason}){proof}")
         self.detail(f"    {many(found.factorisations, 'factorisation')}, {1e3 * found.seconds:.1f} ms")

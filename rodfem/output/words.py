@@ -107,14 +107,27 @@ def index_in_words(special: Data, row: Data) -> str:
     return index if space is None else f"{index} (in space {space})"
 
 
-def is_estimated(data: Data) -> bool:
+def special_lines(data: Data) -> Iterator[str]:
+    """Table of all special points, with what else there is to say of each."""
+    load, ordinate = (with_unit(data[x], data.get(f"{x}_unit") or "") for x in ("parameter", "ordinate"))
+    rows = list(table_of(data))
+    bars = "in parentheses a bound of the error" if _is_estimated(data) else "no estimate of the errors"
+    yield f"Special points ({bars}; ordinate: {ordinate})"
+    wide = max([len("branch point"), *(len(row[1]) for row in rows)])
+    yield f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {COUNT if is_sweep(data) else INDEX}"
+    for name, kind, *numbers, index, remarks in rows:
+        yield f"  {name:<12} {kind:<{wide}} {numbers[0]:<24} {numbers[1]:<24} {index}"
+        yield from (f"    {remark}" for remark in remarks)
+
+
+def _is_estimated(data: Data) -> bool:
     """Whether the error of the load of any special point is estimated."""
     return any(x.get("error_estimate") is not None for branch in data["branches"] for x in branch["special"])
 
 
 def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
     """Branch, kind, load, ordinate and index of each special point, and remarks; without bars where none is known."""
-    scale, known = _scale(data), is_estimated(data)
+    scale, known = _scale(data), _is_estimated(data)
     for branch, special in ((b, special) for b in data["branches"] for special in b["special"]):
         row = row_of(branch, special["row"])
         found = {name: _read(special, name, inf, scale * (name == "ordinate")) for name in READ}

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hard.folders import HOME, MPIRUN, alive, branches_in, children_of, surroundings
 
-from rodfem.app.interrupts import KEPT, held
+from rodfem.ranks import KEPT
 
 HEMITROPIC = ("demos/hemitropic.py", "--no-figures", "--verbose", "--output")
 MAP = ("demos/map.py", "--couplings", "200", "--output")
@@ -111,16 +111,3 @@ def test_a_rank_that_fails_alone() -> None:
     ended = struck(("-c", ALONE), 2, "found", "mpirun", 0)
     assert (ended.left, ended.status) == ([], 1)
     assert "ValueError: a mistake of one rank" in ended.errors
-
-
-def test_interrupts_wait_while_files_are_saved() -> None:
-    done: list[str] = []
-    before, asked = signal.getsignal(signal.SIGTERM), signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt), held():
-            signal.raise_signal(signal.SIGINT)
-            done.append("saved")
-    finally:
-        signal.signal(signal.SIGINT, asked)  # a shell starts a process in the background without it
-    assert done == ["saved"]
-    assert signal.getsignal(signal.SIGTERM) is before

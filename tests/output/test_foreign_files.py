@@ -170,8 +170,6 @@ PROGRAMS: list[tuple[Callable[[Path], None], str, str]] = [
     (lambda bad: entries(bad, "scene"), "info list view", "has no scene"),
     (lambda bad: entries(bad, "branches", 0, "columns", "negative"), "info list", "'negative'"),
     (lambda bad: entries(bad, "meshes", to=[3]), "info", "diagram.json"),
-    (lambda bad: entries(bad, "title", to="\x1b]0;a title\x07"), "info list view", "control characters in its texts"),
-    (lambda bad: entries(bad, "branches", 0, "name", to="\x9b2J"), "info list view", "control characters in its texts"),
     (lambda bad: (bad / "states.h5").write_bytes(b"HDF"), "view convert load", "states.h5"),
 ]
 
