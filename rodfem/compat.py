@@ -124,6 +124,12 @@ def lagrange_basis(degree: int, x: np.ndarray) -> np.ndarray:
     return np.asarray(values)[0].reshape(len(x), degree + 1)
 
 
+def basis_on_pieces(degree: int, pieces: int) -> np.ndarray:
+    """Values of the same basis at the nodes of equal pieces of an element, (pieces, nodes, nodes)."""
+    places = (np.arange(pieces)[:, None] + nodes(degree)) / pieces
+    return lagrange_basis(degree, places.ravel()).reshape(pieces, degree + 1, degree + 1)
+
+
 @cache
 def _lagrange(degree: int) -> Any:
     return basix.create_element(

@@ -123,8 +123,7 @@ class SoftStates:
 
     def _is_clear(self, point: Point) -> bool:
         """Whether one factorisation told the index of a point, with a distance of the nearest eigenvalue from zero."""
-        regular = None if point.nearest else self.solver.regular.at(point.x)
-        return bool(point.nearest or (regular and regular.index and regular.index.nearest))
+        return bool(point.nearest or self.solver.regular.at(point.x))
 
     def _differing(self, point: Point, fixed_load: bool) -> int:
         """Number of eigenvalues of another sign on the richer mesh, or zero there alone; 1 for a row it has not."""

@@ -52,8 +52,9 @@ ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
-NEAR = 1e-3
-"""Distance of an eigenvalue from zero, over the lowest bending eigenvalue, below which the two shifts count."""
+DOUBTFUL = 1e-3
+"""Estimate of the nearest eigenvalue, over the lowest bending one, that one more step of inverse iteration sharpens:
+the generic part of the block finds a new mode as far as that."""
 
 
 class Knot(Protocol):
@@ -152,8 +153,7 @@ def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc
 class RegularPoint:
     """A state whose factors serve: no eigenvalue is near zero."""
 
-    index: Index | None  # by the count of the factors; None where an eigenvalue is too near zero for one count
-    nearest: float  # estimated distance of the eigenvalue nearest zero from zero
+    index: Index  # by the count of the factors
     tangent: PETSc.Vec  # unit tangent, on the side of increasing load
 
     def along(self, row: PETSc.Vec) -> PETSc.Vec:
@@ -187,7 +187,9 @@ class RegularPoints:
         # inverse iteration: one step a point along a branch, three from generic vectors
         for _ in range(1 if self._started else 3):
             own, nearest = self._solve(found)
-        self._started = nearest > NEAR * inertia.scale
+        if nearest < DOUBTFUL * inertia.scale:
+            own, nearest = self._solve(found)
+        self._started = nearest > inertia.regular
         if not self._started:
             self.restart()
             return None
@@ -195,8 +197,7 @@ class RegularPoints:
         tangent.array[:] = own
         self.system.set_load(tangent, 1.0)
         tangent.scale(1.0 / self.system.norm(tangent))
-        certain = nearest >= NEAR * inertia.scale + 10 * inertia.tolerance
-        return RegularPoint(Index(below, found.drifts, nearest) if certain else None, nearest, tangent)
+        return RegularPoint(Index(below, found.drifts, nearest), tangent)
 
     def _solve(self, found: Factored) -> tuple[np.ndarray, float]:
         """Change of state with the load, and the distance of the nearest eigenvalue: a step of inverse iteration."""

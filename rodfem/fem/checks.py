@@ -174,12 +174,15 @@ class Pieces:
         return self._assembled(form, values, pieces, places)
 
     def _assembled(self, form: Assembler, values: np.ndarray, pieces: int, places: Places) -> np.ndarray:
-        bases, mine = self._bases(pieces), self._form(form, pieces)
-        local = values @ bases.transpose(0, 2, 1)
-        out = np.zeros(local.size)
+        mine, local = self._form(form, pieces), np.tile(values, (pieces, 1, 1))
+        for rows, basis in self._bases(pieces):
+            local[..., rows] = basis @ values[:, rows]
+        out = np.zeros_like(local)
         mine.constants = form.constants
-        mine.add(local.ravel(), places, out)
-        return np.asarray(out.reshape(local.shape) @ bases)
+        mine.add(local.ravel(), places, out.ravel())
+        for rows, basis in self._bases(pieces):
+            out[..., rows] = basis.swapaxes(2, 3) @ out[..., rows]
+        return out
 
     def _assembler(self, form: Assembler, pieces: int) -> Assembler:
         return Assembler(form.form, self._cells(pieces), self.equations.known.cut(pieces), self._load, inside=True)
@@ -191,15 +194,11 @@ class Pieces:
         dofs = np.arange(pieces * self.dofs.size, dtype=np.int32).reshape(-1, self.dofs.shape[1])
         return Cells(np.ascontiguousarray(x.reshape(-1, 2, 3)), dofs)
 
-    def _tabulated(self, pieces: int) -> np.ndarray:
-        """Values of the basis of a cell at the nodes of its pieces, (pieces, n, n)."""
-        out = np.tile(np.eye(self.dofs.shape[1]), (pieces, 1, 1))
-        for block in self.fields.blocks:
-            nodes = compat.nodes(block.degree)
-            values = [compat.lagrange_basis(block.degree, (piece + nodes) / pieces) for piece in range(pieces)]
-            for rows in self.rows[block.name].T:
-                out[:, rows[:, None], rows] = values
-        return out
+    def _tabulated(self, pieces: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each field the rows (nodes, size), and its basis at the nodes of pieces, (pieces, 1, nodes, nodes)."""
+        degrees = {block.name: block.degree for block in self.fields.blocks}
+        cut = cache(lambda degree: compat.basis_on_pieces(degree, pieces)[:, None])
+        return [(self.rows[name], cut(degree)) for name, degree in degrees.items()]
 
 
 class QuadratureCheck:

@@ -90,10 +90,10 @@ class Known:
 
     def cut(self, pieces: int) -> Known:
         """The same on equal pieces of this rank's elements, those of the first piece of all elements before others."""
-        out, nodes, own = copy(self), compat.nodes(self._degree), self.along[: self._fields.owned_cells]
+        out, own = copy(self), self.along[: self._fields.owned_cells]
         values = own.reshape(len(own), self._degree + 1, -1)
-        bases = [compat.lagrange_basis(self._degree, (piece + nodes) / pieces) for piece in range(pieces)]
-        out.along = np.concatenate([(basis @ values).reshape(len(values), -1) for basis in bases])
+        cut = compat.basis_on_pieces(self._degree, pieces)[:, None] @ values
+        out.along = cut.reshape(pieces * len(values), -1)
         return out
 
     def _at_nodes(self, a: float, b: float, p: int) -> np.ndarray:

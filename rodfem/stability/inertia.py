@@ -42,6 +42,8 @@ ROUNDED = 1e-13
 round-off."""
 FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
+REGULAR = 1e-5
+"""Distance of the nearest eigenvalue from zero, over the lowest bending one, from which on one factorisation serves."""
 FAR = 0.1
 """Shift of the factors, over the lowest bending eigenvalue, above which they lead to others than those near zero."""
 
@@ -154,6 +156,11 @@ class Inertia:
         smallest = system.comm.allreduce(weights.array_r[weights.array_r > 0].min(initial=np.inf), op=MPI.MIN)
         self.resolution = 10 * EPS * system.matrix_in_units(self.matrix).norm(PETSc.NormType.INFINITY) / smallest
         self.tolerance = max(self.tolerance, self.resolution)
+
+    @property
+    def regular(self) -> float:
+        """Distance of the nearest eigenvalue from zero from which on factors of ``S`` itself count and solve."""
+        return REGULAR * self.scale + 10 * self.tolerance
 
     def forget_band(self) -> None:
         """Settle the band of round-off, and that of symmetries, at the next state."""

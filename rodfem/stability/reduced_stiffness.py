@@ -175,7 +175,7 @@ class Condensation:
             Z = found.factors.solve_all(B)
             H = _symmetric(np.linalg.inv(_symmetric(inertia.sum(B.T @ Z))))
             values, vectors = np.linalg.eigh(H)
-            near = not abs(values).min() > 1e-3 * inertia.scale  # S is too nearly singular to be solved with
+            near = not abs(values).min() > inertia.regular  # S is too nearly singular to be solved with
         except (ConvergenceError, np.linalg.LinAlgError):
             near = True
         if near:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rodfem.continuation.branch import Branch
-from rodfem.continuation.branch_solver import NEAR, BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.fem.symmetries import phase_at
 
@@ -60,7 +60,7 @@ def test_near_singular_states_are_left_to_others(name: str) -> None:
         assert follower.regular.at(s.point.x) is None
         found = follower.inertia.at(s.point.x)
         found.count()
-        assert abs(found.nearest(1)[0][0]) < NEAR * follower.inertia.scale
+        assert abs(found.nearest(1)[0][0]) < follower.inertia.regular
 
 
 @pytest.mark.ranks
@@ -77,8 +77,8 @@ def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
             factored = follower.inertia.at(point.x)
             factored.count()
             exact = abs(factored.nearest(1, accuracy=1e-6)[0][0])
-            assert regular.nearest > (1 - 1e-6) * exact  # an upper bound
-            seen.append(regular.nearest / exact)
+            assert regular.index.nearest > (1 - 1e-6) * exact  # an upper bound
+            seen.append(regular.index.nearest / exact)
     assert len(seen) > 5
     assert np.median(seen) < 1.5
 
