@@ -126,8 +126,16 @@ def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> tuple[np
 
 
 def _aligned(chord: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Shortest rotation of a ``chord`` into the direction that is ``wanted``; none if that is not known."""
-    sizes = np.linalg.norm(chord) * np.linalg.norm(wanted)
+    """Shortest rotation of a ``chord`` into the direction that is ``wanted``, which is not a number where it is free.
+
+    There it is as long as the chord makes it; no rotation, if that is not known.
+    """
+    free, squared = np.isnan(wanted), float(chord @ chord)
+    part = np.where(free, chord if np.any(chord[free]) else 1.0, 0.0)
+    if free.any():
+        part *= np.sqrt(max(squared - np.nansum(wanted**2), 0.0) / (part @ part))
+    wanted = np.where(free, part, wanted)
+    sizes = np.sqrt(squared * (wanted @ wanted))
     cosine = float(chord @ wanted / sizes) if sizes > 0 else -1.0
     if cosine <= -1 + NEGLIGIBLE:
         return np.array(IDENTITY)

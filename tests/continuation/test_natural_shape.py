@@ -32,9 +32,10 @@ def arch(ends: tuple[Any, Any], natural: Any = lambda c: 1 / RADIUS, **more: Any
     return Scene(**given | more)
 
 
+@pytest.mark.parametrize("chord", [None, 2 * RADIUS * sin(HALF)])
 @pytest.mark.parametrize("planar", [None, "e2"])
-def test_an_arch_between_pins_begins_at_rest(planar: str | None) -> None:
-    ends = pinned(), pinned(lambda c: (0.0, 0.0, 2 * RADIUS * sin(HALF)))
+def test_an_arch_between_pins_begins_at_rest(planar: str | None, chord: float | None) -> None:
+    ends = pinned(), pinned(lambda c: (0.0, 0.0, chord))
     point = Solver(arch(ends, planar=planar)).equilibrium(0.0)
     assert point.energy < 1e-16 and point.negative == 0  # in space it turns about its chord, at no cost
     assert abs(point.ordinate) == pytest.approx(RADIUS * (1 - cos(HALF)), rel=1e-9)
