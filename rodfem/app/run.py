@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cache, partial
 from itertools import product
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -170,10 +171,12 @@ class Terminal(Report):
     def _derive(self, diagram: Diagram) -> None:
         """Find the derivative of the load of each special point in each constant that the equations depend on."""
         asked = asked_for(diagram.scene) - {diagram.scene.load, "s"}
+        bar = self.plan.error_bars or self.plan.accuracy is not None
         for branch in diagram:
             for special, name in product(_to_follow(branch), sorted(asked)):
                 with self._without(diagram, branch, special):
-                    diagram.derivative(special, name)
+                    found = special.derivative(name)
+                    special.derivatives[name] = found.value, found.error if bar else nan
 
     def _assess(self, diagram: Diagram, figures: bool) -> None:
         """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""

@@ -158,16 +158,17 @@ class Plane:
         """Both parameters by name."""
         return ", ".join(f"{name} = {v:.{digits}g}" for name, v in zip(self.names, p, strict=True))
 
-    @contextmanager
-    def kept(self) -> Iterator[None]:
-        """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries."""
-        system, verification = self.system, self.system.verification
-        before, dropped, notices = (system.line, system.phase), {*verification.dropped}, [*verification.notices]
-        try:
-            yield
-        finally:
-            system.line, system.phase = before
-            verification.dropped, verification.notices = dropped, notices
+
+@contextmanager
+def kept(system: System) -> Iterator[None]:
+    """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries."""
+    verification = system.verification
+    before, dropped, notices = (system.line, system.phase), {*verification.dropped}, [*verification.notices]
+    try:
+        yield
+    finally:
+        system.line, system.phase = before
+        verification.dropped, verification.notices = dropped, notices
 
 
 def predict(nodes: list[LocusPoint], s: float) -> Prediction:

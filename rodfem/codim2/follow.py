@@ -28,6 +28,7 @@ from rodfem.codim2.criteria import (
     Plane,
     Singular,
     between,
+    kept,
     null_vectors,
     predict,
     unstable,
@@ -253,7 +254,7 @@ def locus(
     is left as it was; ``doubtful``: its mesh leaves the index next to the point open.
     """
     plane = Plane(solver.system, parameter, bounds)
-    with solver.system.clock.scope("locus"), plane.kept():
+    with solver.system.clock.scope("locus"), kept(plane.system):
         curve = Curve(solver, special, plane, doubtful=doubtful or special.resolved is False)
         curve.follow(steps)
         found = curve.locus(*curve.errors(error_bars))
@@ -274,7 +275,7 @@ class Curve:
             raise InputError(
                 f"The special point at {load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
             )
-        _check(solver, special)
+        check_special(solver, special)
         self.solver, self.special, self.plane, self.doubtful = solver, special, plane, doubtful
         guess = self._guess(p)
         self.criterion = criterion_of(solver, plane, special.kind, guess)
@@ -350,7 +351,7 @@ class Curve:
 
     def rows(self, which: int, value: float) -> list[Row]:
         """Rows at which parameter ``which`` has a ``value``, solved for on the mesh, each once, the start first."""
-        with self.plane.kept():
+        with kept(self.plane.system):
             found = self._crossings(which, value)
         other, sizes = 1 - which, (float(self.plane.sizes[1 - which]), self.solver.units.ordinate)
         places = [(float(n.p[other]), n.ordinate) for n in found]
@@ -441,7 +442,7 @@ class Curve:
         return int(-np.sign(change * special.point.slope))
 
 
-def _check(solver: BranchSolver, special: SpecialPoint) -> None:
+def check_special(solver: BranchSolver, special: SpecialPoint) -> None:
     """Raise :class:`InputError` for a special point that has no locus."""
     if special.kind.line is None:
         kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)

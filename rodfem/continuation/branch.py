@@ -20,6 +20,7 @@ from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, SoftMode, inde
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
+    from rodfem.codim2.sensitivity import Derivative
     from rodfem.continuation.branch_solver import BranchSolver
     from rodfem.fem.resultants import Profile, Reactions
     from rodfem.problem.events import Event, Level
@@ -89,7 +90,7 @@ class Point:
 
         Raises :class:`~rodfem.errors.InputError` for a place that is not on the rod.
         """
-        scene, resultants = self._solver.system.scene, self._solver.resultants
+        scene, resultants = self.own_solver.system.scene, self.own_solver.resultants
         if s is None:
             return resultants.profile(self.x)
         places, (first, last) = np.atleast_1d(np.asarray(s, dtype=float)), scene.interval
@@ -98,7 +99,8 @@ class Point:
         return resultants.profile(self.x, places)
 
     @property
-    def _solver(self) -> BranchSolver:
+    def own_solver(self) -> BranchSolver:
+        """Solver of its mesh; raises :class:`~rodfem.errors.InputError` for a point without one."""
         if self.solver is None:
             raise InputError("This point has no solver: take one of a diagram, or of a Solver.")
         return self.solver
@@ -167,7 +169,17 @@ class Point:
 
         A special point has bounds of their errors: ``special.errors["reactions"]``.
         """
-        return self._solver.reactions(self.x)
+        return self.own_solver.reactions(self.x)
+
+    def derivative(self, parameter: str) -> Derivative:
+        """Derivative of the ordinate in a ``parameter`` at this load: ``.value`` and ``.error``; collective.
+
+        Raises :class:`~rodfem.errors.InputError` for what is no constant of the scene, and
+        :class:`~rodfem.errors.ConvergenceError` where the state is singular.
+        """
+        from rodfem.codim2.sensitivity import ordinate_derivative
+
+        return ordinate_derivative(self, parameter)
 
     def backwards(self, total: float) -> Point:
         """The same equilibrium on the branch of length ``total`` followed the other way."""
@@ -277,6 +289,19 @@ class SpecialPoint:
         """Kind, load and change of the index."""
         change = f"{self.negative_before}->{self.negative_after}"
         return f"<Special point: {self.kind.words} at load {self.point.load:.10g}, index {change}>"
+
+    def derivative(self, parameter: str, *, along_the_rod: bool = False) -> Derivative:
+        """Derivative of its load in a ``parameter``: how much stiffer, how much later it buckles; collective.
+
+        Of a fold, a branch point, a flutter or a divergence load; ``.value``, and ``.error``, which is computed when it
+        is asked for.  ``along_the_rod`` its ``.density`` is known, too, at folds and branch points: how the load
+        changes with a parameter that varies, a derivative per length of rod.  Raises
+        :class:`~rodfem.errors.InputError` for a parameter or a kind of special point that make no sense, and
+        :class:`~rodfem.errors.ConvergenceError` where the parameter takes the special point apart.
+        """
+        from rodfem.codim2.sensitivity import derivative
+
+        return derivative(self, parameter, along_the_rod=along_the_rod)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -63,6 +63,8 @@ FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""
 SPLIT = 1.1
 """Times what eigenvalues, or the ``D`` of pairs, that vanish as one differ by that each may be off: to first order."""
+SHARP = ((1.0, 4 / 3), (-1.0, -4 / 3), (2.0, -1 / 6), (-2.0, 1 / 6))
+"""Steps of a central difference of the fourth order, and their weights, twice the step over them."""
 Vectors = Sequence[PETSc.Vec]
 
 
@@ -176,16 +178,19 @@ class SingularSystem:
         sides, *_ = self._modes(self.inertia.at(x).matrix)
         return sides[0], sides[-1]
 
-    def adjoint(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], PETSc.Vec | None, float]:
-        """Null vectors ``v`` at a solution, ``y`` with ``S y = -sum D(S v) v``, and the rate of the eigenvalues' sum.
-
-        Of a fold, which has no ``y``, the rate is the work of the load along the null vector.
-        """
-        at = self._linear(x, 0.0, sharp=True)
-        null = [combine(at.V, z) for z in at.Z.T]
+    def adjoint(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]]]:
+        """Null vectors at a solution, and ``y`` (k, k), ``S y_ij = -D(S v_i) v_j`` across them; no ``y`` at folds."""
+        sides, G, _ = self._modes(self._at(x, 0.0).matrix)
+        null, bordered = [combine(sides[0], z) for z in self._split(G)[0].T], self._bordered[0]
         if self.fold:
-            return null, None, float(at.columns[0].dot(null[0]))
-        return null, self._bordered[0].solve(-at.y, np.zeros(len(self.psi)))[0], float(at.rows[-1, 1])
+            return null, []
+        images = [[self.system.new_vector() for _ in null] for _ in null]
+        for v, row in zip(null, images, strict=True):
+            for step, weight in SHARP:
+                matrix = self._at(x + v * (step * DIFFERENCE), 0.0, moved=True).matrix
+                for image, other in zip(row, null, strict=True):
+                    image.axpy(weight / (2 * DIFFERENCE), self._image(matrix, other))
+        return null, [[bordered.solve(-image, np.zeros(len(self.psi)))[0] for image in row] for row in images]
 
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
@@ -308,7 +313,7 @@ class SingularSystem:
         They are central differences, of the fourth order if ``sharp``.
         """
         y, f = self.system.new_vector(), np.zeros(1 if self._section is None else 2)
-        steps = ((1.0, 4 / 3), (-1.0, -4 / 3), (2.0, -1 / 6), (-2.0, 1 / 6)) if sharp else ((1.0, 1.0), (-1.0, -1.0))
+        steps = SHARP if sharp else ((1.0, 1.0), (-1.0, -1.0))
         for v, left in zip(*sides, strict=True):
             for step, weight in steps:
                 there, share = x + v * (step * DIFFERENCE), weight / (2 * DIFFERENCE)

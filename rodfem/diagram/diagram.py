@@ -216,20 +216,8 @@ class Diagram:
         along_the_rod=yes_or_no,
     )
     def derivative(self, special: SpecialPoint, parameter: str, *, along_the_rod: bool = False) -> Derivative:
-        """Derivative of the load of a special point in a ``parameter``: how much stiffer, how much later it buckles.
-
-        Of a fold, a branch point, a flutter or a divergence load of this diagram; ``.value``, and ``.error`` where the
-        diagram has error bars.  ``along_the_rod`` its ``.density`` is known, too, at folds and branch points: how the
-        load changes with a parameter that varies, a derivative per length of rod.  Raises
-        :class:`~rodfem.errors.InputError` for a parameter or a kind of special point that make no sense, and
-        :class:`~rodfem.errors.ConvergenceError` where the parameter takes the special point apart.
-        """
-        from rodfem.codim2.sensitivity import derivative
-
-        solver, bar = self.solvers[special.point.mesh], self.plan.error_bars or self.plan.accuracy is not None
-        found = derivative(solver, special, parameter, error_bar=bar, along_the_rod=along_the_rod)
-        special.derivatives[parameter] = found.value, found.error
-        return found
+        """Derivative of the load of a special point in a ``parameter``: see :meth:`rodfem.SpecialPoint.derivative`."""
+        return special.derivative(parameter, along_the_rod=along_the_rod)
 
     @checked(load=finite(1.0), tries=whole(24, 0), seed=whole(0, 0))
     def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:

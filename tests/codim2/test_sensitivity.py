@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Ordinate, Parameter, Plan, Scene, clamped, sliding
+from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free, sliding
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.forms.energy import bending_and_twist
 
@@ -74,6 +74,57 @@ def test_of_a_fold_is_the_sum_along_the_rod() -> None:
     for name in "AC":
         found = diagram.derivative(fold, name, along_the_rod=True)
         assert abs(found.density @ np.diff(found.ends) - found.value) <= found.error
+
+
+def test_loads_of_a_double_point_split() -> None:
+    """The column of one stiffness in two planes: pi^2 for B, and nothing for A, in some basis of the null vectors."""
+    diagram = rodfem.trace(round_column(), plan=PLAN)
+    (buckling,) = diagram.special("branch point")
+    assert buckling.multiplicity == 2
+    for name in "AB":
+        found = buckling.derivative(name)
+        assert abs(found.splitting - found.splitting.T).max() < 1e-9
+        assert np.linalg.eigvalsh(found.splitting) == pytest.approx([0.0, 4 * pi**2], abs=1e-8)
+        assert found.value == pytest.approx(2 * pi**2) and found.error < 1e-6
+
+
+def round_column() -> Scene:
+    """A column between clamps whose two stiffnesses are one by accident."""
+    return Scene(
+        name="round column",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (c.A, c.B, 1.0)),
+        parameters={"P": Parameter(0.0), "A": Parameter(1.0), "B": Parameter(1.0)},
+        load="P",
+        ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("shortening", s=1.0, of=lambda r, q: 1 - r[2]),
+        span=(0.0, 45.0),
+    )
+
+
+def test_of_an_ordinate() -> None:
+    """An arc of the curvature M / B + K: its end is (1 - cos k) / k off the tangent, and a sum over it is k."""
+    arc = Scene(
+        name="arc",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist((k[0] - c.K, k[1], k[2]), (c.B, 1.0, 1.0)),
+        parameters={"M": Parameter(0.0), "B": Parameter(2.0), "K": Parameter(0.0)},
+        load="M",
+        ends=(clamped(), free(moment=lambda c: (c.M, 0.0, 0.0))),
+        ordinate=Ordinate("deflection", s=1.0, of=lambda r, q: r[1]),
+        span=(0.0, 3.0),
+        planar="e1",
+    )
+    point = rodfem.Solver(arc).equilibrium(2.4)
+    k = 1.2
+    slope = (k * np.sin(k) - 1 + np.cos(k)) / k**2 * np.sign(point.ordinate)
+    for name, factor in (("K", 1.0), ("B", -k / 2)):
+        found = point.derivative(name)
+        assert abs(found.value - factor * slope) <= found.error < 1e-7
+    with pytest.raises(InputError, match="choose one of B, K"):
+        point.derivative("M")
 
 
 def test_of_flutter_in_the_stiffness(tmp_path: Path) -> None:
