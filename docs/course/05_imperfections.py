@@ -127,7 +127,6 @@ other = rodfem.trace(replace(imperfect, start=bent, span=(4.0, 1.0), states="the
 (snap,) = other.special("fold")
 curves = {"perfect": straight, "followed": followed, "the other": other}
 show(equilibria(curves, "thrust $P$", "tip displacement").figure, "05_snap")
-print(f"followed: {followed.special()}; the other: {snap}")
 
 # %% [markdown]
 # ## Number
@@ -153,9 +152,11 @@ print(f"curvature {answer:.9f} (1/8); fold at {snap.point.load:.10f}, by Koiter 
 # \varepsilon\sin\theta$ has a *subcritical* pitchfork. At which largest $p$ does it collapse for $\varepsilon = 0.01$?
 #
 # **5.3** A heavy column (exercise 2.2): $q = q_1(1 + c\,a^2)$. Find $c$, with $a$ the angle of the tip.
+#
+# **5.4** [Two robots](../trades/two-grippers.md): at which $\kappa$ does $C_{11} = 0.65$, $C_{22} = 0$ end, by a jump?
 
 # %% [markdown]
 # ## Where it breaks
 #
-# The law is local: at $\varepsilon = 0.02$ it is off by 0.06 %. Two modes at nearly one load make the reduced energy
-# one of two amplitudes, more sensitive to imperfections. Symmetric rods do that always (lesson 7).
+# The law is local: at $\varepsilon = 0.02$ it is off by 0.06 %. Two modes at nearly one load, as of symmetric rods
+# (lesson 7), make the reduced energy one of two amplitudes, more sensitive to imperfections.

@@ -37,4 +37,12 @@ ANSWERS = (
         "Take the null vector of exercise 2.2, one at the tip, and the derivatives of lesson 5 with the weight 1 - s.",
         ((1 / 8, "That is the load at the tip: the upper part of a heavy column carries less."),),
     ),
+    Answer(
+        "curvature at which the rod between two robots leaves the helix C11 = 0.65, C22 = 0",
+        6.551450266,
+        "by another computation of the rod of Tong, Borum & Jawed (2022)",
+        1e-8,
+        "grippers(0.65, 0.0) of the page: its first branch point.",
+        ((7.068037605, "That is the path of C11 = 0.23."),),
+    ),
 )
