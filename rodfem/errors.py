@@ -1,4 +1,4 @@
-"""The errors that rodfem raises on purpose; each message is one sentence for a person, its remedy is data as well.
+"""The errors that rodfem raises on purpose; each message is one sentence for a person, with its remedy.
 
 A remedy names arguments of the interface in Python, as in ``StepControl(largest=...)``.  The command line, which has an
 option for each, names that instead (:meth:`rodfem.app.cli.Parser.in_options`).
@@ -6,9 +6,8 @@ option for each, names that instead (:meth:`rodfem.app.cli.Parser.in_options`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 INTERRUPTED = 130  # status of a program that is interrupted
+SMALLER_STEPS = "use smaller steps (StepControl(largest=...))"
 
 
 def many(count: int, noun: str, plural: str = "") -> str:
@@ -16,41 +15,7 @@ def many(count: int, noun: str, plural: str = "") -> str:
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
-@dataclass(frozen=True)
-class Argument:
-    """An argument of a public class or function, with the ``value`` to give where there is one to recommend."""
-
-    owner: str
-    name: str
-    value: object = ...
-
-    def __str__(self) -> str:
-        return f"{self.owner}({self.name}={'...' if self.value is ... else repr(self.value)})"
-
-
-class Remedy:
-    """What to try: words in which each ``{}`` stands for an argument."""
-
-    def __init__(self, words: str, *arguments: Argument) -> None:
-        self.words, self.arguments = words, arguments
-
-    def __str__(self) -> str:
-        return self.words.format(*self.arguments)
-
-
-SMALLER_STEPS = Remedy("use smaller steps ({})", Argument("StepControl", "largest"))
-POINTWISE = Remedy("use {}", Argument("Discretization", "formulation", "pointwise"))
-
-
-class _Remediable(Exception):
-    """An error in one sentence, or in the first half of one that its ``remedy`` completes."""
-
-    def __init__(self, sentence: str, remedy: Remedy | None = None) -> None:
-        super().__init__(sentence if remedy is None else f"{sentence}: {remedy}.")
-        self.remedy = remedy
-
-
-class InputError(_Remediable, ValueError):
+class InputError(ValueError):
     """An option, an argument or a file that does not make sense: names the value, what was expected, what to try."""
 
 
@@ -58,9 +23,9 @@ class SceneError(InputError):
     """A scene that does not make sense."""
 
 
-class ConvergenceError(_Remediable, RuntimeError):
+class ConvergenceError(RuntimeError):
     """Newton's method found no equilibrium where one was needed; says at which load and what to try."""
 
 
-class SetupError(_Remediable, RuntimeError):
+class SetupError(RuntimeError):
     """A missing or unfit installation (complex PETSc, no dolfinx, a locked form cache); says what to do."""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rodfem import __version__
-from rodfem.errors import Argument, InputError
+from rodfem.errors import InputError
 
 if TYPE_CHECKING:
     import h5py
@@ -78,8 +78,8 @@ class Format:
 
 DIAGRAM = Format("rodfem diagram", "the diagram.json of a run", 2)
 STATES = Format("rodfem states", "the states.h5 of a run", 2)
-MODES = Format("rodfem modes", f"the modes.h5 of a run with {Argument('Plan', 'modes')}")
-LOCUS = Format("rodfem locus", f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
+MODES = Format("rodfem modes", "the modes.h5 of a run with Plan(modes=...)")
+LOCUS = Format("rodfem locus", "a locus-1.json, locus-2.json ... of a run with Plan(locus=...)")
 RESULT = Format("rodfem result", "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 

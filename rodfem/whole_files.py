@@ -19,7 +19,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rodfem.errors import Argument, InputError, Remedy
+from rodfem.errors import InputError
 from rodfem.ranks import on_first
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ LOCK = ".lock"  # file whose lock says that the folder is in use; it has the pro
 OF_A_RUN = ("modes.h5", "modes-*.png", "modes-*.gif", "locus-*.json", "locus.png", "diagram.png", "shape.png")
 """Names of the files that a run may write next to its diagram and states."""
 FOLDERS: set[Path] = set()  # folders whose lock this process has
-ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
+ANOTHER_FOLDER = "choose another one with run(output=...)"
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def writing(folder: Path) -> Iterator[None]:
         raise
     except (OSError, ValueError) as error:  # ValueError for a zero byte in a name
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"The output folder {folder} cannot be written ({reason})", ANOTHER_FOLDER) from error
+        raise InputError(f"The output folder {folder} cannot be written ({reason}): {ANOTHER_FOLDER}.") from error
 
 
 @contextmanager
@@ -132,7 +132,7 @@ def _lock(folder: Path) -> int | None:
     except (BlockingIOError, PermissionError):
         holder = os.pread(file, 300, 0).decode(errors="replace") or "another process"
         os.close(file)
-        raise InputError(f"The output folder {folder} is in use by {holder}", ANOTHER_FOLDER) from None
+        raise InputError(f"The output folder {folder} is in use by {holder}: {ANOTHER_FOLDER}.") from None
     os.close(file)
     return None
 

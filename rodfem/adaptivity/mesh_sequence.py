@@ -26,7 +26,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.singular import SingularState, SingularSystem
-from rodfem.errors import Argument, ConvergenceError, Remedy
+from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import correct
 from rodfem.fem.symmetries import may_slide
@@ -40,9 +40,6 @@ TRIES, MOST = 4, 16  # meshes tried at one place, and in a run
 GROWN, SELDOM = 1.5, 10
 """An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
 NEAR = 0.1  # points of a branch nearer to each other than this, in arclength, are at one place
-OWN_MESH = Remedy(
-    "use {} and {} instead of an accuracy", *(Argument("Discretization", name) for name in ("elements", "degree"))
-)
 LEAST = 1e-6  # least bound of a step next to a gap
 ARM = 0.05  # distance, in the metric, at which the four arms that would meet are looked for
 
@@ -170,7 +167,8 @@ class Meshes:
                 break
         if not pairs:
             raise ConvergenceError(
-                f"The branch could not be carried to another mesh near load {history[-1].load:.8g}", OWN_MESH
+                f"The branch could not be carried to another mesh near load {history[-1].load:.8g}: use "
+                "Discretization(elements=...) and Discretization(degree=...) instead of an accuracy."
             )
         return pairs
 

@@ -43,7 +43,7 @@ listen()
 
 
 ARGUMENT = re.compile(r"\b(?:Discretization|Plan|StepControl|run)\((\w+)=([^()]*)\)")
-"""An :class:`~rodfem.errors.Argument` in a sentence: its name and its value."""
+"""An argument in a sentence: its name and its value."""
 NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$|-(inf|nan)$")
 """A negative number, which is the value of an option and none itself; argparse knows those without exponent."""
 

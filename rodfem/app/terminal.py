@@ -19,7 +19,7 @@ from rodfem import code_cache
 from rodfem.continuation.branch import Branch, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
-from rodfem.errors import Argument, many
+from rodfem.errors import many
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
@@ -210,10 +210,10 @@ class Report(Observer):
         self.say("\n" + "\n".join(special_lines(data)))
         if missed := not_followed(branches):
             deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
-            more = Argument("Plan", "depth", deepest + 1)
+            more = f"Plan(depth={deepest + 1})"
             limit = f"as the depth is {deepest} (switches from the first branch)"
             if most and len(branches) >= most:
-                more, limit = Argument("Plan", "most_branches", 2 * most), f"as there are {len(branches)} branches"
+                more, limit = f"Plan(most_branches={2 * most})", f"as there are {len(branches)} branches"
             points = many(missed, "branch point was", "branch points were")
             self.say(f"  {points} not followed, {limit}: {more} follows what leaves there")
 

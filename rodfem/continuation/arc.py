@@ -58,7 +58,7 @@ def corrected(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.V
     finally:
         system.damping = before
     raise ConvergenceError(
-        f"No equilibrium near load {system.scalar(start):.8g} while locating a special point", SMALLER_STEPS
+        f"No equilibrium near load {system.scalar(start):.8g} while locating a special point: {SMALLER_STEPS}."
     )
 
 

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import FIRST_BRANCH, Point
 from rodfem.continuation.branch_solver import ROWS, BranchSolver, across_orbit, predict_at_load
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.errors import Argument, ConvergenceError, InputError, Remedy, SceneError
+from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
@@ -78,11 +78,8 @@ def check_index(solver: BranchSolver, load: float, index: int) -> None:
     if index > max(0.9 * nodes, 4):
         raise Overfull(
             f"At {solver.system.scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can "
-            f"hold (its index is {index} there)",
-            Remedy(
-                "use smaller loads, or more elements ({}), or a start nearer to the equilibrium that is meant",
-                Argument("Discretization", "elements"),
-            ),
+            f"hold (its index is {index} there): use smaller loads, or more elements (Discretization(elements=...)), "
+            "or a start nearer to the equilibrium that is meant."
         )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from rodfem.continuation.follow import StepControl
-from rodfem.errors import Argument, InputError, Remedy
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.arguments import a, convert, each, interval, optional, real, reals, whole, yes_or_no
 from rodfem.problem.events import Event, Level
@@ -15,17 +15,14 @@ from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
 from rodfem.stability import AUTO, METHODS, find
 
-MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"), Argument("Plan", "spectrum")
-FEWER = "give less in {}, or use more elements"
 COUNTS = {
-    Argument("Plan", "depth"): "depth",
-    Argument("Plan", "most_branches"): "number of branches",
-    Argument("Plan", "tries"): "number of tries",
-    SPECTRUM: "number of eigenvalues",
-    MODES: "number of modes",
+    "depth": "depth",
+    "most_branches": "number of branches",
+    "tries": "number of tries",
+    "spectrum": "number of eigenvalues",
+    "modes": "number of modes",
 }
-"""Arguments that are not negative, in words."""
-GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
+"""Fields that are not negative, in words."""
 FINEST, ACCURACY, COARSEST = 1e-11, 1e-8, 1e-1
 """Least accuracy that can be asked for, which is near round-off, one that an error suggests, and the greatest one."""
 
@@ -173,18 +170,20 @@ class Plan:
 
     def _check_counts(self) -> None:
         """Raise :class:`InputError` for numbers below zero, and for what needs loads where none is asked for."""
-        for argument, what in COUNTS.items():
-            if (value := getattr(self, argument.name)) < 0:
-                raise InputError(f"{value} is not a {what}", Remedy("give 0 or more in {}", argument))
+        for name, what in COUNTS.items():
+            if (value := getattr(self, name)) < 0:
+                raise InputError(f"{value} is not a {what}: give 0 or more in Plan({name}=...).")
         for asked, words in (
             (self.tries, "A search needs loads to search at"),
             (self.modes, "Modes need loads to judge at"),
             (self.method, "A method needs loads to judge at"),
         ):
             if asked and not self.at:
-                raise InputError(words, GIVE_LOADS)
+                raise InputError(f"{words}: give them in Plan(at=...).")
         if self.modes and self.method in METHODS and not find(self.method).finds_modes:
-            raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
+            raise InputError(
+                "Counting alone finds no modes: leave out Plan(modes=...), or name another Plan(method=...)."
+            )
 
     @staticmethod
     def _check_accuracy(accuracy: float, scene: Scene) -> None:
@@ -201,9 +200,12 @@ class Plan:
             return  # meshes are chosen on the way
         check_mesh(scene, discretization)
         most = most_eigenvalues(scene, discretization)
-        for argument in (SPECTRUM, MODES):
-            if (asked := getattr(self, argument.name)) > most:
-                raise InputError(f"The mesh has no more than {most} eigenvalues, not {asked}", Remedy(FEWER, argument))
+        for name in ("spectrum", "modes"):
+            if (asked := getattr(self, name)) > most:
+                raise InputError(
+                    f"The mesh has no more than {most} eigenvalues, not {asked}: give less in Plan({name}=...), or use "
+                    "more elements."
+                )
 
 
 def plan_of(plan: Plan | None, asked: dict[str, Any]) -> Plan:

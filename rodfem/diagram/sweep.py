@@ -31,7 +31,7 @@ from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.doubts import Quadrature
 from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_first
 from rodfem.diagram.plan import Plan
-from rodfem.errors import Argument, ConvergenceError, Remedy, SceneError, many
+from rodfem.errors import ConvergenceError, SceneError, many
 from rodfem.fem.fields import Discretization
 from rodfem.fem.shape import Transfer, halved, richer_system
 from rodfem.fem.system import System
@@ -429,8 +429,9 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
         values = eigensolver.at(x).near(number + 2, SHIFT * system.scene.units.omega2).values
         found.append(values[np.argsort(abs(values))][: number + 2])
     if min(map(len, found)) < number:
-        remedy = Remedy("ask for fewer ({})", Argument("Plan", "spectrum"))
-        raise ConvergenceError(f"The coarsest mesh has fewer than {number} frequencies", remedy)
+        raise ConvergenceError(
+            f"The coarsest mesh has fewer than {number} frequencies: ask for fewer (Plan(spectrum=...))."
+        )
     return found
 
 

@@ -22,7 +22,7 @@ from rodfem.diagram.equivalence import connection, equivalent, image_of, loop_en
 from rodfem.diagram.events import Events, Step, at_loads
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
-from rodfem.errors import Argument, ConvergenceError, Remedy
+from rodfem.errors import ConvergenceError
 from rodfem.ranks import as_failure, without
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import DRIFT, ROUND_OFF
@@ -30,9 +30,7 @@ from rodfem.tolerances import DRIFT, ROUND_OFF
 NO_CONVERGENCE = "no convergence"
 REMEDIES = {
     NO_CONVERGENCE: "use more elements or smaller steps",
-    MOST_REACHED: Remedy(
-        "use longer steps ({}) or more points ({})", Argument("StepControl", "largest"), Argument("StepControl", "most")
-    ),
+    MOST_REACHED: "use longer steps (StepControl(largest=...)) or more points (StepControl(most=...))",
 }
 """What to try where a branch ends for a reason, by its words."""
 NEAR_START = 8

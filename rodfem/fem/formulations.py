@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 
-from rodfem.errors import Argument, InputError, Remedy
+from rodfem.errors import InputError
 from rodfem.forms import lagrangian
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
@@ -344,6 +344,5 @@ def chosen(name: str, scene: Scene) -> Formulation:
     refusals = {other: made.refusal(scene) for other, made in FORMULATIONS.items()}
     first = next(other for other, refusal in refusals.items() if not refusal)
     if refusals.get(name):
-        remedy = Remedy("use {}", Argument("Discretization", "formulation", first))
-        raise InputError(f"The {name} formulation {refusals[name]}", remedy)
+        raise InputError(f"The {name} formulation {refusals[name]}: use Discretization(formulation={first!r}).")
     return FORMULATIONS[first if name == AUTO else name]

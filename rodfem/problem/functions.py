@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 import numpy as np
 import ufl
 
-from rodfem.errors import POINTWISE, SceneError
+from rodfem.errors import SceneError
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY, rotation
 
@@ -260,7 +260,9 @@ class Known(SimpleNamespace):
         if name.startswith("__"):
             raise AttributeError(name)
         if name in ("r", "dr") and "r" not in vars(self):
-            raise NoCentreline("The reduced formulation has no centreline here", POINTWISE)
+            raise NoCentreline(
+                "The reduced formulation has no centreline here: use Discretization(formulation='pointwise')."
+            )
         has = "r, q, R, d1, d2, d3, s and length, and where it is the whole rod dr, v and k"
         raise UnnamedError(f"asks for {name!r} of a place: it has {has}.")
 

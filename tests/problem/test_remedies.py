@@ -11,9 +11,9 @@ from hemitropic_cases import run_demo
 from mpi4py import MPI
 
 import rodfem
-from rodfem.app.cli import ARGUMENT, Parser
+from rodfem.app.cli import Parser
 from rodfem.app.main import Statement, parser_of
-from rodfem.errors import POINTWISE, Argument, ConvergenceError, InputError, Remedy, SceneError, SetupError
+from rodfem.errors import SMALLER_STEPS, ConvergenceError, InputError, SceneError, SetupError
 
 HOME = Path(__file__).parents[2] / "rodfem"
 COMMAND_LINE = ("app/cli.py", "app/main.py", "app/console.py")
@@ -29,16 +29,12 @@ def parser() -> Parser:
 
 
 def named() -> set[tuple[str, str]]:
-    """Owner and name of every argument in the package: each is two strings, or a name from a tuple of them."""
-    found = set()
+    """Owner and name of every argument that a text of the package names."""
+    found, argument = set(), re.compile(r"\b(Discretization|Plan|StepControl|run)\((\w+)=")
     for path in HOME.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.GeneratorExp) and "Argument(" in ast.unparse(node.elt):
-                owner = ast.literal_eval(node.elt.args[0])  # type: ignore[attr-defined]
-                found |= {(owner, name) for name in ast.literal_eval(node.generators[0].iter)}
-            elif isinstance(node, ast.Call) and ast.unparse(node.func) == "Argument":
-                if all(isinstance(word, ast.Constant) for word in node.args[:2]):
-                    found.add(tuple(word.value for word in node.args[:2]))  # type: ignore[attr-defined]
+        tree = ast.parse(path.read_text())
+        texts = [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
+        found |= {pair for text in texts for pair in argument.findall(text)}
     return found
 
 
@@ -47,7 +43,6 @@ def test_every_argument_exists_and_has_an_option() -> None:
     assert {("StepControl", "largest"), ("Plan", "depth"), ("Discretization", "elements"), ("run", "output")} <= named()
     for owner, name in named():
         assert name in inspect.signature(getattr(rodfem, owner)).parameters, (owner, name)
-        assert ARGUMENT.fullmatch(str(Argument(owner, name))), (owner, name)
         assert name in ("most_branches", "most") or parser().option(name).startswith("--")  # which only Python has
 
 
@@ -61,12 +56,8 @@ def test_no_other_module_knows_options() -> None:
 
 
 def test_words_of_python_and_of_the_command_line() -> None:
-    steps, depth = Argument("StepControl", "largest"), Argument("Plan", "depth", 3)
-    trouble = ConvergenceError("It did not", Remedy("try {} or {}", steps, depth))
-    assert trouble.remedy is not None and trouble.remedy.arguments == (steps, depth)
-    assert str(trouble) == "It did not: try StepControl(largest=...) or Plan(depth=3)."
-    assert parser().in_options(f"So ({trouble})") == "So (It did not: try --step or --depth 3.)"
-    assert parser().in_options(str(POINTWISE)) == "use --formulation pointwise"
+    assert parser().in_options(f"{SMALLER_STEPS} or Plan(depth=3).") == "use smaller steps (--step) or --depth 3."
+    assert parser().in_options("use Discretization(formulation='pointwise')") == "use --formulation pointwise"
     for unknown in ("use Event(name=...)", "use StepControl(smallest=...)"):
         assert parser().in_options(unknown) == unknown
 
