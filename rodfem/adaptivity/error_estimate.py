@@ -41,7 +41,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.newton import correct
 from rodfem.fem.resultants import NAMES
-from rodfem.fem.shape import Shape, Transfer, halved, richer_system
+from rodfem.fem.shape import Shape, halved, richer_system, transferred
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event, Level
@@ -163,7 +163,7 @@ class Enriched:
     def __init__(self, solver: BranchSolver) -> None:
         self.coarse, self.system = solver, richer_system(solver.system)
         self.solver = BranchSolver(self.system)
-        self.transfer = Transfer(solver.system, self.system)
+        self.transfer = partial(transferred, solver.shape, self.system)
         self.origins: list[tuple[SpecialPoint, Origin, float]] = []
         self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
         self._ordinate = OrdinateBound(solver.shape, self.solver.shape)

@@ -46,7 +46,7 @@ ARM = 0.05  # distance, in the metric, at which the four arms that would meet ar
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:
     """Accuracy to work with: a mesh breaks the symmetry of a uniform ring along itself, which must not be seen."""
-    uniform_ring = may_slide(scene) and not scene.depends_on_s()
+    uniform_ring = may_slide(scene) and not scene.energy_depends_on("s")
     return min(accuracy, 1e-8) if uniform_ring else accuracy  # below what counts as a drift
 
 

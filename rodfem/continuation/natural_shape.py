@@ -67,7 +67,7 @@ def _between_ends(scene: Scene, load: float) -> tuple[tuple[np.ndarray, np.ndarr
 
 def _natural_strains(scene: Scene, load: float) -> Callable[[np.ndarray], np.ndarray] | None:
     """Natural strains (m, 6) as a function of arclengths (m,); None if they are the undeformed ones."""
-    places = np.linspace(*scene.interval, 33) if scene.depends_on_s() else np.array([scene.interval[0]])
+    places = np.linspace(*scene.interval, 33) if scene.energy_depends_on("s") else np.array([scene.interval[0]])
     found = [x for x in (_least(scene, load, float(s)) for s in places) if x is not None]
     if len(found) < len(places) or not np.array(found).any():
         return None
@@ -83,7 +83,7 @@ def _least(scene: Scene, load: float, s: float) -> np.ndarray | None:
     """Change (6,) of the undeformed strains that minimises the energy at ``s``; None if Newton's method finds none."""
     c, unit, free = scene.constants(load, s), np.where(np.arange(6) < 3, 1.0, 1.0 / scene.length), _free(scene)
     chosen = [[*scene.free_strains, 3, 4, 5].index(i) for i in free]
-    stiffness = scene.stiffness(s if scene.depends_on_s() else None)[np.ix_(chosen, chosen)]
+    stiffness = scene.stiffness(s if scene.energy_depends_on("s") else None)[np.ix_(chosen, chosen)]
     x = np.zeros(6)
     for _ in range(20):
         try:

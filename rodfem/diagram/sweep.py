@@ -33,7 +33,7 @@ from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_f
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError, many
 from rodfem.fem.fields import Discretization
-from rodfem.fem.shape import Transfer, halved, richer_system
+from rodfem.fem.shape import halved, richer_system, transferred
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, without
@@ -344,7 +344,7 @@ class SweepErrors:
         system = solver.system
         self.richer = BranchSolver(richer_system(system))
         self.eigensolver = NonsymmetricSolver(self.richer.system)
-        self.transfer = Transfer(system, self.richer.system)
+        self.transfer = partial(transferred, solver.shape, self.richer.system)
         self.rho = halved(system.fields.discretization.degree)
         self.ordinate = OrdinateBound(solver.shape, self.richer.shape)
 

@@ -37,7 +37,7 @@ from rodfem.fem.assembly import Assembler, Cells, Places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.state import NodalValues
 from rodfem.fem.system import System
-from rodfem.forms.kinematics import curvature, strain
+from rodfem.forms.kinematics import curvature
 from rodfem.linalg.matrices import EPS
 from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
@@ -52,12 +52,9 @@ MOTION = 1e-3 * np.array([1.0, 0.7, 0.45])
 
 def second_derivative(e: Equations) -> tuple[Any, bool, Any]:
     """Entries of the second derivative of ``W`` as a vector in UFL; whether the state is in them; and them expanded."""
-    u, scene = e.unknowns, e.fields.scene
-    free, k = scene.free_strains, curvature(u.q, u.q.dx(0))
-    x = ufl.variable(ufl.as_vector([*e.components(u.v, len(free)), *(k[i] for i in range(3))]))
-    v = strain(free, [x[i] for i in range(len(free))])
-    W = scene.energy(v, ufl.as_vector([x[len(free) + i] for i in range(3)]), e.constants)
-    hessian, every = ufl.diff(ufl.diff(W, x), x), range(len(free) + 3)
+    u, free = e.unknowns, len(e.fields.scene.free_strains)
+    k, every = curvature(u.q, u.q.dx(0)), range(free + 3)
+    x, hessian = e.fields.scene.second_derivative([*e.components(u.v, free), *(k[i] for i in range(3))], e.constants)
     vector = ufl.as_vector([hessian[i, j] for i in every for j in every])
     expanded = differentiated(vector)
     variables = extract_type(expanded, Variable)

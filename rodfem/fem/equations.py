@@ -1,8 +1,4 @@
-"""The equations of a scene on its fields: Lagrangian, weak form, Jacobian and metrics as compiled forms.
-
-A number in Python that a scene's functions have in them is part of the text of a form, ``0.617 * k1**2``, and each
-other number would be compiled anew.  As a constant it is a value that the compiled form reads.
-"""
+"""The equations of a scene on its fields: Lagrangian, weak form, Jacobian and metrics as compiled forms."""
 
 from __future__ import annotations
 
@@ -18,19 +14,11 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from rodfem.expressions import (
-    Expr,
-    FloatValue,
-    MultiFunction,
-    apply_algebra_lowering,
-    extract_type,
-    map_integrand_dags,
-    parts,
-)
+from rodfem.expressions import apply_algebra_lowering, extract_type
 from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import FEW, Discretization, Fields
-from rodfem.fem.known import Known
+from rodfem.fem.known import Known, readable
 from rodfem.fem.state import Line, load_line
 from rodfem.forms import inertia, lagrangian
 from rodfem.forms.kinematics import curvature, strain
@@ -39,53 +27,6 @@ from rodfem.problem.contribution import Site
 from rodfem.problem.functions import Constants, Place, derived, place
 from rodfem.problem.scene import Part, Scene
 from rodfem.tolerances import same_place
-
-KEPT = {sign * value for sign in (-1.0, 1.0) for value in (0.25, 0.5, 1.0, 2.0, 3.0, 4.0)}
-"""Numbers that belong to formulas, as the half of an energy."""
-
-
-def with_constants(form: Any, mesh: Any) -> Any:
-    """Return a form, or an expression, with constants on ``mesh`` in the place of its numbers, but integers and powers.
-
-    What is none, as a sum without terms, is returned as it is.
-    """
-    if not isinstance(form, (ufl.Form, Expr)):
-        return form
-    wholes = [x.integrand() for x in form.integrals()] if isinstance(form, ufl.Form) else [form]
-    # to look for numbers takes a third of the time of a map
-    if all(float(x) in KEPT for whole in wholes for x in parts(whole) if isinstance(x, FloatValue)):
-        return form
-    constants = _Constants(mesh)
-    mapped = map_integrand_dags(constants, form, compress=False)
-    return mapped if constants.of else form
-
-
-class _Constants(MultiFunction):
-    """Maps numbers to the constants that stand for them: ``of`` has these by value."""
-
-    expr = MultiFunction.reuse_if_untouched
-
-    def __init__(self, mesh: Any) -> None:
-        super().__init__()
-        self.mesh = mesh
-        self.of: dict[float, Any] = {}
-
-    def float_value(self, number: Any) -> Any:
-        value = float(number)
-        if value in KEPT:
-            return number
-        if value not in self.of:
-            self.of[value] = fem.Constant(self.mesh, value)
-        return self.of[value]
-
-    def power(self, o: Any, base: Any, exponent: Any) -> Any:
-        """Keep an exponent, by which UFL differentiates, as it is."""
-        given = o.ufl_operands[1]
-        return self.reuse_if_untouched(o, base, given if isinstance(given, FloatValue) else exponent)
-
-    def bessel_function(self, o: Any, order: Any, argument: Any) -> Any:
-        """Keep the order, too."""
-        return self.reuse_if_untouched(o, o.ufl_operands[0], argument)
 
 
 class Equations:
@@ -229,7 +170,7 @@ class Equations:
 
     def compilable(self, form: Any) -> Any:
         """A form, or an expression, with what is known in the place of tables, and constants in that of numbers."""
-        return with_constants(self.known.put(form), self.fields.mesh)
+        return readable(form, self.fields.mesh, self.known)
 
     def evaluated(self, vector: Any, points: np.ndarray) -> Callable[[], np.ndarray]:
         """Compile a vector in UFL at ``points`` (m,) in [0, 1] of each of this rank's elements."""
@@ -319,12 +260,7 @@ class Equations:
     def lift(self, c: Constants) -> Any:
         """Linear in s and equal to the ends' positions: the unknown ``r`` is what comes on top, zero where held."""
         x = (c.s - self.ends[0]) / self.length
-        left, right = (end.held(c) for end in self.fields.scene.sides)
-        lift = []
-        for a, b in zip(left, right, strict=True):
-            pair = (b, b) if a is None else (a, a) if b is None else (a, b)
-            lift.append(0.0 if pair == (None, None) else (1 - x) * pair[0] + x * pair[1])
-        return ufl.as_vector([value + 0 * x for value in lift])
+        return ufl.as_vector([(1 - x) * a + x * b + 0 * x for a, b in self.fields.scene.end_positions(c)])
 
 
 def _terms(name: str, sites: list[Any], dx: Any) -> list[Any]:

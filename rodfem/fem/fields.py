@@ -331,9 +331,7 @@ class Fields:
         """Linear function of the ends' positions that the centreline field is measured from, (..., 3) for (...,)."""
         start, stop = self.scene.interval
         x = ((np.asarray(s) - start) / (stop - start))[..., None]
-        left, right = ([None if p is None else float(p) for p in end.held(c)] for end in self.scene.sides)
-        a = np.array([p if p is not None else q or 0.0 for p, q in zip(left, right, strict=True)])
-        b = np.array([q if q is not None else p or 0.0 for p, q in zip(left, right, strict=True)])
+        a, b = np.array([[float(p) for p in pair] for pair in self.scene.end_positions(c)]).T
         return np.asarray((1 - x) * a + x * b)
 
     def coordinates(self, degree: int) -> np.ndarray:

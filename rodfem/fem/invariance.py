@@ -259,11 +259,11 @@ def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_mul
     """
     fields, scene = equations.fields, equations.fields.scene
     values, part = derived(equations, ("generic values", seed, decay), lambda: _generic_values(fields, seed, decay))
-    units = {block.name: scene.units.of_field(block) for block in fields.blocks}
-    units |= {unknown.name: scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
+    named = {x.name: scene.units.of_field(x) * values[x.name] for x in fields.blocks}
+    named |= {x.name: scene.units.of_scalar(x) * values[x.name] for x in fields.unknown_scalars}
     if no_multipliers:
-        units |= dict.fromkeys(_multipliers(fields), 0.0)
-    named = {name: unit * values[name] for name, unit in units.items()}
+        multipliers = {x.name for every in (fields.blocks, fields.unknown_scalars) for x in every if x.multiplier}
+        named = {name: value for name, value in named.items() if name not in multipliers}
     low, high = sorted(scene.span)
     named[LOAD] = low + (high - low) * part
     for size in (1.0, 0.1, 0.01, 1e-3):  # of displacements: a barrier admits no large ones
@@ -273,12 +273,6 @@ def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_mul
         if fields.comm.allreduce(bool(np.isfinite(loads) and np.isfinite(state.covector()).all()), op=MPI.LAND):
             break
     return state
-
-
-def _multipliers(fields: Fields) -> list[str]:
-    """Names of fields and scalars that are multipliers."""
-    scalars = [x.name for x in fields.unknown_scalars if x.group.motion is not Motion.POSITION]
-    return scalars + [block.name for block in fields.blocks if block.multiplier]
 
 
 def _generic_values(fields: Fields, seed: int, decay: float) -> tuple[dict[str, Any], float]:

@@ -1,7 +1,11 @@
-r"""What the compiled forms read in addition to the unknown: tables along the rod, and pieces of paths of the load.
+r"""What the compiled forms read in addition to the unknown: numbers, tables along the rod, and paths of the load.
 
-Both are values of one discontinuous function, of which a cell has its own.  A table ``f`` along the rod is its
-projection on polynomials on each element, of the degree ``p`` for which the rule of the element has ``p + 1`` points::
+A number in Python that a scene's functions have in them is part of the text of a form, ``0.617 * k1**2``, and each
+other number would be compiled anew.  As a constant it is a value that the compiled form reads.
+
+Tables and paths are values of one discontinuous function, of which a cell has its own.  A table ``f`` along the rod is
+its projection on polynomials on each element, of the degree ``p`` for which the rule of the element has ``p + 1``
+points::
 
     int (f - f_h) P_j ds = 0,    P_j the Legendre polynomials of the element, j = 0 ... p,
 
@@ -16,21 +20,26 @@ form lays there those of the piece in which the load is: derivatives with respec
 from __future__ import annotations
 
 from copy import copy
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
+from dolfinx import fem
 from numpy.polynomial import legendre
 
 from rodfem import compat
-from rodfem.expressions import Expr, MultiFunction, PositiveRestricted, map_integrand_dags, parts
+from rodfem.expressions import Expr, FloatValue, MultiFunction, PositiveRestricted, map_integrand_dags, parts
 from rodfem.problem.table import Entry, Table
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
     from rodfem.fem.state import Line
+
+KEPT = {sign * value for sign in (-1.0, 1.0) for value in (0.25, 0.5, 1.0, 2.0, 3.0, 4.0)}
+"""Numbers that belong to formulas, as the half of an energy."""
 
 
 class Known:
@@ -63,7 +72,7 @@ class Known:
         sizes = sum(len(t.rows[0]) for t in self.tables), sum(rows.shape[1] for rows in self.rows)
         parts = [(False, d, size) for d, size in zip((self._degree, 0), sizes, strict=True) if size]
         space = compat.mixed_space(self._fields.mesh, parts)
-        self.function = compat.fem.Function(space, name=self.name, dtype=compat.REAL)
+        self.function = fem.Function(space, name=self.name, dtype=compat.REAL)
         self._dofs = compat.cell_dofs(space, cells)
         self._values = []
         for part, (_, _, size) in zip(ufl.split(self.function), parts, strict=True):
@@ -114,12 +123,6 @@ class Known:
             pieces = [rows[path.piece(t)] for rows, (path, _), t in zip(self.rows, self.paths, places, strict=True)]
             self.function.x.array[self._dofs[:, self.along.shape[1] :]] = np.concatenate(pieces)
 
-    def put(self, form: Any) -> Any:
-        """Return a form, or an expression, with the function in the place of the entries of tables."""
-        if self.function is None or not isinstance(form, (ufl.Form, Expr)):
-            return form
-        return map_integrand_dags(_Put(self), form, compress=False)
-
     def value(self, entry: Entry) -> Any:
         """Expression of the function that an ``entry`` stands for."""
         at, place, m = entry.ufl_operands[0], 0, len(entry.table.rows[0])
@@ -169,12 +172,42 @@ def _moments(table: Table, a: float, b: float, p: int) -> tuple[np.ndarray, floa
     return coefficients, float(weights @ ((values - basis @ coefficients) ** 2).sum(axis=1))
 
 
-class _Put(MultiFunction):
+def readable(form: Any, mesh: Any, known: Known | None = None) -> Any:
+    """Return a form, or an expression, with what is ``known`` for tables, and constants on ``mesh`` for its numbers.
+
+    Integers and powers stay.  What is no form, as a sum without terms, is returned as it is.
+    """
+    if not isinstance(form, (ufl.Form, Expr)):
+        return form
+    if known is None or known.function is None:  # to look for numbers takes a third of the time of a map
+        wholes = [x.integrand() for x in form.integrals()] if isinstance(form, ufl.Form) else [form]
+        if all(float(x) in KEPT for whole in wholes for x in parts(whole) if isinstance(x, FloatValue)):
+            return form
+    return map_integrand_dags(_Readable(mesh, known), form, compress=False)
+
+
+class _Readable(MultiFunction):
+    """Maps entries of tables to what is ``known`` of them, and numbers to constants, one for each value."""
+
     expr = MultiFunction.reuse_if_untouched
 
-    def __init__(self, known: Known) -> None:
+    def __init__(self, mesh: Any, known: Known | None) -> None:
         super().__init__()
-        self.known = known
+        self.known, self.constant = known, cache(lambda value: fem.Constant(mesh, value))
 
     def variable(self, o: Any, at: Any, label: Any) -> Any:
-        return self.known.value(o) if isinstance(o, Entry) else self.reuse_if_untouched(o, at, label)
+        if self.known is not None and isinstance(o, Entry):
+            return self.known.value(o)
+        return self.reuse_if_untouched(o, at, label)
+
+    def float_value(self, number: Any) -> Any:
+        return number if float(number) in KEPT else self.constant(float(number))
+
+    def power(self, o: Any, base: Any, exponent: Any) -> Any:
+        """Keep an exponent, by which UFL differentiates, as it is."""
+        given = o.ufl_operands[1]
+        return self.reuse_if_untouched(o, base, given if isinstance(given, FloatValue) else exponent)
+
+    def bessel_function(self, o: Any, order: Any, argument: Any) -> Any:
+        """Keep the order, too."""
+        return self.reuse_if_untouched(o, o.ufl_operands[0], argument)

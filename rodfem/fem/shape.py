@@ -18,7 +18,6 @@ from rodfem.fem.fields import HIGHEST, Discretization, Fields
 from rodfem.fem.state import LOAD, NodalValues, State
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import UNDEFORMED
-from rodfem.problem.contribution import Block
 from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import CONJUGATE, directors, product
 from rodfem.writhe import writhe
@@ -49,7 +48,8 @@ class Shape:
     """Evaluates shapes of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks.
 
     ``cells`` are the owned ones among the local ones, ``s`` the arclengths of their nodes from left to right, (cells,
-    nodes), and ``order`` the order of the nodes of an element from left to right.
+    nodes), ``order`` the order of the nodes of an element from left to right, and ``natural`` the degrees of freedom
+    of each field in that order.
     """
 
     def __init__(self, system: System) -> None:
@@ -78,7 +78,7 @@ class Shape:
         left = self.from_left(self.start)[:, None, None]
         widths = np.diff(left, axis=0, append=system.scene.interval[1])
         self._every_s = unique(left + widths * self.nodes[None, :, None])[:, 0]
-        self._natural = {b.name: f.dofs[b.name][cells][:, np.argsort(compat.nodes(b.degree))] for b in f.blocks}
+        self.natural = {b.name: f.dofs[b.name][cells][:, np.argsort(compat.nodes(b.degree))] for b in f.blocks}
 
     def ordinate(self, x: PETSc.Vec) -> float:
         """Ordinate of the scene at the state ``x``."""
@@ -115,12 +115,12 @@ class Shape:
         system, f = self.system, self.system.fields
         out: dict[str, Any] = {"elements": f.discretization.elements, "s": self._every_s}
         for block in f.blocks:
-            values = state.local[self._natural[block.name]]
+            values = state.local[self.natural[block.name]]
             out[block.name] = self.joined(values) if block.continuous else self.from_left(values)
         smooth = self.smooth(state)
         for name in f.surfaces:
             mean = state.scalars.get(name.replace("u", "h"), 0.0) / system.scene.length
-            out[name.replace("u", "p")] = mean - self._slope(smooth.local[self._natural[name]])
+            out[name.replace("u", "p")] = mean - self._slope(smooth.local[self.natural[name]])
         r, chord = f.formulation.nodal(self, state)
         out["r"] = r + f.formulation.offset(f, state, out["s"], chord)
         out["q"] = f.turning.quaternion(out[f.turning.name])
@@ -135,7 +135,7 @@ class Shape:
         for name in f.surfaces:
             for end, (side, own) in zip(self.system.scene.interval, ((0, slice(1, None)), (k, slice(k))), strict=True):
                 cell = np.flatnonzero(np.isclose(self.s[:, side], end))
-                rows = self._natural[name][cell, :, 0]
+                rows = self.natural[name][cell, :, 0]
                 basis = np.linalg.solve(np.vander(self.nodes[own]).T, np.vander(self.nodes[[side]], k)[0])
                 local[rows[:, side]] = local[rows[:, own]] @ basis
         return NodalValues(state.equations, local, state.line) if f.surfaces else state
@@ -150,27 +150,17 @@ class Shape:
 
     def restore(self, sample: dict[str, Any]) -> PETSc.Vec:
         """State vector of a :meth:`sample`, taken with the same formulation but any number of elements and degree."""
-        f = self.system.fields
-        named = {name: sample[name] for name in self.system.scalars if not name.startswith("drift")}
-        named |= {block.name: self._evaluate(sample, block) for block in f.blocks}
-        return self.system.vector(f.filled(named))
-
-    def _evaluate(self, sample: dict[str, Any], block: Block) -> np.ndarray:
-        """Values of a field of a :meth:`sample` at the nodes of the cells."""
-        f, elements, s = self.system.fields, int(sample["elements"]), sample["s"]
+        f, elements, s = self.system.fields, int(sample["elements"]), np.asarray(sample["s"])
         degree = (len(s) - 1) // elements
-        ends, x = s[::degree], f.coordinates(block.degree)
-        inwards = x + 1e-9 * (x.mean(axis=1, keepdims=True) - x)  # the end of a cell belongs to that cell
-        cell = np.clip(np.searchsorted(ends, inwards) - 1, 0, elements - 1)
-        own = degree if block.continuous else degree - 1
-        table = np.asarray(sample[block.name])
-        if block.name == "r":
-            table = table - f.lift(s, self.system.line.constants(sample[LOAD]))
-        if block.continuous:
-            table = table[np.arange(elements)[:, None] * degree + np.arange(degree + 1)]
-        local = (x - ends[cell]) / (ends[cell + 1] - ends[cell])
-        basis = compat.lagrange_basis(own, local.ravel())[:, np.argsort(compat.nodes(own))]
-        return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
+        own = np.arange(elements)[:, None] * degree + np.arange(degree + 1)
+        named = {name: sample[name] for name in self.system.scalars if not name.startswith("drift")}
+        for block in f.blocks:
+            table = np.asarray(sample[block.name])
+            if block.name == "r":
+                table = table - f.lift(s, self.system.line.constants(sample[LOAD]))
+            table = table[own] if block.continuous else table
+            named[block.name] = interpolated(table, s[::degree], f.coordinates(block.degree))
+        return self.system.vector(f.filled(named))
 
     def with_centreline(self, given: NodalValues) -> PETSc.Vec:
         """State with the centreline, or the scalar positions of the ends, that rotations and strains integrate to.
@@ -317,33 +307,25 @@ def compile_richer(system: System) -> None:
     Equations.compile_ahead(Fields(system.scene, richer(system), system.comm))
 
 
-class Transfer:
-    """Interpolates vectors of one system to another whose elements are those of the first, or parts of them."""
+def transferred(source: Shape, target: System, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
+    """A state, or (``state=False``) a direction, on another mesh: a direction is zero where a state is clamped."""
+    old, new = source.system.fields, target.fields
+    values = (source.system.at(vector) if state else source.system.change(vector)).local
+    out, ends = np.zeros(len(new.number)), old.all_vertices()
+    for block in new.blocks:
+        table = source.from_left(values[source.natural[block.name]])
+        out[new.dofs[block.name]] = interpolated(table, ends, new.coordinates(block.degree))
+    out[new.copies] = values[old.copies[0]]
+    return target.vector(out)
 
-    def __init__(self, source: System, target: System) -> None:
-        self.source, self.target = source, target
-        old, new = source.fields, target.fields
-        vertices = old.all_vertices()
-        self._owned = slice(0, old.owned_cells)
-        self._order = np.argsort(np.concatenate(source.comm.allgather(old.vertices[self._owned, 0])))
-        self._parents = np.searchsorted(vertices, new.vertices.mean(axis=1)) - 1
-        first, size = vertices[self._parents, None], np.diff(vertices)[self._parents, None]
-        places, which = np.unique(np.round((new.vertices - first) / size, 9), axis=0, return_inverse=True)
-        self._members = [np.flatnonzero(which.ravel() == i) for i in range(len(places))]
-        degrees = {b.name: b.degree for b in old.blocks}
-        self._bases = {
-            b.name: [compat.lagrange_basis(degrees[b.name], a + (z - a) * compat.nodes(b.degree)) for a, z in places]
-            for b in new.blocks
-        }
 
-    def __call__(self, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
-        """Interpolate a state, or (``state=False``) a direction, which is zero where a state is clamped."""
-        old, new = self.source.fields, self.target.fields
-        values = (self.source.at(vector) if state else self.source.change(vector)).local
-        out = np.zeros(len(new.number))
-        for name, bases in self._bases.items():
-            every = np.concatenate(self.source.comm.allgather(values[old.dofs[name][self._owned]]))[self._order]
-            for members, basis in zip(self._members, bases, strict=True):
-                out[new.dofs[name][members]] = np.einsum("pn,cni->cpi", basis, every[self._parents[members]])
-        out[new.copies] = values[old.copies[0]]
-        return self.target.vector(out)
+def interpolated(table: np.ndarray, ends: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Values (cells, n, components) at the arclengths ``x`` (cells, n) of polynomials on elements between ``ends``.
+
+    ``table`` (elements, nodes, components) has them at the nodes of the elements, from left to right.
+    """
+    inwards = x + 1e-9 * (x.mean(axis=1, keepdims=True) - x)  # the end of a cell belongs to that cell
+    cell = np.clip(np.searchsorted(ends, inwards) - 1, 0, len(table) - 1)
+    local, degree = (x - ends[cell]) / (ends[cell + 1] - ends[cell]), table.shape[1] - 1
+    basis = compat.lagrange_basis(degree, local.ravel())[:, np.argsort(compat.nodes(degree))]
+    return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, -1)

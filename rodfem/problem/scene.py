@@ -20,7 +20,7 @@ import ufl
 
 from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
-from rodfem.forms.kinematics import RODS, UNDEFORMED
+from rodfem.forms.kinematics import RODS, UNDEFORMED, strain
 from rodfem.problem.arguments import Check, a, convert, encodes, finite, interval, optional, plain, real, text
 from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution
 from rodfem.problem.ends import End, Ring
@@ -83,16 +83,15 @@ def _massless(c: Constants) -> float:
     return 0.0
 
 
-def _unit_rotary(c: Constants) -> tuple[float, ...]:
-    return (1.0, 1.0, 1.0)
-
-
-def _no_rotary(c: Constants) -> tuple[float, ...]:
-    return (0.0, 0.0, 0.0)
-
-
 def _one(c: Constants) -> float:
     return 1.0
+
+
+def _of_three(of: Callable[[Constants], float]) -> Callable[[Constants], tuple[float, ...]]:
+    return lambda c: (of(c),) * 3
+
+
+_no_rotary, _unit_rotary = _of_three(_massless), _of_three(_one)
 
 
 @dataclass(frozen=True)
@@ -505,6 +504,12 @@ class Scene(Contribution, metaclass=Stated):
         left, right = (side.dead and number == 1 for side, number in zip(self.sides, here, strict=True))
         return left, right
 
+    def end_positions(self, c: Constants) -> list[tuple[Any, Any]]:
+        """Component by component the positions of both ends; that of the other end, or zero, where one is free."""
+        held = zip(*(end.held(c) for end in self.sides), strict=True)
+        pairs = [(right, right) if left is None else (left, left if right is None else right) for left, right in held]
+        return [(0.0, 0.0) if pair == (None, None) else pair for pair in pairs]
+
     def known_force(self, component: int, c: Constants) -> Any | None:
         """Component of the contact force that a dead end force prescribes, or None where it is an unknown.
 
@@ -537,10 +542,6 @@ class Scene(Contribution, metaclass=Stated):
 
     # --- the stored energy
 
-    def depends_on_s(self) -> bool:
-        """Whether the stored energy is a function of the arclength too."""
-        return self.energy_depends_on("s")
-
     def energy_depends_on(self, *names: str) -> bool:
         """Whether the stored energy is a function of one of the parameters ``names``, or of the arclength ``s``."""
         c, asked = watched(self.constants())
@@ -565,7 +566,7 @@ class Scene(Contribution, metaclass=Stated):
             )
             return any(abs(other - one) > NEGLIGIBLE * max(abs(one), abs(other)) for other in others)
 
-        places = self.samples() if self.depends_on_s() else self.samples()[:1]
+        places = self.samples() if self.energy_depends_on("s") else self.samples()[:1]
         return tuple(i for i in range(3) if i not in self.free_strains and any(felt(i, s) for s in places))
 
     def stiffness(self, s: float | None = None) -> np.ndarray:
@@ -583,8 +584,11 @@ class Scene(Contribution, metaclass=Stated):
 
     def _hessian(self) -> tuple[Constants, Any]:
         """Second derivative of ``W`` in the strains of :meth:`stiffness`, and the symbols of its constants."""
-        free, c = self.free_strains, symbols(self)
-        x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free] + [0.0] * 3))
-        v = [x[free.index(i)] if i in free else ufl.as_ufl(value) for i, value in enumerate(UNDEFORMED)]
-        W = ufl.as_ufl(self.energy(ufl.as_vector(v), ufl.as_vector([x[len(free) + i] for i in range(3)]), c))
-        return c, differentiated(ufl.diff(ufl.diff(W, x), x))
+        c = symbols(self)
+        return c, differentiated(self.second_derivative([UNDEFORMED[i] for i in self.free_strains] + [0.0] * 3, c)[1])
+
+    def second_derivative(self, values: list[Any], c: Constants) -> tuple[Any, Any]:
+        """A variable in UFL of these ``values`` of the m free strains and ``k``, and the second derivative of ``W``."""
+        m, x = len(self.free_strains), ufl.variable(ufl.as_vector(values))
+        v, k = strain(self.free_strains, [x[i] for i in range(m)]), ufl.as_vector([x[m + i] for i in range(3)])
+        return x, ufl.diff(ufl.diff(ufl.as_ufl(self.energy(v, k, c)), x), x)

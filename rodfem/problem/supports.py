@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.rotation import IDENTITY, product, rotation
+from rodfem.problem.arguments import number_of
 from rodfem.problem.ends import End
 from rodfem.problem.functions import SIDES, Constants, OfPlace, Place, place
 from rodfem.problem.scene import Scene
@@ -46,7 +47,7 @@ def supports_of(scene: Scene, sample: Sample, first: dict[str, Support] | None =
             springs = np.array([first[name].translation_stiffness, first[name].rotation_stiffness])
         out[name] = _support(scene, s, end, sample, springs)
         if mass is not None:
-            out[name] = replace(out[name], mass=_number(mass(scene.constants(float(sample["load"]), s))))
+            out[name] = replace(out[name], mass=number_of(mass(scene.constants(float(sample["load"]), s))))
     return out
 
 
@@ -62,7 +63,7 @@ def _support(scene: Scene, s: float, end: End, sample: Sample, springs: Floats |
         loads = _load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
         loads[1] *= end.turning != HELD
     if end.rotation is not None:
-        frame = np.array([_number(x) for x in end.frame(c)])
+        frame = np.array([number_of(x) for x in end.frame(c)])
     held = np.array([p is not None for p in end.held(c)])
     return Support(
         s=s,
@@ -194,15 +195,11 @@ def _write_supports(group: Any, scene: Scene, samples: Sequence[Sample]) -> None
 
 def write_section(file: Any, scene: Scene) -> None:
     """Write the bending stiffness (n, 2, 2) in ``k1, k2`` at arclengths ``s`` (n,), one where the rod is uniform."""
-    varies = scene.depends_on_s()
+    varies = scene.energy_depends_on("s")
     places = scene.samples() if varies else [scene.interval[0]]
     stiffness = np.array([scene.stiffness(s if varies else None)[-3:-1, -3:-1] for s in places])
     file[f"{SECTION}/s"], file[f"{SECTION}/stiffness"] = np.array(places), stiffness
 
 
-def _number(value: Any) -> float:
-    return float(value if isinstance(value, (int, float)) else ufl.as_ufl(value)(()))  # most are plain numbers
-
-
 def _vector(function: Callable[[Constants], Any] | None, c: Constants) -> Floats:
-    return np.zeros(3) if function is None else np.array([_number(x) for x in function(c)])
+    return np.zeros(3) if function is None else np.array([number_of(x) for x in function(c)])

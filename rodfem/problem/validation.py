@@ -175,7 +175,7 @@ def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[flo
 
 def check_convexity(scene: Scene) -> None:
     """Raise :class:`SceneError` if the stored energy is not strictly convex at the undeformed state."""
-    for s in scene.samples() if scene.depends_on_s() else [None]:
+    for s in scene.samples() if scene.energy_depends_on("s") else [None]:
         where = "" if s is None else f" at s = {s:g}"
         try:
             stiffness = scene.stiffness(s)

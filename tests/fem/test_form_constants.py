@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, Solver, clamped, compat, free, trace
 from rodfem.fem import form_compiler
-from rodfem.fem.equations import with_constants
+from rodfem.fem.known import readable
 
 COMM = MPI.COMM_WORLD
 
@@ -52,12 +52,12 @@ def test_values_are_those_of_the_numbers() -> None:
     x = ufl.SpatialCoordinate(mesh)[0]
     dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 8})
     form = (0.5 * (x + 1.7) ** 2.5 + ufl.conditional(ufl.lt(x, 0.375), 3.3 * x, 7 * x) + ufl.bessel_J(1, 2.9 * x)) * dx
-    mapped = with_constants(form, mesh)
+    mapped = readable(form, mesh)
     assert sorted(float(c.value) for c in mapped.constants()) == [0.375, 1.7, 2.9, 3.3]
     values = [fem.assemble_scalar(f) for f in form_compiler.compile_forms([form, mapped])]
     assert values[1] == pytest.approx(values[0], rel=1e-14)
     for nothing in (0, 0.5 * x * dx, 7 * x**1.5 * dx):
-        assert not getattr(with_constants(nothing, mesh), "constants", list)()
+        assert not getattr(readable(nothing, mesh), "constants", list)()
 
 
 def by_number(v: Any, k: Any, c: Any) -> Any:
