@@ -202,14 +202,14 @@ class Terminal(Report):
             self._draw_modes(saved if figures else [])
 
     def _draw_modes(self, saved: Sequence[tuple[str, int]]) -> None:
-        """Draw the modes that were ``saved`` of rows of branches: a picture and an animation of each row."""
+        """Draw the modes that were ``saved`` of rows of branches, a picture of each row."""
         from rodfem.output.plot_modes import draw_modes
 
-        output, pictures = self.output, [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved]
-        self._name(*(f"{picture}{suffix}" for picture in pictures for suffix in (".png", ".gif")))
-        for (place, picture), suffix in product(zip(saved, pictures, strict=True), (".png", ".gif")):
-            on_first(self.comm, partial(draw_modes, output / "modes.h5", *place, output / f"{picture}{suffix}"))
-        self.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
+        output, pictures = self.output, [f"modes-{name.replace(' ', '-')}-{row}.png" for name, row in saved]
+        self._name(*pictures)
+        for place, picture in zip(saved, pictures, strict=True):
+            on_first(self.comm, partial(draw_modes, output / "modes.h5", *place, output / picture))
+        self.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *pictures])}")
 
     def _follow(self, diagram: Diagram, figures: bool, asked: tuple[str, float, float]) -> None:
         """Follow each special point that no locus passes in the plane of the load and the parameter asked for."""

@@ -1,7 +1,7 @@
 """Pictures of a rod in space: from where it is seen, and how it is drawn, off screen, from ``states.h5`` alone.
 
 It is seen along the axis across the plane in which it moves, a little from above.  What is upwards is decided here, for
-pictures, animations and the page alike.  Gravity is downwards.  Without it an axis of space points upwards, e1 before
+pictures and the page alike.  Gravity is downwards.  Without it an axis of space points upwards, e1 before
 e2 before e3, never the opposite way, so that a weight that hangs along -e1 pulls downwards.  The exception is an arch,
 a rod that is bent before a load presses on its crown: it stands.
 """

@@ -11,7 +11,6 @@ from closed_forms import column as beck_value
 from hemitropic_cases import run_demo
 from mpi4py import MPI
 from petsc4py import PETSc
-from PIL import Image
 from scipy.spatial.transform import Rotation
 from small_states import buckled, plain
 from small_states import solver as solver_of
@@ -21,7 +20,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.modes.finder import ModeFinder, Motions
 from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
-from rodfem.output.plot_modes import FRAMES, RISING, amplitude, draw_modes
+from rodfem.output.plot_modes import draw_modes
 
 FINE = Discretization("reduced", 6, 6)
 METHODS = ("shift-invert", "cayley", "slicing", "reduction")
@@ -235,23 +234,8 @@ def test_file_and_pictures(folder: Path) -> None:
         load_modes(path, "branch 1", 3)
     with pytest.raises(InputError, match=r"run a scene with Plan.modes=.* and Plan.at="):
         load_modes(folder / "nothing.h5", "branch 1", 3)
-    for picture in (folder / "a" / "modes.gif", folder / "modes.png"):
-        draw_modes(path, "branch 1", 7, picture)
-    with Image.open(folder / "a" / "modes.gif") as animation:
-        assert getattr(animation, "n_frames", 1) == 60
-    assert (folder / "modes.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-
-
-@pytest.mark.parametrize(("root", "grows"), [(2j, False), (3.0, True), (0.5 + 10j, True), (3.0 + 0.1j, True)])
-def test_animation_is_a_loop_without_a_jump(root: complex, grows: bool) -> None:
-    """From picture to picture, and from the last to the first, it does not go far."""
-    path = np.array([amplitude(complex(root), grows, frame / FRAMES) for frame in range(FRAMES + 1)])
-    assert path[-1] == pytest.approx(path[0], abs=1e-12)
-    assert abs(path).max() == pytest.approx(1.0)
-    assert abs(np.diff(path)).max() < 0.3
-    if grows:
-        start = path[: int(RISING * FRAMES) + 1]
-        np.testing.assert_allclose(start[1:] / start[:-1], start[1] / start[0])  # exponential
+    draw_modes(path, "branch 1", 7, folder / "a" / "modes.png")
+    assert (folder / "a" / "modes.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
 @pytest.mark.long
