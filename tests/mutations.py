@@ -102,7 +102,7 @@ TABLE = {
             "[: len(own) - size]\n    chosen = np.intersect1d(chosen, np.argsort(abs(spectrum.values))[:10])",
             "diagram/test_light_and_slow_rods.py"),
         "locus-of-a-mean-with-the-bar-of-one": ("split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI),
-        "flutter-locus-of-a-mean-with-the-bar-of-one": ("+ SPLIT * here.split", "+ 0.0 * here.split", LOCI),
+        "flutter-locus-of-a-mean-with-the-bar-of-one": ("split = SPLIT * here.split", "split = 0.0 * here.split", LOCI),
         "flutter-locus-of-a-mean": ("if here.split > FEWER", "if False and here", LOCI),
         "a-locus-drops-symmetries-for-good": (
             "verification.dropped, verification.notices = dropped, notices", "pass", IN_WORDS),
@@ -143,9 +143,8 @@ TABLE = {
         "ends-of-folds-counted": ("dx=dx / size, s=s,", "dx=dx / size, s=s, rest=0,", "codim2/test_locus.py"),
         "a-fold-that-passes-a-branch-point-ends": (" and (a.dp * b.dp < 0)[moves].all()", "", LOCI),
         "a-passage-is-a-cusp": ("if _coupling_vanishes(cusp, a, b, 1e-3):", "if False:", LOCI),
-        "cusps-are-turns": ("sides[0].curvature * sides[1].curvature < 0", "False", LOCI),
-        "cusps-hide-in-a-step": ("pairwise([a, *self._hidden(a, b, other), b])", "pairwise([a, b])", LOCI),
-        "no-turn-beside-a-cusp": ("        if sides and depth:\n", "        if False:\n", LOCI),
+        "cusps-are-turns": ("if p.curvature * q.curvature < 0:", "if False:", LOCI),
+        "cusps-hide-in-a-step": ("pairwise([a, *self._parts(a, b), b])", "pairwise([a, b])", LOCI),
         "the-end-of-a-fold-has-no-bar": (
             "np.maximum(abs(node.p - a.p), abs(node.p - b.p)) + a.located_to", "a.located_to", LOCI),
         "a-gap-of-loci-is-a-crossing-for-sure": (", or turns back within {GAP:g} of the bounds from one", "", LOCI),

@@ -211,10 +211,6 @@ class Criterion(ABC):
         state may move, in the metric.  Raises :class:`Destroyed` where the special point changes its kind.
         """
 
-    @abstractmethod
-    def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
-        """The same point with its parameters, state and double eigenvalue alone: no tangent, modes or counts."""
-
 
 class Singular(Criterion):
     """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
@@ -236,8 +232,17 @@ class Singular(Criterion):
 
     def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
         """See :class:`Criterion`."""
-        axes, x, section = self._section(guess, near, reach)
-        found = self.states.solve(x, section)
+        self.states.border(near.modes, near.left)
+        p, x, dp, dx = guess
+        direction = dp / self.plane.width
+        weight = float(np.linalg.norm(direction))
+        ahead = direction / weight if weight else np.array([0.0, 1.0])
+        axes = np.array([[ahead[1], -ahead[0]], ahead])  # across and along
+        (across, along), line, x = axes * self.plane.width, self.plane.line, x.copy()
+        self.solver.system.set_load(x, 0.0)
+        row = None if dx is None else self.metric * dx
+        lines = (lambda t: line(p + t * along, across)), (lambda load: line(p + load * across, along))
+        found = self.states.solve(x, Section(*lines, weight, row, reach))
         if found is None or found.curve is None:
             raise ConvergenceError("Newton's method does not converge")
         if not self.fold and found.size > IMPERFECT * self.scale:
@@ -245,35 +250,6 @@ class Singular(Criterion):
         if found.spread > FEWER * self.scale:
             raise Destroyed(f"its {len(found.vectors)} zero eigenvalues do not vanish together any more")
         return self._node(found, found.curve, axes, guess)
-
-    def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
-        """See :class:`Criterion`."""
-        axes, x, section = self._section(guess, near, 1.0)
-        found = self.states.place(x, section)
-        if found is None:
-            raise ConvergenceError("Newton's method does not converge")
-        x, parts, last = found
-        p = guess[0] + self._turned(parts, axes)
-        return LocusPoint(p, self.plane.at(p, x), near.dp, near.dx, self.plane.round_off(p, self._turned(last, axes)))
-
-    def _section(self, guess: Guess, near: LocusPoint, reach: float) -> tuple[np.ndarray, PETSc.Vec, Section]:
-        """Axes (2, 2) across and along a guess's direction, its state without a load, the plane through it across."""
-        self.states.border(near.modes, near.left)
-        p, x, dp, dx = guess
-        direction = dp / self.plane.width
-        weight = float(np.linalg.norm(direction))
-        ahead = direction / weight if weight else np.array([0.0, 1.0])
-        axes = np.array([[ahead[1], -ahead[0]], ahead])
-        (across, along), line, x = axes * self.plane.width, self.plane.line, x.copy()
-        self.solver.system.set_load(x, 0.0)
-        row = None if dx is None else self.metric * dx
-        return (
-            axes,
-            x,
-            Section(
-                lambda t: line(p + t * along, across), lambda load: line(p + load * across, along), weight, row, reach
-            ),
-        )
 
     def _turned(self, parts: np.ndarray, axes: np.ndarray) -> np.ndarray:
         """Change (2,) of the parameters of which these are the parts along the ``axes``."""
@@ -321,9 +297,12 @@ class Collision(Criterion):
 
     def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
         """See :class:`Criterion`; raises :class:`Destroyed` if pairs that met at once do not any more."""
-        node, here = self._onto(guess, near, reach)
-        plane, system, p, x, omega2 = self.plane, self.solver.system, node.p, node.x, node.omega2
-        basis, forward = _basis(near), guess[2] / plane.width
+        plane, system, basis = self.plane, self.solver.system, _basis(near)
+        forward = guess[2] / plane.width / np.linalg.norm(guess[2] / plane.width)
+        across = np.array([-forward[1], forward[0]]) * plane.width
+        system.line = plane.line(guess[0], across)
+        t, last, here, x = self._collide(guess[1], Cluster(basis, near.omega2), reach)
+        p, omega2 = guess[0] + t * across, here.cluster.mean
         gradient, clearest = np.zeros(2), here
         for which, name in enumerate(plane.names):
             system.line = plane.line(p, plane.axis(which))
@@ -341,35 +320,20 @@ class Collision(Criterion):
         orientation = 1 if dq @ forward >= 0 else -1
         basis = clearest.cluster.basis
         rest = unstable(self.eigensolver.at(plane.at(p, x)), basis.shape[1], basis)
-        return replace(
-            node,
-            dp=orientation * dq * plane.width,
+        split = SPLIT * here.split * abs(gradient) / (gradient @ gradient) * plane.width
+        return LocusPoint(
+            p,
+            x,
+            orientation * dq * plane.width,
+            system.new_vector(),
+            plane.round_off(p, last * across) + split,
+            ordinate=self.solver.shape.ordinate(x),
+            omega2=omega2,
             orientation=orientation,
-            located_to=node.located_to + SPLIT * here.split * abs(gradient) / (gradient @ gradient) * plane.width,
             modes=as_vectors(system, basis),
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
             lower=int(np.sign(gradient[0])),
         )
-
-    def onto(self, guess: Guess, near: LocusPoint) -> LocusPoint:
-        """See :class:`Criterion`."""
-        return self._onto(guess, near, 1.0)[0]
-
-    def _onto(self, guess: Guess, near: LocusPoint, reach: float) -> tuple[LocusPoint, Measured]:
-        """Point of the curve on the line, and the cluster there; the tangent is the one that was given."""
-        p, x, dp, _ = guess
-        width, system = self.plane.width, self.solver.system
-        forward = dp / width / np.linalg.norm(dp / width)
-        across = np.array([-forward[1], forward[0]])
-        system.line = self.plane.line(p, across * width)
-        t, last, here, x = self._collide(x, Cluster(_basis(near), near.omega2), reach)
-        p = p + t * across * width
-        x = self.plane.at(p, x)
-        located, ordinate = self.plane.round_off(p, last * across * width), self.solver.shape.ordinate(x)
-        node = LocusPoint(
-            p, x, forward * width, system.new_vector(), located, ordinate=ordinate, omega2=here.cluster.mean
-        )
-        return node, here
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
         """Zero of ``D`` on the system's line of parameters: by secants, the last digits by both subspaces."""

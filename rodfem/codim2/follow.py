@@ -163,10 +163,9 @@ class Half:
 
     def _between(self, last: LocusPoint, node: LocusPoint) -> str:
         """Insert what lies between the last node and the next one; a reason if the curve ends there."""
-        rows, ended = self.points.between(last, node, self.steps[-2] if len(self.steps) > 1 else None)
+        rows, ended = self.points.between(last, node)
         for row, kind in rows:
-            if kind:
-                self.marks[len(self.nodes)] = kind
+            self.marks[len(self.nodes)] = kind
             self.nodes.append(row)
         if not ended and last.rest != node.rest:
             self.marks[len(self.nodes)] = self.criterion.others

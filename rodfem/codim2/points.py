@@ -5,8 +5,8 @@ the parameters does not vanish.  If it does, in both of them at one place, the f
 the curve is its own mirror image; or it *passes a branch point*, to other parameters.  A double eigenvalue that
 vanishes ends a curve of flutter.
 
-What changes sign between two nodes is located.  What changes it twice is looked for at the extremum of a parabola or
-cubic through the nodes: such a step is parted there.
+What changes sign between two nodes is located.  A step that shows a turning point or a cusp, or in which the cubic
+through the nodes may turn twice, is parted, and looked at part by part.
 
 Points of a locus are known to the last digits *across* it, tangents by differences displace places along it.  Points
 on both sides are corrected to the curve at Chebyshev's points of a window of the tangent, and what is sought is read
@@ -17,7 +17,8 @@ points and what the polynomial leaves out (L. N. Trefethen, *Approximation Theor
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -44,15 +45,14 @@ CERTAIN = 10.0
 NONE = 1e-10
 """Part of a unit tangent along one parameter, or of a coupling over that with the other one, that is round-off: it has
 no sign."""
-TRIES = 8
-"""Parabolas by which a least value in a step is sought, and times that a step is parted for more cusps than one."""
+PARTS = 12  # of a step that shows a turning point or a cusp
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
 """The end of a curve of flutter: its double eigenvalue vanishes."""
 ENDS = "the fold ends on a branch point"
 DIVERGES = "the double eigenvalue vanishes: divergence"
 PASSES = "the fold passes a branch point"
 """Marks of rows; at the last one the coupling vanishes as well, but the fold goes on."""
-Row = tuple[LocusPoint, str]  # a point of a locus and the kind of its mark; empty for none
+Row = tuple[LocusPoint, str]  # a point of a locus and the kind of its mark
 Test = Callable[[LocusPoint], float]  # what vanishes at a point of codimension two
 
 
@@ -113,7 +113,7 @@ def place(criterion: Criterion, node: LocusPoint, sought: Sought, windows: tuple
 def _in_window(criterion: Criterion, node: LocusPoint, sought: Sought, half: float) -> Place:
     """Where ``sought`` is, by points of a window of this ``half`` width; raises :class:`ConvergenceError`."""
     t = half * PLACES
-    nodes = [_ahead(criterion, node, float(s), criterion.onto) for s in t]
+    nodes = [_ahead(criterion, node, float(s)) for s in t]
     tables = [[sought.of(n) for n in nodes], *np.array([n.p for n in nodes]).T]
     f, *through = (Chebyshev.fit(t, values, POINTS - 1, domain=[-half, half]) for values in tables)
     # each coefficient may be wrong by as much as the last two: by |T_k(0)| times that the value, |T_k'(0)| the slope
@@ -132,12 +132,12 @@ def _in_window(criterion: Criterion, node: LocusPoint, sought: Sought, half: flo
     return Place(s, ds, through, nodes, half, np.zeros(2))
 
 
-def _ahead(criterion: Criterion, node: LocusPoint, s: float, correct: Callable[..., LocusPoint]) -> LocusPoint:
+def _ahead(criterion: Criterion, node: LocusPoint, s: float) -> LocusPoint:
     """Point that is at ``s`` on the tangent of ``node``, corrected; ConvergenceError out of the bounds."""
     p = node.p + s * node.dp
     if criterion.plane.outside(p) is not None:
         raise ConvergenceError("the window leaves the bounds")
-    return correct((p, node.x + node.dx * s, node.dp, node.dx), node)
+    return criterion.correct((p, node.x + node.dx * s, node.dp, node.dx), node)
 
 
 class Codim2Points:
@@ -146,8 +146,8 @@ class Codim2Points:
     def __init__(self, criterion: Criterion) -> None:
         self.criterion, self.plane = criterion, criterion.plane
 
-    def between(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> tuple[list[Row], str]:
-        """Rows between two nodes, with the one ``before`` them, and why the curve ends there, or nothing."""
+    def between(self, a: LocusPoint, b: LocusPoint) -> tuple[list[Row], str]:
+        """Rows between two nodes, and why the curve ends there, or nothing."""
         if _reverses(a, b, NONE * self.plane.width):
             coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
             if coupling is None or _coupling_vanishes(coupling, a, b, 0.05):
@@ -158,7 +158,7 @@ class Codim2Points:
             zero = self.located(a, b, DOUBLE_ZERO.of)
             row, where = self._end(a, b, a.omega2 / (a.omega2 - b.omega2), zero and self._double_zero(zero, a))
             return [(row, DIVERGES)], f"{DIVERGES} {where}"
-        return self._rows(a, b, before, TRIES), ""
+        return self._rows(a, b), ""
 
     def located(self, a: LocusPoint, b: LocusPoint, f: Test) -> LocusPoint | None:
         """Point between two others at which ``f`` vanishes; None where it cannot be located."""
@@ -170,73 +170,46 @@ class Codim2Points:
 
     # --- rows ------------------------------------------------------------------------------------------------------
 
-    def _rows(self, a: LocusPoint, b: LocusPoint, other: LocusPoint | None, depth: int) -> list[Row]:
-        """What is between two nodes, next to an ``other`` one, in a step that may be parted ``depth`` times."""
-        rows = list[Row]()
-        for p, q in pairwise([a, *self._hidden(a, b, other), b]):
-            rows += self._piece(p, q, depth) + [(q, "")] * (q is not b)
-        return rows
+    def _rows(self, a: LocusPoint, b: LocusPoint) -> list[Row]:
+        """Turning points and cusps between two nodes: signs in parts of the step, if it shows one or may hide two."""
+        turning, found = _changes(a, b), list[Row]()
+        if a.curvature * b.curvature >= 0 and not (turning & _bends(a, b)).any():
+            return found
+        for p, q in pairwise([a, *self._parts(a, b), b]):
+            if p.curvature * q.curvature < 0:
+                found += self._cusp(p, q, a, b)
+            else:
+                found += self._turns(p, q, turning)
+        return found
 
-    def _piece(self, a: LocusPoint, b: LocusPoint, depth: int) -> list[Row]:
-        """What is between two nodes where the curvature has another sign at most once, or by pieces next to that."""
-        if a.curvature * b.curvature >= 0:
-            turns = self._turns(a, b)
-            for turn, _ in turns if depth else []:
-                sides = self._sides(turn, a, b)
-                if sides and sides[0].curvature * sides[1].curvature < 0:  # a cusp, of an even number
-                    return self._rows(a, sides[0], None, 0) + self._piece(sides[0], b, depth - 1)
-            return turns
-        cusp = self.located(a, b, lambda n: n.curvature)
+    def _parts(self, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
+        """Points that part a step."""
+        found = list[LocusPoint]()
+        for share in np.arange(1, PARTS) / PARTS:
+            with suppress(ConvergenceError):
+                found.append(self._at(a, b, a.s + float(share) * (b.s - a.s)))
+        return found
+
+    def _cusp(self, p: LocusPoint, q: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[Row]:
+        """What is between two points of a step from ``a`` to ``b`` where the curvature has different signs."""
+        cusp = self.located(p, q, lambda n: n.curvature)
         if cusp is None:
             return []
-        left, right, sides = list[Row](), list[Row](), self._sides(cusp, a, b)
-        if sides and depth:
-            (p, q), less = sides, depth - 1
-            left, right = self._rows(a, p, q, less), self._rows(q, b, p, less)
         if _coupling_vanishes(cusp, a, b, 1e-3):  # the place of a cusp is known to no more
             # no solution locates it: corrections slide along the curve of branch points
-            return [*left, (_within(cusp, a, b), PASSES), *right]
-        return [*left, (self._placed(cusp, _reversal(self.plane, a, b)), "cusp"), *right]
+            return [(_within(cusp, p, q), PASSES)]
+        return [(self._placed(cusp, _reversal(self.plane, p, q)), "cusp")]
 
-    def _sides(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
-        """Points on both sides of a ``node`` between two others, none where these are as close."""
-        aside = (b.s - a.s) / 100  # the tangent has the direction that it has next to a cusp
-        both = node.s - aside, node.s + aside
-        return [self._at(a, b, s) for s in both] if a.s < both[0] and both[1] < b.s else []
-
-    def _turns(self, a: LocusPoint, b: LocusPoint) -> list[Row]:
-        """Points between two nodes at which a parameter has an extremum that differs from both by more than noise."""
+    def _turns(self, a: LocusPoint, b: LocusPoint, turning: np.ndarray) -> list[Row]:
+        """Points at which one of the parameters ``turning`` turns, and differs from both ends by more than noise."""
         found = list[Row]()
         flat = np.minimum(abs(a.dp), abs(b.dp)) <= NONE * self.plane.width
-        for i in np.flatnonzero((a.dp * b.dp < 0) & ~flat & _changes(a, b)):
+        for i in np.flatnonzero((a.dp * b.dp < 0) & ~flat & turning):
             turn = self.located(a, b, lambda n, i=i: float(n.dp[i]))  # type: ignore[misc]
             sought = Sought(lambda n, i=i: float(n.p[i]), stationary=True)  # type: ignore[misc]
             if turn is not None and max(abs(turn.p - a.p)[i], abs(turn.p - b.p)[i]) > CERTAIN * turn.located_to[i]:
                 found.append((self._placed(turn, sought), f"turns in {self.plane.names[i]}"))
         return sorted(found, key=lambda item: item[0].s)
-
-    def _hidden(self, a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> list[LocusPoint]:
-        """A point between two nodes where something has another sign than at both, if there is one."""
-        found = (self._beyond_zero(a, b, s, of) for s, of in _extrema(a, b, before))
-        return next(([node] for node in found if node is not None), [])
-
-    def _beyond_zero(self, a: LocusPoint, b: LocusPoint, s: float | None, of: Test) -> LocusPoint | None:
-        """Point near arclength ``s`` where ``of`` has the other sign than at both nodes, by successive parabolas."""
-        sign, last = np.sign(of(a)), np.inf
-        for _ in range(TRIES):
-            if s is None or not a.s < s < b.s:
-                return None
-            try:
-                node = self._at(a, b, s)
-            except ConvergenceError:
-                return None
-            value = sign * of(node)
-            if value < 0:
-                return node
-            if value >= last:
-                return None
-            last, s = value, _vertex((a.s, s, b.s), (sign * of(a), value, sign * of(b)))
-        return None
 
     # --- where it is -----------------------------------------------------------------------------------------------
 
@@ -248,7 +221,7 @@ class Codim2Points:
         """The point near ``node`` that is ``sought``, with uncertainties of its place along the curve, too."""
         try:
             found = place(self.criterion, node, sought)
-            better = _ahead(self.criterion, node, found.s, self.criterion.correct)
+            better = _ahead(self.criterion, node, found.s)
         except ConvergenceError:
             along = np.maximum(abs(node.dp), UNPLACED * self.plane.width)
             return replace(node, located_to=node.located_to + UNPLACED * along)
@@ -321,23 +294,11 @@ def _reversal(plane: Plane, a: LocusPoint, b: LocusPoint) -> Sought:
     return Sought(lambda n: float(turned @ n.p), stationary=True)
 
 
-def _extrema(a: LocusPoint, b: LocusPoint, before: LocusPoint | None) -> list[tuple[float | None, Test]]:
-    """Arclengths between two nodes at which something that has one sign at both comes near zero, or passes it."""
-    found = list[tuple[float | None, Test]]()
-    if before is not None and a.curvature * b.curvature > 0:
-        nodes = (before, a, b)
-        found.append((_vertex([n.s for n in nodes], [n.curvature for n in nodes]), lambda n: n.curvature))
-    for i in np.flatnonzero((a.dp * b.dp > 0) & _changes(a, b)):
-        chord = (b.p[i] - a.p[i]) / (b.s - a.s)
-        if np.sign(a.dp[i]) * (3 * chord - (a.dp[i] + b.dp[i]) / 2) < min(abs(a.dp[i]), abs(b.dp[i])):
-            found.append(((a.s + b.s) / 2, lambda n, i=i: float(n.dp[i])))  # type: ignore[misc]
-    return found
-
-
-def _vertex(s: Sequence[float], values: Sequence[float]) -> float | None:
-    """Argument at which the parabola through three values comes nearest to zero or passes it; None without one."""
-    second, first, _ = np.polyfit(np.array(s) - s[1], values, 2)
-    return None if second * values[1] <= 0 else float(s[1] - first / (2 * second))
+def _bends(a: LocusPoint, b: LocusPoint) -> np.ndarray:
+    """Whether each parameter (2,) turns between two nodes, or twice: its cubic is slower there than at both."""
+    chord = (b.p - a.p) / (b.s - a.s)
+    middle = np.sign(a.dp) * (3 * chord - (a.dp + b.dp) / 2)
+    return np.asarray((a.dp * b.dp < 0) | (middle < np.minimum(abs(a.dp), abs(b.dp))))
 
 
 def _changes(a: LocusPoint, b: LocusPoint) -> np.ndarray:

@@ -194,19 +194,6 @@ class SingularSystem:
 
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
-        found = self._newton(x, section)
-        return None if found is None else self._state(*found)
-
-    def place(self, x: PETSc.Vec, section: Section) -> tuple[PETSc.Vec, np.ndarray, np.ndarray] | None:
-        """The state of the same solution, both parameters (2,) and their last changes (2,)."""
-        found = self._newton(x, section)
-        if found is None:
-            return None
-        x, t, _, (_, share) = found
-        return x, np.array([self.system.scalar(x), t]), share[:2]
-
-    def _newton(self, x: PETSc.Vec, section: Section | None) -> tuple[PETSc.Vec, float, _Linear, Step] | None:
-        """The solution, its second parameter, and the last step, as it was linearised."""
         self._section = section
         start, x, t, moved = x, x.copy(), 0.0, 0.0
         at: _Linear | None = None
@@ -231,7 +218,7 @@ class SingularSystem:
         if not outcome.converged or at is None or step is None:
             return None
         step[0].scale(outcome.error if outcome.error < TOLERANCE else 1.0)  # what convergence leaves, or round-off
-        return x, t, at, step
+        return self._state(x, t, at, step)
 
     def _lost(self, x: PETSc.Vec, at: _Linear | None, step: Step | None) -> bool:
         """Whether round-off of the eigenvalue at ``x`` moves the load by as much as a step to a branch point."""
