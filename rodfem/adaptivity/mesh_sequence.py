@@ -79,6 +79,18 @@ class TooCoarse(Exception):
         return self.why or f"estimated error {self.error:.0e}"
 
 
+def interpolated(point: Point, target: BranchSolver) -> Point:
+    """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""
+    if point.mesh == target.mesh:
+        return point
+    assert point.solver is not None
+    source, tangent = point.solver.shape, None
+    x = target.shape.restore(source.sample(point.x))
+    if point.tangent is not None:
+        tangent = target.shape.restore(source.sample(point.x + point.tangent)) - x
+    return replace(point, x=x, tangent=tangent, mesh=target.mesh, solver=target)
+
+
 class Meshes:
     """The solvers of one run, by the number of their mesh, and their richer companions, made when needed."""
 
@@ -129,19 +141,9 @@ class Meshes:
         self.solvers.append(new)
         return new
 
-    def here(self, point: Point, target: BranchSolver) -> Point:
-        """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""
-        if point.mesh == target.mesh:
-            return point
-        source = self.solvers[point.mesh].shape
-        x, tangent = target.shape.restore(source.sample(point.x)), None
-        if point.tangent is not None:
-            tangent = target.shape.restore(source.sample(point.x + point.tangent)) - x
-        return replace(point, x=x, tangent=tangent, mesh=target.mesh)
-
     def _carried(self, point: Point, target: BranchSolver, fixed_load: bool) -> Point | None:
         """Point solved on another mesh, on the plane across its tangent or at its load; None where that fails."""
-        guess = self.here(point, target)
+        guess = interpolated(point, target)
         if guess.tangent is None:
             return None
         x, row = guess.x, target.row(guess.tangent)
@@ -348,7 +350,7 @@ class Gaps:
 
     def _distances(self, solver: BranchSolver, point: Point) -> list[float]:
         """Distances of a point from all gaps."""
-        return [solver.system.distance(point.x, self.meshes.here(gap.point, solver).x) for gap in self.known]
+        return [solver.system.distance(point.x, interpolated(gap.point, solver).x) for gap in self.known]
 
 
 def arms(solver: BranchSolver, gap: Gap) -> list[Point]:

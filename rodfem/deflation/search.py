@@ -23,7 +23,7 @@ A search can show that there are more equilibria, and never that there are no mo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import inf, isfinite, nan
 from typing import NamedTuple
@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.adaptivity.mesh_sequence import interpolated
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
@@ -273,13 +274,11 @@ def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
     return Coexisting(point, count, system.active_drifts(point.x))
 
 
-def equilibria_at(
-    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
-) -> list[Point]:
+def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float) -> list[Point]:
     """Equilibria of traced branches at exactly ``load``, each once, which a search for further ones deflates."""
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
-        for point in _along(solver, branch, [here(p) for p in branch.points], load):
+        for point in _along(solver, branch, [interpolated(p, solver) for p in branch.points], load):
             if known.distance(point.x) >= APART:
                 point.branch = branch.name
                 found.append(point)

@@ -141,7 +141,7 @@ class Diagram:
         if not solver.conservative:
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
-        found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, solver.mesh))
+        found = equilibria_at(solver, self.branches, load)
         compare = self.plan.error_bars or self.plan.accuracy is not None
         return [self.solver(p).examined(p, compare=compare, special=self._special_at(p)) for p in found]
 
@@ -268,13 +268,6 @@ class Diagram:
     def _finest(self) -> int:
         """Number of the mesh with most unknowns."""
         return max(range(len(self.solvers)), key=lambda i: self.solvers[i].system.fields.unknowns)
-
-    def _on(self, point: Point, mesh: int) -> Point:
-        """Point interpolated on another mesh, to start from; itself if it is on that."""
-        if point.mesh == mesh:
-            return point
-        x = self.solvers[mesh].shape.restore(self.solvers[point.mesh].shape.sample(point.x))
-        return replace(point, x=x, tangent=None, mesh=mesh, solver=self.solvers[mesh])
 
     # --- how it is kept and shown ------------------------------------------------------------------------------------
 

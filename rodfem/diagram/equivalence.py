@@ -18,6 +18,7 @@ from math import inf
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.adaptivity.mesh_sequence import interpolated
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
@@ -131,13 +132,14 @@ def _sampled(branch: Branch, solver: BranchSolver) -> tuple[list[Point], float]:
     return chosen, max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])
 
 
-def loop_end(branch: Branch, step: Step, width: float, here: Callable[[Point], Point], alike: Alike) -> Point | None:
+def loop_end(branch: Branch, step: Step, width: float, alike: Alike) -> Point | None:
     """Last point of a ``branch`` that is back at its beginning in a ``step``; None if it is not."""
     if len(branch.points) < 12:
         return None
     solver, a, b = step.solver, step.a, step.b
     if max(abs(a.slope), abs(b.slope)) < VERTICAL * width:  # equal loads: compare the states
-        passed = solver.system.distance(b.x, here(branch.points[0]).x) < b.arclength - a.arclength
+        first = interpolated(branch.points[0], solver)
+        passed = solver.system.distance(b.x, first.x) < b.arclength - a.arclength
         return b if passed else None
     first = branch.points[0 if branch.parent is None else 1]
     if not (_passes(a, b, first) and near(first, a, solver.units, 4)):

@@ -51,7 +51,7 @@ class Explorer(Tracer):
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
         with self.solver.system.clock.scope("search"):
-            search = Deflation(self.solver, load, equilibria_at(self.solver, self.branches, load, self.here))
+            search = Deflation(self.solver, load, equilibria_at(self.solver, self.branches, load))
             found = search.run(self.plan.tries)
         self.observer.note(Remark(f"\n{search}", load))
         before = len(self.branches)
@@ -64,7 +64,7 @@ class Explorer(Tracer):
         """Whether a point is on one of the branches traced, from number ``first`` on."""
         self.use(point.mesh)
         known = Orbits(self.solver.system)
-        for other in equilibria_at(self.solver, self.branches[first:], point.load, self.here):
+        for other in equilibria_at(self.solver, self.branches[first:], point.load):
             known.add(other.x)
         return known.distance(point.x) < APART
 
@@ -324,7 +324,7 @@ class Explorer(Tracer):
         since = parent.points[-1].arclength - REACH * point.arclength  # its steps may be short there
         rows = next((i for i, row in enumerate(parent.points) if row.arclength >= since), 0)
         tail = replace(parent, points=parent.points[max(min(rows, len(parent.points) - TAIL), 0) :])
-        known = equilibria_at(self.solver, [tail], point.load, self.here)
+        known = equilibria_at(self.solver, [tail], point.load)
         return any(equivalent(point, other, self.solver.units, SAME_STATE) for other in known)
 
     def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:

@@ -11,7 +11,7 @@ from math import inf
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes
+from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes, interpolated
 from rodfem.continuation.arc import Piece
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.crossings import Node, Zeros, fourth
@@ -92,7 +92,7 @@ class SpecialSearch:
         """Special points that the row ``b`` shows, in order; a singular row, of no index, waits for the next one."""
         settled = self._open[0]
         if settled.mesh != b.mesh:
-            self._open = [self.meshes.here(settled, self.meshes.solvers[b.mesh])]
+            self._open = [interpolated(settled, self.meshes.solvers[b.mesh])]
         try:
             self._open.append(b)
             return self._shown() if self._regular(b) or len(self._open) > PATIENCE else []

@@ -8,7 +8,7 @@ from math import isnan
 from typing import NoReturn
 
 from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible
-from rodfem.adaptivity.mesh_sequence import AccuracyControl, Gap, Gaps, Meshes, TooCoarse
+from rodfem.adaptivity.mesh_sequence import AccuracyControl, Gap, Gaps, Meshes, TooCoarse, interpolated
 from rodfem.adaptivity.soft_states import SoftRows
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
@@ -63,10 +63,6 @@ class Tracer:
     def use(self, mesh: int) -> None:
         """Go on with the solver of that mesh."""
         self.solver = self.meshes.solvers[mesh]
-
-    def here(self, point: Point) -> Point:
-        """Point on the mesh in use."""
-        return self.meshes.here(point, self.solver)
 
     def trace(self, branch: Branch) -> None:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
@@ -188,7 +184,7 @@ class Tracer:
     def _take(self, branch: Branch, history: list[Point], row: Point) -> None:
         """Append a row to a branch, with the special points before it."""
         previous = history[-1]
-        last = loop_end(branch, Step(self.solver, previous, row), self.high - self.low, self.here, self.alike)
+        last = loop_end(branch, Step(self.solver, previous, row), self.high - self.low, self.alike)
         row = last or row
         self._check_symmetry(row)
         require_equilibrium(self.solvers[row.mesh], row)
@@ -225,7 +221,8 @@ class Tracer:
         out = next((s for s in specials if not self.low - margin <= s.point.load <= self.high + margin), None)
         if out is None:
             return
-        a = self.here(max((p for p in branch.points if p.arclength < out.point.arclength), key=lambda p: p.arclength))
+        last = max((p for p in branch.points if p.arclength < out.point.arclength), key=lambda p: p.arclength)
+        a = interpolated(last, self.solver)
         begins = len(branch.points) == 1  # else what is at its first point has been found
         step = Step(self.solver, a, b, specials, begins=begins).up_to((self.low, self.high))
         branch.cut(a.arclength)
@@ -242,7 +239,7 @@ class Tracer:
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
         if len(branch.points) == 2 and branch.parent is not None:
-            a, b = map(self.here, branch.points)
+            a, b = (interpolated(point, self.solver) for point in branch.points)
             self._insert(branch, self._requests(Step(self.solver, a, b, begins=a is branch.points[0])))
 
     def _rest(self, branch: Branch) -> None:
@@ -306,7 +303,7 @@ class Tracer:
 
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Insert a branch point on the very end of the range, located on a piece of the branch that goes past it."""
-        previous, load = self.here(branch.points[-2]), last.load + 0.02 * (last.load - sum(self.span) / 2)
+        previous, load = branch.points[-2], last.load + 0.02 * (last.load - sum(self.span) / 2)
         low, high = self.scene.parameters[self.scene.load].admissible
         if previous.x is last.x or not low < load < high:
             return
@@ -316,7 +313,7 @@ class Tracer:
                 raise ConvergenceError(f"there is no equilibrium at {self.scene.load} = {load:g}")
             s = last.arclength + self.solver.system.distance(last.x, x)
             further = self.solver.point(x, s, self.solver.load_tangent(x, load > last.load), outcome)
-            found = self.specials.beyond(previous, further)
+            found = self.specials.beyond(interpolated(previous, self.solver), further)
         width = 1e-6 * (self.high - self.low)  # nearer is the last state
         for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
             if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
