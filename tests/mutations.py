@@ -399,11 +399,6 @@ TABLE = {
             "(bent | (larger < 2 * change)).any()", "(larger < 2 * change).any()", "diagram/test_kinks.py"),
         "convexity-of-the-undeformed-state-alone": (
             "self.alters = of_state or", "self.alters =", "diagram/test_functions_between_rows.py"),
-        "convexity-at-places-of-a-grid-alone": (
-            "b[believed] - slope[believed] ** 2 / (2 * curvature[believed])", "b[believed]",
-            "continuation/test_convexity.py"),
-        "parabolas-through-steps-are-believed": (
-            " & (off <= 0.1 * (np.maximum(a, c) - b))", "", "continuation/test_convexity.py"),
     },
     "rodfem/fem/equations.py": {
         "constants-of-the-first-scene-stay": (

@@ -65,8 +65,7 @@ class Convexity:
     """Evaluates the least eigenvalue of the second derivative of ``W`` along a state.
 
     At the Gauss points of each element and at its ends: strains are largest at a clamp or a joint more often than not.
-    A material that varies along the rod may be too soft between them: it is looked at on a grid as well, and at the
-    vertices of parabolas through the values there.
+    A material that varies along the rod may be too soft between them: it is looked at on a grid as well.
 
     It ``alters`` with the state or the load, of the parameters with these ``names``, and ``varies`` along the rod.
     """
@@ -87,8 +86,6 @@ class Convexity:
 
     def holds(self, x: PETSc.Vec) -> bool:
         """Whether the second derivative is positive definite along the whole rod at the state ``x``."""
-        if self.varies and not self.margin(x, self.scales(x)) > 0:
-            return False
         return not self.lowest(x) <= 0
 
     def lowest(self, x: PETSc.Vec) -> float:
@@ -111,10 +108,7 @@ class Convexity:
     def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
         """Least eigenvalue over the whole rod at ``x``, in units of the ``scales`` of states nearby: smooth."""
         least = np.linalg.eigvalsh(self._by_element(x) / scales[..., None] / scales[..., None, :])[..., 0]
-        mine = least.min(initial=1.0)
-        if self.varies:
-            mine = min(mine, _vertices(least[:, -GRID:]).min(initial=1.0))
-        return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
+        return float(self.system.comm.allreduce(float(least.min(initial=1.0)), op=MPI.MIN))
 
     def _by_element(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives by element of this rank and place on it, (cells, places, size, size)."""
@@ -125,17 +119,6 @@ class Convexity:
         assert self.evaluate is not None
         matrices = self.system.at(x).evaluate(self.evaluate).reshape(-1, self.size, self.size)
         return np.asarray((matrices + matrices.transpose(0, 2, 1)) / 2)
-
-
-def _vertices(values: np.ndarray) -> np.ndarray:
-    """Lowest values of parabolas through three of some ``values`` on elements, (cells, places), of those believed."""
-    a, b, c = values[:, :-2], values[:, 1:-1], values[:, 2:]
-    slope, curvature = (c - a) / 2, a - 2 * b + c
-    before, after = (3 * a - 3 * b + c)[:, 1:] - values[:, :-3], (a - 3 * b + 3 * c)[:, :-1] - values[:, 3:]
-    off = np.maximum(np.pad(abs(before), ((0, 0), (1, 0))), np.pad(abs(after), ((0, 0), (0, 1))))
-    # a parabola through a jump is not believed: it has lower values than the function
-    believed = (abs(slope) <= curvature) & (curvature > 0) & (off <= 0.1 * (np.maximum(a, c) - b))
-    return np.asarray(b[believed] - slope[believed] ** 2 / (2 * curvature[believed]))
 
 
 class Pieces:

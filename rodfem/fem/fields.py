@@ -23,7 +23,7 @@ from rodfem.errors import InputError
 from rodfem.fem import formulations
 from rodfem.fem.formulations import CONTACT_FORCE, Formulation, turning_of
 from rodfem.fem.state import LOAD
-from rodfem.problem.arguments import reals, whole
+from rodfem.problem.arguments import convert, optional, reals, whole
 from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.functions import Constants
 from rodfem.problem.scene import Scene
@@ -55,10 +55,8 @@ class Discretization:
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`InputError`."""
-        object.__setattr__(self, "elements", whole(8)("elements", self.elements))
-        object.__setattr__(self, "degree", whole(6)("degree", self.degree))
-        if self.vertices is not None:
-            object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
+        along = optional(lambda name, value: reals(name, value, (0.0, 0.5, 1.0)))
+        convert(self, elements=whole(8), degree=whole(6), vertices=along)
         names, elements = formulations.names(), self.elements
         most = 1_000_000  # of which 100000 of degree 2 take 4 GB
         if self.formulation not in names:

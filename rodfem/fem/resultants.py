@@ -15,8 +15,8 @@ force ``dV/dr``, a moment ``dV/dtheta``.  Multipliers of hinges and guides act f
 ``V``.  These are rows of the discrete equations that are not solved, because the end is held: they are as accurate as
 those that are.  Loads at the end, springs there too, are part of ``V``.
 
-On a surface (:mod:`rodfem.problem.surface`) the residual has the multiplier of ``r' = R v`` for the force, to which
-that of the surface is added; what the surface does to an end of the rod is part of the reaction there.
+On a surface (:class:`~rodfem.problem.contribution.Surface`) the residual has the multiplier of ``r' = R v`` for the
+force, to which that of the surface is added; what the surface does to an end of the rod is part of the reaction there.
 """
 
 from __future__ import annotations

@@ -166,30 +166,27 @@ def changes(
     """Fields of a dataclass in which functions, and all that they hold, are replaced by ``visit(words, f, role)``."""
     new = {}
     for f in fields(owner):
-        value = getattr(owner, f.name)
-        if value is not f.default and (nested or "role" in f.metadata):
-            found = _visited(owner, f.metadata, value, visit, place)
-            if found is not value:
-                new[f.name] = found
+        value, role = getattr(owner, f.name), f.metadata.get("role")
+        if value is f.default or not (nested or role):
+            continue
+        if role is None:
+            found = _changed(value, visit, place, f.metadata.get("places"))
+        else:
+            role = role if isinstance(role, Role) else role(owner)
+            constant = role.or_value and not callable(value)
+            found = in_floats(value) if constant else visit(role.words.format(place), value, role)
+        if found is not value:
+            new[f.name] = found
     return new
 
 
-def _visited(owner: Any, declared: Any, value: Any, visit: Callable[[str, Any, Role], Any], place: str) -> Any:
-    role = declared.get("role")
-    if role is not None:
-        role = role if isinstance(role, Role) else role(owner)
-        constant = role.or_value and not callable(value)
-        return in_floats(value) if constant else visit(role.words.format(place), value, role)
+def _changed(value: Any, visit: Callable[[str, Any, Role], Any], place: str, places: Sequence[str] | None) -> Any:
     if isinstance(value, (tuple, list)):
-        places = declared.get("places") or ("",) * len(value)
-        parts = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))
+        pairs = zip(value, places or ("",) * len(value), strict=True)
+        parts = tuple(_changed(x, visit, where, None) for x, where in pairs)
         return parts if any(a is not b for a, b in zip(parts, value, strict=True)) else value
-    return _changed(value, visit, place)
-
-
-def _changed(owner: Any, visit: Callable[[str, Any, Role], Any], place: str) -> Any:
-    new = changes(owner, visit, place) if is_dataclass(owner) and not isinstance(owner, type) else {}
-    return replace(owner, **new) if new else owner
+    new = changes(value, visit, place) if is_dataclass(value) and not isinstance(value, type) else {}
+    return replace(value, **new) if new else value
 
 
 # --- constants, and the state of the rod at a place

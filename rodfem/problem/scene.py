@@ -22,7 +22,7 @@ from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated
 from rodfem.forms.kinematics import RODS, UNDEFORMED, strain
 from rodfem.problem.arguments import Check, a, convert, encodes, finite, interval, optional, plain, real, text
-from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution
+from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution, acting
 from rodfem.problem.ends import End, Ring
 from rodfem.problem.functions import (
     Constants,
@@ -37,7 +37,6 @@ from rodfem.problem.functions import (
     role_field,
     watched,
 )
-from rodfem.problem.surface import acting
 from rodfem.problem.table import Table, tables_of
 from rodfem.problem.trials import check_function, symbols
 from rodfem.problem.units import Units, units_of

@@ -84,31 +84,6 @@ def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
     assert lost == pytest.approx((1.0 - width - low) / (high - low), abs=1e-9)
 
 
-@pytest.mark.long
-def test_convexity_lost_between_the_places_of_the_quadrature(width: float = 1e-2) -> None:
-    """Twisting stiffness ``(s - 0.37)^2 + (P - 1)^2 - width^2``: negative within a width of 0.37, where P is near 1."""
-
-    def notch(v: Any, k: Any, c: Any) -> Any:
-        return bending_and_twist(k, (1.0, 2.0, (c.s - 0.37) ** 2 + (c.P - 1.0) ** 2 - width**2))
-
-    (branch,) = trace(rod(notch), MESH, Plan(depth=0, error_bars=False))
-    assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
-    with pytest.raises(SceneError, match=r"not convex somewhere along the state at P = 1\b"):
-        Solver(rod(notch), MESH).equilibrium(1.0)
-
-
-@pytest.mark.long
-def test_a_step_and_a_kink_inside_an_element_are_convex() -> None:
-    """A parabola through a step has lower values than the step."""
-    for stiffness in (
-        lambda c: ufl.conditional(ufl.lt(c.s, 0.3), 1.0, 0.02),
-        lambda c: abs(c.s - 0.3) + 1e-4,
-    ):
-        scene = rod(lambda v, k, c: bending_and_twist(k, (1.0, 2.0, stiffness(c) * (1.0 + c.P))))  # noqa: B023
-        (branch,) = trace(scene, MESH, Plan(depth=0, error_bars=False))
-        assert branch.ended == "end of range"
-
-
 @pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize("width", [0.1, pytest.param(0.01, marks=pytest.mark.alone)])

@@ -95,17 +95,6 @@ def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) 
     assert mu[0] <= -p + 1e-9  # a rigid rotation lowers the energy
 
 
-@pytest.mark.long
-def test_special_points_of_the_circle() -> None:
-    """It buckles in its plane at n^2, on top of the rotation."""
-    plan = Plan((0.3, 9.5), depth=0, steps=StepControl(first=0.05, largest=0.15), error_bars=False)
-    branch = trace(ring("e2"), Discretization("pointwise", 8, 6), plan)[0]
-    points = [s for s in branch.special if s.kind == "branch point"]
-    assert [s.point.load for s in points] == pytest.approx([4.0, 9.0], abs=1e-7)
-    assert [(s.negative_before, s.negative_after) for s in points] == [(1, 3), (3, 5)]
-    assert {(p.negative, p.zero) for p in branch.points if abs(p.load - 4) > 0.1 and p.load < 8} == {(1, 2), (3, 2)}
-
-
 LOADS: list[tuple[Callable[[Any], Any] | None, Any, list[str]]] = [
     (lambda c: (0.0, 0.0, c.P * ufl.cos(7 * c.s)), None, ["rotation about e3"]),
     (lambda c: (0.0, c.P * ufl.sin(c.s), 0.0), None, ["rotation about e2"]),

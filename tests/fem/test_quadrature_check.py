@@ -1,16 +1,13 @@
 """Functions that the rule of the elements does not integrate: said, and right on the mesh that is asked for."""
 
 from collections.abc import Callable
-from itertools import pairwise
 from math import isfinite, isnan, pi, sqrt, tan
 from typing import Any
 
-import numpy as np
 import pytest
 import ufl
 from classics import SUPPORTS, column
 from diagram.test_kinks import bent, deflection, ordinates
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, trace
@@ -45,31 +42,6 @@ def test_a_jump_asks_for_a_break() -> None:
     assert f"{NOT}0.43" in said and "breaks=" in said
     assert isnan(first.error_estimate) and "not estimated" in first.note and abs(first.point.load - load) > 1e-4
     assert seeing.warnings == [] and abs(second.point.load - load) <= second.error_estimate < 1e-7
-
-
-@pytest.mark.long
-def test_a_layer_of_a_thousandth_asks_for_shorter_elements() -> None:
-    """``theta' = M/B, M' = -P theta`` with ``B = 1 + tanh((s - 0.786)/0.001) / 2``, by Runge and Kutta."""
-    place = lambda s: (s - STEEP) / WIDTH  # noqa: E731
-
-    def moment(P: float) -> float:
-        y, ends = np.array([0.0, 1.0]), (0.0, STEEP - 40 * WIDTH, STEEP + 40 * WIDTH, 1.0)
-        for a, b in pairwise(ends):
-            slope = lambda s, y: [y[1] / (1 + 0.5 * np.tanh(place(s))), -P * y[0]]  # noqa: E731
-            y = solve_ivp(slope, (a, b), y, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
-        return float(y[1])
-
-    load = brentq(moment, 1.0, 2.5, xtol=1e-11)
-    steep = scene(lambda s: 1 + 0.5 * ufl.tanh(place(s)))
-    blind = trace(steep, plan=Plan(depth=0))
-    assert abs(blind.special("branch point")[0].point.load - load) > 1e-6
-    assert any(f"{NOT}0.78" in said and "shorter elements" in said for said in blind.warnings)
-    close = STEEP + WIDTH * np.array([-16, -8, -4, -2, 0, 2, 4, 8, 16])
-    vertices = tuple(float(s) for s in (0.0, 0.35, 0.65, *close, 0.86, 1.0))
-    seeing = trace(steep, Discretization("reduced", len(vertices) - 1, 8, vertices), Plan(depth=0))
-    found = seeing.special("branch point")[0]
-    assert abs(found.point.load - load) < found.error_estimate < 1e-7
-    assert seeing.warnings == []
 
 
 @pytest.mark.long

@@ -14,6 +14,7 @@ import rodfem
 from rodfem.app.cli import Parser
 from rodfem.app.main import Statement, parser_of
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, InputError, SceneError, SetupError
+from rodfem.fem.formulations import AUTO, FORMULATIONS
 
 HOME = Path(__file__).parents[2] / "rodfem"
 COMMAND_LINE = ("app/cli.py", "app/main.py", "app/console.py")
@@ -73,3 +74,19 @@ def test_terminal_of_the_command_line_names_options(folder: Path, capfd: pytest.
     err = capfd.readouterr().err
     assert not err or err == "error: -1 is not a depth: give 0 or more in --depth.\n"
     assert bool(err) == (MPI.COMM_WORLD.rank == 0)
+
+
+def test_all_formulations_are_named() -> None:
+    """By their keys, in the help and in the page about files."""
+    page, words = (HOME.parent / "docs" / "files.md").read_text(), " ".join(parser().format_help().split())
+    assert "{" + ",".join((AUTO, *FORMULATIONS)) + "}" in words
+    for name, made in FORMULATIONS.items():
+        assert made.name == name and f"`{name}`" in page and f"{name}: {made.words}" in words
+
+
+def test_no_other_module_compares_names_of_formulations() -> None:
+    """A formulation is asked, not recognised."""
+    for path in HOME.rglob("*.py"):
+        text = path.read_text()
+        for name in FORMULATIONS:
+            assert f'== "{name}"' not in text and f'!= "{name}"' not in text, path

@@ -8,34 +8,12 @@ import hemitropic_cases
 import numpy as np
 import pytest
 from golden_cases import cases, trace
-from rescaled import DNA as METRES_AND_NEWTONS
-from rescaled import STEEL, differences, rescaled
+from rescaled import DNA, STEEL, differences, rescaled
 
 import rodfem
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
 from rodfem.forms.energy import bending_and_twist
-from rodfem.problem.functions import Constants
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-
-DNA, PIPELINE = (1e-8, 2e-28, 1e-15), (1e4, 1e9, 1e3)
-"""Lengths, stiffnesses and masses per length in SI units."""
-MESH = Discretization(elements=4, degree=5)
-
-
-def column(length: float, stiffness: float, rod: str) -> Scene:
-    """Column of lengths and stiffnesses in some units, up to ten times its natural load."""
-
-    def energy(v, k, c: Constants):
-        out = bending_and_twist(k, (c.EI, 1.3 * c.EI, 0.8 * c.EI))
-        if rod == "flexible":
-            out += 0.5e4 * c.EI / length**2 * (v[0] ** 2 + v[1] ** 2 + 2 * (v[2] - 1) ** 2)
-        return out
-
-    return classics.column(
-        "column", classics.SUPPORTS["clamped-free"], (0.0, 10 * stiffness / length**2), interval=(0.0, length), rod=rod,
-        energy=energy, constants={"EI": stiffness},
-        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0] ** 2 + r[1] ** 2),
-    )  # fmt: skip
 
 
 @pytest.mark.ranks
@@ -115,7 +93,7 @@ BAR = ["classic haringx", "classic bow", "classic Beck"]
 @pytest.mark.parametrize(
     ("name", "units"),
     [
-        *((name, METRES_AND_NEWTONS) for name in MOLECULE),
+        *((name, DNA) for name in MOLECULE),
         *((name, STEEL) for name in BAR),
         ("classic pressed arch", (*STEEL[:2], 1e13)),
     ],
@@ -134,16 +112,3 @@ def test_a_fold_feels_a_load_of_any_unit() -> None:
     arch = cases()["classic pressed arch"]()
     folds = [trace(rescaled(arch, 1.0, 1.0, unit), error_bars=False).special("fold")[0] for unit in (1e-13, 1e13)]
     assert folds[1].coupling == pytest.approx(folds[0].coupling, rel=1e-6) and folds[0].coupling > 1e-3
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
-def test_methods(method: str) -> None:
-    """Eigenvalues of a flexible rod by each method, in the kinetic metric of unit rotary inertia."""
-    values = []
-    for length, stiffness in ((1.0, 1.0), DNA[:2]):
-        solver = rodfem.Solver(column(length, stiffness, "flexible"), MESH)
-        verdict = solver.assess(solver.equilibrium(5.0 * stiffness / length**2), method)
-        assert verdict.negative == 2
-        values.append(np.array(verdict.values) * length**2 / stiffness)
-    np.testing.assert_allclose(values[1], values[0], rtol=1e-8)
