@@ -42,7 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         lines = (f"  {each:<10}{_summary(command)}" for each, command in COMMANDS.items())
         print(HELP.format(commands="\n".join(lines)), end="")
     elif name == "--version":
-        _print_versions()
+        from rodfem.output.files import versions  # imports dolfinx, which takes a second
+
+        for library, version in {"rodfem": rodfem.__version__, **versions()}.items():
+            print(f"{library:<8}{version}")
     elif name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
@@ -51,13 +54,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
             COMMANDS[name](words)
         except (InputError, SetupError) as trouble:
             complain(str(trouble))
-
-
-def _print_versions() -> None:
-    from rodfem.output.files import versions  # imports dolfinx, which takes a second
-
-    for library, version in {"rodfem": rodfem.__version__, **versions()}.items():
-        print(f"{library:<8}{version}")
 
 
 def _summary(command: Callable[..., None]) -> str:

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.diagram.diagram import MESH, PLAN, trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import RANKS, SCENE
@@ -26,14 +25,18 @@ from rodfem.fem.fields import Discretization
 from rodfem.file_format import RESULT
 from rodfem.libraries import optional
 from rodfem.output.files import save_json
+from rodfem.output.table import special_data
 from rodfem.problem.arguments import checked, each, function, path, reals
 from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, end_together, on_first
 from rodfem.whole_files import locked
 
 Work = Callable[[Scene], dict[str, Any]]
-NUMBERS = ("critical_load", "error", "ordinate", "index_before", "index_after")
-"""What a family has of a special point."""
+NUMBERS = {
+    **{"critical_load": "load", "error": "error_estimate", "ordinate": "ordinate"},
+    **{"index_before": "negative_before", "index_after": "negative_after"},
+}
+"""What a family has of a special point, and the entries of files."""
 
 
 def key_of(scene: Scene) -> dict[str, Any]:
@@ -171,51 +174,26 @@ def family(
     work = partial(_critical, plan=plan or Plan(depth=0), discretization=discretization or Discretization())
     found = many(rods, work, folder, **sharing)
     shape = tuple(map(len, values.values()))
-    data = {name: ([*values], column.reshape(shape)) for name, column in _of_rods(found).items()}
-    data |= {name: ([*values, "point"], table.reshape(*shape, -1)) for name, table in _of_points(found).items()}
-    return xarray.Dataset(data, values, {"scene": scene.name, "load": scene.load})
-
-
-def _of_rods(found: Sequence[dict[str, Any]]) -> dict[str, np.ndarray]:
-    """Where each rod loses its stability, and what failed."""
-    losses = [rod.get("first_loss") for rod in found]
-    return {
-        "first_loss": np.array([np.nan if load is None else load for load in losses]),
+    of_rods = {
+        "first_loss": np.array([rod.get("first_loss") for rod in found], dtype=float),
         "trouble": np.array([rod.get("error", "") for rod in found]),
     }
-
-
-def _of_points(found: Sequence[dict[str, Any]]) -> dict[str, np.ndarray]:
-    """Tables (rods, points) of what special points have, filled up where a rod has fewer."""
-    points = [rod.get("points", []) for rod in found]
+    points = [rod.get("points", []) for rod in found]  # filled up where a rod has fewer
     rows = list(zip(*zip_longest(*points, fillvalue={}), strict=True)) or [()] * len(points)
-    kinds = {"kind": np.array([[point.get("kind", "") for point in row] for row in rows])}
-    return kinds | {
-        name: np.array([[np.nan if point.get(name) is None else point[name] for point in row] for row in rows])
-        for name in NUMBERS
-    }
+    of_points = {name: np.array([[x.get(name) for x in row] for row in rows], dtype=float) for name in NUMBERS}
+    of_points["kind"] = np.array([[x.get("kind", "") for x in row] for row in rows])
+    data = {name: ([*values], column.reshape(shape)) for name, column in of_rods.items()}
+    data |= {name: ([*values, "point"], table.reshape(*shape, -1)) for name, table in of_points.items()}
+    return xarray.Dataset(data, values, {"scene": scene.name, "load": scene.load})
 
 
 def _critical(rod: Scene, plan: Plan, discretization: Discretization) -> dict[str, Any]:
     """Special points of a rod, by their loads, and where its first branch loses its stability."""
     diagram = trace(rod, discretization, plan, comm=MPI.COMM_SELF)
-    points = sorted(diagram.special(), key=lambda special: special.point.load)
-    return {"points": [_entry(special) for special in points], "first_loss": _first_loss(diagram[0])}
-
-
-def _entry(special: SpecialPoint) -> dict[str, Any]:
-    bar = special.error_estimate
+    points = sorted(map(special_data, diagram.special()), key=lambda special: special["load"])
+    stable = not diagram[0].points[0].negative  # at first
+    lost = [s.point.load for s in diagram[0].special if stable and s.negative_after > s.negative_before == 0]
     return {
-        "kind": str(special.kind),
-        "critical_load": special.point.load,
-        "error": bar if np.isfinite(bar) else None,
-        "ordinate": special.point.ordinate,
-        "index_before": special.negative_before,
-        "index_after": special.negative_after,
+        "points": [{"kind": x["kind"]} | {name: x[entry] for name, entry in NUMBERS.items()} for x in points],
+        "first_loss": next(iter(lost), None),
     }
-
-
-def _first_loss(branch: Branch) -> float | None:
-    """Load of the first special point of a branch that begins stable beyond which it is not."""
-    lost = (s for s in branch.special if s.negative_after > s.negative_before == 0)
-    return None if branch.points[0].negative else next((s.point.load for s in lost), None)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.spatial import KDTree
 
-from rodfem.continuation.kinds import IMPERFECT, KINDS
+from rodfem.continuation.kinds import KINDS
 from rodfem.output import style
 from rodfem.output.pieces import COUNTED, Piece, endings, pieces_of
 from rodfem.output.style import END, FONT, HALO, LINES, PALETTE
@@ -150,8 +150,7 @@ def _draw_marks(axes: Axes, branches: Branches) -> list[Line2D]:
     for kind, places in found.items():
         if places and (kind in MARKERS or kind.startswith(ENDS)):
             look = {"linestyle": "none", "zorder": 5, **MARKERS.get(kind, END)}
-            look["label"] = look.get("label", kind) + (_unfolding(branches) if kind == IMPERFECT else "")
-            handles += axes.plot(*np.unique(places, axis=0).T, path_effects=HALO, **look)
+            handles += axes.plot(*np.unique(places, axis=0).T, path_effects=HALO, **{"label": kind, **look})
     return handles
 
 
@@ -164,14 +163,6 @@ def _marks(branch: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float, float]
     yield from ((f"{ENDS}{reason}", tuple(places[row])) for row, reason in endings(branch))
     if branch.get("singular_start"):
         yield SINGULAR, tuple(places[0])
-
-
-def _unfolding(branches: Branches) -> str:
-    """Unfolding of imperfect bifurcations for the legend."""
-    points = [point for branch in branches for point in branch.get("special", []) if point["kind"] == IMPERFECT]
-    values = [abs(point["unfolding"]) for point in points if point.get("unfolding") is not None]
-    sizes = dict.fromkeys(f"{value:.0e}" for value in (min(values), max(values))) if values else ()
-    return f", unfolding {' to '.join(sizes)}" if sizes else ""
 
 
 # --- words

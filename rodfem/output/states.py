@@ -77,7 +77,7 @@ def _numbers(columns: Mapping[str, Any], stored: Mapping[str, Floats]) -> dict[s
     out = {name: x for name, x in stored.items() if x.ndim == 1 and not name.startswith(DRIFT)}
     for name, column in columns.items():
         if all(x is None or isinstance(x, (int, float)) for x in column):
-            out[name] = np.array([np.nan if x is None else x for x in column])
+            out[name] = np.array(column, dtype=float)
     return out
 
 
@@ -274,7 +274,7 @@ def _columns(rows: Rows, columns: Mapping[str, Any]) -> dict[str, Floats]:
         for negative, undecided, kink, uncompared, in_space in zip(*parts, strict=True)
     ]
     known = {"undecided": np.zeros(len(none))} | rows.columns
-    known["stable"] = np.array([np.nan if x is None else x for x in stable])
+    known["stable"] = np.array(stable, dtype=float)
     return {name: known.get(name, np.full(len(none), np.nan)) for name in COLUMNS}
 
 

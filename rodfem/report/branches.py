@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from html import escape, unescape
 from html.entities import html5
-from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,7 +112,7 @@ def _listed(columns: Data) -> list[str]:
 
 def _clear(values: Iterable[Any], size: float) -> list[float | None]:
     """Values of an ordinate; zero where they are the round-off of numbers of its natural ``size``."""
-    found = np.array([nan if value is None else value for value in values], dtype=float)
+    found = np.array([*values], dtype=float)
     found[abs(found) < NEGLIGIBLE * size] = 0.0
     return plain(found)
 

@@ -193,5 +193,3 @@ def test_what_a_diagram_does_not_explain_is_marked() -> None:
     assert not {*marks} & {*legend(plain)}
     for mark, more in marks.items():
         assert mark in legend(plain | more)
-    point = {"kind": "imperfect bifurcation", "row": 2, "load": 2.0, "ordinate": 2.0, "unfolding": -3e-9}
-    assert "imperfect bifurcation, unfolding 3e-09" in legend(plain | {"special": [point]})
