@@ -24,18 +24,12 @@ from rodfem.ranks import all_come, in_words, listen
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
 
-def check_installation() -> None:
-    """Leave with one sentence and status 2 where this Python lacks a module."""
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        sys.stderr.write(
-            f"error: {sys.executable} has no module {', '.join(missing)}: install what is missing by 'pip install "
-            "\"rodfem[pip]\"' (Python 3.12 or newer), or on Debian by 'make setup', and use .venv/bin/python.\n"
-        )
-        sys.exit(2)
-
-
-check_installation()
+if missing := [name for name in NEEDED if find_spec(name) is None]:
+    sys.stderr.write(
+        f"error: {sys.executable} has no module {', '.join(missing)}: install what is missing by 'pip install "
+        "\"rodfem[pip]\"' (Python 3.12 or newer), or on Debian by 'make setup', and use .venv/bin/python.\n"
+    )
+    sys.exit(2)
 # Open MPI 4 starts a daemon otherwise, in 0.2 s, which needs a home folder; a file with a rod may start MPI when read
 os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"  # a closed pipe is no error

@@ -59,7 +59,7 @@ def as_data(
 ) -> dict[str, Any]:  # fmt: skip
     """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene)."""
     system = max(systems, key=lambda s: s.fields.unknowns)
-    scene = system.scene
+    scene, points = system.scene, sum(len(b.points) for b in branches)
     load, ordinate, order = scene.parameters[scene.load], scene.ordinate, scene.inertia.order
     return {
         "format": DIAGRAM.mark(),
@@ -83,7 +83,8 @@ def as_data(
         "branch_points_not_followed": not_followed(branches),
         "meshes": list(map(_mesh_data, systems)),
         "branches": list(map(partial(branch_data, rates=order == 1), branches)),
-        "timing": _timing(clock, sum(len(b.points) for b in branches)) | {"ranks": system.comm.size},
+        "timing": {f"{name.replace(' ', '_')}_s": clock.seconds.get(name, 0.0) for name in PARTS}
+        | {"total_s": clock.total(), "points": points, "ms_per_point": clock.each(points), "ranks": system.comm.size},
     }
 
 
@@ -91,12 +92,6 @@ def mesh_of(system: System) -> dict[str, Any]:
     """Discretisation, as files record it."""
     d, unknowns = system.fields.discretization, system.fields.unknowns
     return {"formulation": d.formulation, "elements": d.elements, "degree": d.degree, "unknowns": unknowns}
-
-
-def _timing(clock: Clock, points: int) -> dict[str, Any]:
-    """Times of the parts of a run, of all of it, and of each of so many points."""
-    parts = {f"{name.replace(' ', '_')}_s": clock.seconds.get(name, 0.0) for name in PARTS}
-    return parts | {"total_s": clock.total(), "points": points, "ms_per_point": clock.each(points)}
 
 
 def _mesh_data(system: System) -> dict[str, Any]:
@@ -166,12 +161,6 @@ def save_run(
     states = folder / "states.h5"
     image = states_of(branches, solvers, states, run=data["run"], first=first, modes=modes)
     on_first(solvers[0].system.comm, lambda: write_whole({folder / "diagram.json": as_json(data), states: image}))
-
-
-def save_states(branch: Branch, solvers: Sequence[BranchSolver], path: Path, first: bool) -> None:
-    """Add one ``branch`` to an HDF5 file, or write the ``first`` one; collective, written on rank 0."""
-    image = states_of([branch], solvers, path, first=first)
-    on_first(solvers[0].system.comm, lambda: write_whole({path: image}))
 
 
 def states_of(

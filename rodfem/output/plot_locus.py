@@ -55,17 +55,13 @@ def draw_locus(loci: Sequence[Locus], path: Path) -> Path:
         load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
         axes.set_xlabel(other, fontsize=FONT + 1)
         axes.set_ylabel(load, fontsize=FONT + 1)
-        explain(axes, [*axes.get_lines(), *axes.collections, *_index_entry(loci)])
+        known = any(pair[0] >= 0 for one in loci for pair in one["columns"]["index"])
+        look = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
+        index = Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **look)
+        explain(axes, [*axes.get_lines(), *axes.collections, *[index] * known])
         for one in loci:
             _write_indices(axes, one)
     return save(figure, path)
-
-
-def _index_entry(loci: Sequence[Locus]) -> list[Line2D]:
-    """Entry of the legend for the indices of the curves, if there are any."""
-    known = any(pair[0] >= 0 for one in loci for pair in one["columns"]["index"])
-    look = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
-    return [Line2D([], [], label=f"index{plane_of(loci[0])} on the two sides", **look)] * known
 
 
 def _draw_curve(axes: Axes, one: Locus, loci: Sequence[Locus]) -> None:

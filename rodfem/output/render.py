@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the caption
-FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 SHINE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
 TILT = np.radians(20.0)  # by which a picture is seen from above
@@ -65,8 +64,6 @@ def draw_shape(
     :class:`ImportError` without PyVista, and :class:`RuntimeError` where the picture comes out blank.
     """
     path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise ValueError(f"picture {path} has an unknown format: expected one of {FORMATS}, try shape.png")
     state = _read(Path(states), branch, row)
     look = Look(radius or thickness(state.centres), state.view() if view is None else view)
     pyvista = _import_pyvista()
@@ -340,19 +337,20 @@ def snapshot(
 ) -> Snapshot:
     """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one."""
     from rodfem.continuation.branch import Branch
-    from rodfem.output.files import save_states
+    from rodfem.output.files import states_of
 
-    comm = solvers[0].system.comm
+    homes = {id(p): (b.name, i) for b in reversed(branches) for i, p in enumerate(b.points)}
+    (name, row), comm = homes.get(id(point), ("state", 0)), solvers[0].system.comm
+    saved = [replace(branches[0], special=[])]
+    if name != saved[0].name:
+        saved.append(Branch(name, None, 0, [point]))
+        row = 0
     with TemporaryDirectory() as folder:
-        states, picture = Path(folder) / "states.h5", Path(folder) / "shape.png"
-        homes = {id(p): (b.name, i) for b in reversed(branches) for i, p in enumerate(b.points)}
-        (name, row), first, png = homes.get(id(point), ("state", 0)), branches[0], b""
-        save_states(replace(first, special=[]), solvers, states, first=True)
-        if name != first.name:
-            save_states(Branch(name, None, 0, [point]), solvers, states, first=False)
-            row = 0
+        states, png = Path(folder) / "states.h5", b""
+        image = states_of(saved, solvers, states, first=True)
         if comm.rank == 0:
-            png = draw_shape(states, name, row, picture, caption=caption).read_bytes()
+            states.write_bytes(image)
+            png = draw_shape(states, name, row, Path(folder) / "shape.png", caption=caption).read_bytes()
     found = Snapshot(png)
     if path is not None:
         on_first(comm, lambda: found.save(path))

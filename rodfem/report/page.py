@@ -68,24 +68,19 @@ def write_report(folder: Path, path: Path | None = None) -> Path:
 
 def page_of(payload: Mapping[str, Any]) -> str:
     """HTML of a report on this data; no text of it is an element of the page."""
-    data = script_json(payload)
+    data, head = script_json(payload), "data:text/javascript;charset=utf-8;base64,"
+    modules = {f"report/{file.name.removesuffix('.js')}": file for file in (STATIC / "js").iterdir()}
+    modules |= {name: STATIC / "vendor" / file for name, file in LIBRARIES.items()}
+    urls = {name: head + b64encode(file.read_bytes()).decode() for name, file in sorted(modules.items())}
     parts = {
         "title": escape(f"{payload['title']} · rodfem"),
         "nonce": sha256(data.encode()).hexdigest(),
         "style": _text(STATIC / "report.css"),
         "payload": data,
         "plotly": _text(STATIC / "vendor" / "plotly-basic.min.js"),
-        "imports": script_json({"imports": _modules()}),
+        "imports": script_json({"imports": urls}),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _text(STATIC / "template.html"))
-
-
-def _modules() -> dict[str, str]:
-    """Names of all modules, and each as a data URL."""
-    own = {f"report/{file.name.removesuffix('.js')}": file for file in (STATIC / "js").iterdir()}
-    libraries = {name: STATIC / "vendor" / file for name, file in LIBRARIES.items()}
-    head = "data:text/javascript;charset=utf-8;base64,"
-    return {name: head + b64encode(file.read_bytes()).decode() for name, file in sorted({**own, **libraries}.items())}
 
 
 def _text(file: Traversable) -> str:
@@ -121,6 +116,9 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     words = str(data.get("parameter_words") or "").replace("$", "")
     names = {"ordinate": data["ordinate"], **DERIVED}
     labels = names | {"ordinate": ordinate_in_words(data)}
+    origin = data.get("origin") or {}
+    versions = ", ".join(f"{name} {version}" for name, version in (origin.get("versions") or {}).items())
+    known = {"command": origin.get("command"), "date": origin.get("date"), "versions": versions}
     return {
         "scene": data["scene"],
         "title": plain_of(data["title"]),
@@ -138,15 +136,8 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         "meaning": data["meaning"],
         "mesh": mesh_in_words(data["discretization"]),
         "program": data["format"]["program"],
-        "origin": _origin(data.get("origin") or {}),
+        "origin": [[name, str(text)] for name, text in known.items() if text],
         "folder": str(folder),
         "loci": loci_of(folder, data),
         "glossary": {name: ENTRIES[key] for name, key in NAMES.items()},
     }
-
-
-def _origin(origin: Mapping[str, Any]) -> list[list[str]]:
-    """Command, date and versions, as far as they are recorded, each with its name."""
-    versions = ", ".join(f"{name} {version}" for name, version in (origin.get("versions") or {}).items())
-    found = {"command": origin.get("command"), "date": origin.get("date"), "versions": versions}
-    return [[name, str(text)] for name, text in found.items() if text]

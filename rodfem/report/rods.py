@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
-from rodfem.modes.modes import RIGID, SYMMETRY, Few, Typical, exponent, load_modes, rows_with_modes, typical_of
+from rodfem.modes.modes import RIGID, SYMMETRY, Few, exponent, load_modes, rows_with_modes, typical_of
 from rodfem.output.glyphs import Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
@@ -49,19 +49,18 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
         here, group = shapes[branch["name"]], groups[branch["name"]]
         shown = branch_data(branch, here, colour, data)
-        shown["ordinates"] |= _reactions(branch["columns"].get("reactions") or [])
+        rows = list(map(reactions_by_name, branch["columns"].get("reactions") or []))
+        shown["ordinates"] |= {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
         shown |= _drawn(here, group, stage, shelf) | profiles_data(group, states)
         shown |= _moving(branch, here, group, folder / "modes.h5", stage)
         traced = is_traced(branch, data["branches"])
         branches.append(shown | {"image": "" if traced else branch.get("image", "")})
     _clear_reactions(branches, data["natural"])
-    return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
-
-
-def _reactions(column: Sequence[Any]) -> dict[str, list[float | None]]:
-    """Forces and moments of supports and attachments in all rows, by their names."""
-    rows = list(map(reactions_by_name, column))
-    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
+    solids = []
+    for body, color in shelf:  # a box and a wedge have sharp edges
+        points, triangles = packed(body_of(body)[0]), body_of(body)[1].ravel().tolist()
+        solids.append({"points": points, "triangles": triangles, "colour": color, "flat": body in ("box", "wedge")})
+    return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": solids}
 
 
 def _clear_reactions(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
@@ -84,12 +83,7 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
         if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
             shown = [mode._replace(rates=bool(branch.get("rates"))) for mode in shown]
             modes[row] = motions_of(shown, shapes, row, read_setting(group, row), stage.look)
-    return {"modes": modes, "missed": _troubles(typical.values())}
-
-
-def _troubles(typical: Iterable[Typical]) -> dict[int, str]:
-    """Why rows have no modes."""
-    return {each.row: each.trouble for each in typical if each.trouble}
+    return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items() if each.trouble}}
 
 
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
@@ -99,21 +93,16 @@ def profiles_data(group: Any, states: int) -> dict[str, Any]:
     left out; ``jumps`` (P,) are those of each of the four between elements.
     """
     found = [profiles_of(group, row) for row in range(len(group["load"]))]
-    most, loaded = group[POINTS][0].size, _loaded(group)
+    most = group[POINTS][0].size
+    acting = [float(place.attrs["s"]) for kind in (SUPPORTS, CONSTRAINTS) for place in group.get(kind, {}).values()]
     kept = np.unique(np.linspace(0, most - 1, min(most, max(2, BUDGET // states))).round().astype(int))
     out = np.full((len(found), most, 1 + 3 * len(PROFILES)), np.nan)
     for place, one in zip(out, found, strict=True):
         columns = [one.points.reshape(-1, 1), *(one.fields[symbol].reshape(-1, 3) for symbol in PROFILES)]
         place[: one.points.size] = np.hstack(columns)
     element = [one.points.shape[1] * (len(kept) == most) for one in found]
-    jumps = {symbol: plain([one.jump(symbol, loaded) for one in found]) for symbol in PROFILES}
+    jumps = {symbol: plain([one.jump(symbol, acting) for one in found]) for symbol in PROFILES}
     return {"profile": packed(out[:, kept]), "element": element, "jumps": jumps}
-
-
-def _loaded(group: Any) -> list[float]:
-    """Arclengths at which something holds or loads the rod."""
-    places = [float(place.attrs["s"]) for kind in (SUPPORTS, CONSTRAINTS) for place in group.get(kind, {}).values()]
-    return [s for s in places if np.isfinite(s)]
 
 
 def _drawn(shapes: Shapes, group: Any, stage: Stage, shelf: dict[tuple[str, str], int]) -> dict[str, Any]:
@@ -145,15 +134,6 @@ def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
     """Outline of the cross-sections (1, k, 2), or (S, k, 2) at the stations where they differ."""
     whole = stage.look.radius * profile_of(shapes.s, stage.setting.section, angles)
     return whole[:1] if np.ptp(whole, axis=0).max() < SAME_SPECIAL * stage.look.radius else whole
-
-
-def _solids(shelf: dict[tuple[str, str], int]) -> list[dict[str, Any]]:
-    """Bodies in their colours; a box and a wedge have sharp edges."""
-    out = []
-    for body, color in shelf:
-        points, triangles = packed(body_of(body)[0]), body_of(body)[1].ravel().tolist()
-        out.append({"points": points, "triangles": triangles, "colour": color, "flat": body in ("box", "wedge")})
-    return out
 
 
 # --- shapes

@@ -15,8 +15,11 @@ from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
 
 import rodfem
 from rodfem import Branch, Discretization, IndexStepControl, InputError, Plan, Point, SceneError, StepControl, trace
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
-from rodfem.output.files import load_state, save_states
+from rodfem.output.files import load_state, states_of
+from rodfem.ranks import on_first
+from rodfem.whole_files import write_whole
 
 AT = (0.05, 0.5, 0.9)
 
@@ -91,15 +94,19 @@ def test_newton_converges_quadratically() -> None:
     assert np.log(sizes[3] / sizes[2]) / np.log(sizes[2] / sizes[1]) == pytest.approx(2, abs=0.2)
 
 
+def write_states(branch: Branch, solver: BranchSolver, path: Path) -> None:
+    image = states_of([branch], [solver], path, first=True)
+    on_first(solver.system.comm, lambda: write_whole({path: image}))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:
     """A saved state starts Newton's method on other elements of another degree, and it lands on the exact state."""
     branch = explored(formulation, 8, 6, at=AT if formulation == "reduced" else (0.5,), depth=1)[1]
-    save_states(branch, [follower(formulation, 8, 6)], folder / "states.h5", first=True)
+    write_states(branch, follower(formulation, 8, 6), folder / "states.h5")
     row = branch.points.index(user_points(branch, 0.5)[0])
     other = follower(formulation, 10, 8)
-    other.system.comm.barrier()
     guess = load_state(folder / "states.h5", branch.name, row, other)
     assert other.system.scalar(guess) == 0.5
     other.system.set_phase(guess)
@@ -114,8 +121,7 @@ def test_restart_on_another_discretisation(formulation: str, folder: Path) -> No
 def test_restart_from_what_is_not_there(folder: Path) -> None:
     branch = explored(at=AT)[0]
     path = folder / "states.h5"
-    save_states(branch, [follower()], path, first=True)
-    follower().system.comm.barrier()
+    write_states(branch, follower(), path)
     for wrong in ((folder / "nothing.h5", "straight", 0), (path, "crooked", 0), (path, "straight", 999)):
         with pytest.raises(InputError, match=r"no row .* of a branch"):
             load_state(*wrong, follower())
