@@ -240,7 +240,7 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
 
     made = "; ".join(f"{each.name}: {each.words}" for each in formulations.FORMULATIONS.values())
     auto = f"{formulations.AUTO}: the first that the scene allows (default {formulations.AUTO})"
-    known = f"{{{','.join(formulations.names())}}}"
+    known = f"{{{','.join(formulations.NAMES)}}}"
     add = parser.add_argument_group("discretisation").add_argument
     words = "number of finite elements along the rod (default: the scene's own, or 8)"
     add("--elements", type=int, metavar="N", help=words)

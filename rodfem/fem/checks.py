@@ -138,7 +138,10 @@ class Pieces:
         self.points = self.equations.quadrature_degree(d.degree) // 2 + 1
         self.number = max(LEAST, 2 ** round(np.log2(POINTS / d.elements / self.points)))
         self._load = numbers[int(self.fields.copies[0, -1])]
-        self._cells, self._bases, self._form = cache(self._cut), cache(self._tabulated), cache(self._assembler)
+        self._cells, self._bases = cache(self._cut), cache(self._tabulated)
+        self._form = cache(
+            lambda form, n: Assembler(form.form, self._cells(n), equations.known.cut(n), self._load, inside=True)
+        )
 
     def vectors(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
         """A linear form, whose parameters have been taken, where the unknown has these ``values`` (cells, n)."""
@@ -163,9 +166,6 @@ class Pieces:
         for rows, basis in self._bases(pieces):
             out[..., rows] = basis.swapaxes(2, 3) @ out[..., rows]
         return out
-
-    def _assembler(self, form: Assembler, pieces: int) -> Assembler:
-        return Assembler(form.form, self._cells(pieces), self.equations.known.cut(pieces), self._load, inside=True)
 
     def _cut(self, pieces: int) -> Cells:
         ends = (np.arange(pieces)[:, None] + np.array([0.0, 1.0])) / pieces

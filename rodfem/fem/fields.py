@@ -57,7 +57,7 @@ class Discretization:
         """Check the values; raises :class:`InputError`."""
         along = optional(lambda name, value: reals(name, value, (0.0, 0.5, 1.0)))
         convert(self, elements=whole(8), degree=whole(6), vertices=along)
-        names, elements = formulations.names(), self.elements
+        names, elements = formulations.NAMES, self.elements
         most = 1_000_000  # of which 100000 of degree 2 take 4 GB
         if self.formulation not in names:
             raise InputError(
@@ -344,10 +344,17 @@ class Fields:
 
     def constraints(self) -> int:
         """Number of constraint equations: free multipliers, fields and scalars (drift scalars not counted)."""
-        multipliers = [self.dofs[b.name].ravel() for b in self.blocks if b.multiplier]
-        mine = np.unique(np.concatenate([np.array([], dtype=int), *multipliers]))
-        owned = mine[(mine < self.space.dofmap.index_map.size_local) & (self.number[mine] >= 0)]
-        return self.comm.allreduce(len(owned)) + sum(x.multiplier for x in self.unknown_scalars)
+        mine = int(self.multipliers[self.free_owned].sum())
+        return self.comm.allreduce(mine) + sum(x.multiplier for x in self.unknown_scalars)
+
+    @cached_property
+    def multipliers(self) -> np.ndarray:
+        """Whether each local degree of freedom is that of a multiplier, (local size,)."""
+        out = np.zeros(len(self.number), dtype=bool)
+        for block in self.blocks:
+            out[self.dofs[block.name]] = block.multiplier
+        out[self.copies[:, :-1]] = [x.multiplier for x in self.unknown_scalars]
+        return out
 
     @cached_property
     def groups(self) -> dict[Group, list[Unknown]]:

@@ -332,11 +332,8 @@ def _left_end(
 AUTO = "auto"
 """Not a formulation: the first that applies is chosen."""
 FORMULATIONS: dict[str, Formulation] = {made.name: made for made in (Reduced(), Formulation())}
-
-
-def names() -> tuple[str, ...]:
-    """Return what a discretisation may ask for."""
-    return AUTO, *FORMULATIONS
+NAMES = (AUTO, *FORMULATIONS)
+"""What a discretisation may ask for."""
 
 
 def chosen(name: str, scene: Scene) -> Formulation:

@@ -259,16 +259,14 @@ def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_mul
     """
     fields, scene = equations.fields, equations.fields.scene
     values, part = derived(equations, ("generic values", seed, decay), lambda: _generic_values(fields, seed, decay))
-    named = {x.name: scene.units.of_field(x) * values[x.name] for x in fields.blocks}
-    named |= {x.name: scene.units.of_scalar(x) * values[x.name] for x in fields.unknown_scalars}
-    if no_multipliers:
-        multipliers = {x.name for every in (fields.blocks, fields.unknown_scalars) for x in every if x.multiplier}
-        named = {name: value for name, value in named.items() if name not in multipliers}
     low, high = sorted(scene.span)
-    named[LOAD] = low + (high - low) * part
+    local = fields.sizes * fields.filled(values)
+    local[fields.copies[:, -1]] = low + (high - low) * part
+    local[fields.multipliers & no_multipliers] = 0.0
     for size in (1.0, 0.1, 0.01, 1e-3):  # of displacements: a barrier admits no large ones
-        moved = {"r": size * named["r"]} if "r" in named else {}
-        state = NodalValues(equations, fields.filled(named | moved), equations.line)
+        moved = local.copy()
+        moved[fields.dofs.get("r", [])] *= size
+        state = NodalValues(equations, moved, equations.line)
         loads = 0.0 if equations.loads is None else state.integral(equations.loads)
         if fields.comm.allreduce(bool(np.isfinite(loads) and np.isfinite(state.covector()).all()), op=MPI.LAND):
             break

@@ -315,10 +315,6 @@ class Phase:
         """Number of symmetries that the reference state breaks: as many zero eigenvalues belong to it."""
         return len(self.broken)
 
-    def belongs_to(self, x: PETSc.Vec) -> bool:
-        """Whether ``x`` is the reference state, or no state can have a phase condition."""
-        return not len(self.offsets) or (self.reference is not None and bool(self.reference.equal(x)))
-
 
 def no_phase(system: System, reference: PETSc.Vec | None = None) -> Phase:
     """No active condition for any drift scalar of the ``system``."""

@@ -183,16 +183,12 @@ class System:
                 return state
         gathered, local = self.gathered(x), self.fields.clamps.copy()
         local[self._numbered] = gathered[: len(self._numbered)]
-        self.tidy()
+        if self.fields.unknowns > FEW:  # long vectors that Python has collected are destroyed together
+            compat.destroy_garbage(self.comm)
         state = State(self, local, gathered[len(self._numbered) :], line)
         if values:  # a row is left for its neighbours and met again
             self._recent = [(values, state), *self._recent[: 3 if self.fields.unknowns <= FEW else 0]]
         return state
-
-    def tidy(self, vectors: int = 1) -> None:
-        """Destroy the vectors that Python has collected, if they are long, or so many at a time; collective."""
-        if vectors * self.fields.unknowns > FEW:
-            compat.destroy_garbage(self.comm)
 
     def change(self, d: PETSc.Vec) -> NodalValues:
         """Nodal values of a change of state: zero where a state is clamped."""
@@ -317,7 +313,7 @@ class System:
         """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.symmetries`); None: none active."""
         if reference is None:
             self.phase = no_phase(self)
-        elif not self.phase.belongs_to(reference):
+        elif self.drifts and not (self.phase.reference is not None and self.phase.reference.equal(reference)):
             phases, dropped = self.at(reference).phases, frozenset(self.verification.dropped)
             if dropped not in phases:
                 phases[dropped] = phase_at(self, reference, self.verification.dropped)

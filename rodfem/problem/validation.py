@@ -17,8 +17,6 @@ from rodfem.problem.trials import check_functions, check_plane, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
-    from rodfem.problem.ends import End
-    from rodfem.problem.functions import Constants
     from rodfem.problem.scene import Scene
 
 LARGEST, TINIEST = 1e60, 1e-60  # lengths, widths of ranges and stiffnesses whose powers are floats
@@ -32,41 +30,35 @@ TURNED = 0.3  # angle, in radian, between neighbours that may be a jump
 
 def check_scene(scene: Scene) -> None:
     """Check places, functions, supports and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
-    try:
-        _check_scene(scene)
-    except RecursionError:
-        deep = "A function of the scene has conditionals nested deeper than UFL can follow"
-        raise SceneError(f"{deep}: give a table, as in rodfem.tabulated(s, values), or fewer of them.") from None
-
-
-def _check_scene(scene: Scene) -> None:
     if scene.planar not in (None, "e1", "e2"):
         raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
     check_places(scene)
-    check_functions(scene)
-    _ = scene.tables  # they cover what they are needed for
+    try:
+        check_functions(scene)
+        _ = scene.tables  # they cover what they are needed for
+        check_convexity(scene)
+    except RecursionError:
+        deep = "A function of the scene has conditionals nested deeper than UFL can follow"
+        raise SceneError(f"{deep}: give a table, as in rodfem.tabulated(s, values), or fewer of them.") from None
     check_start(scene)
     for side, end in zip(SIDES, scene.sides, strict=True):
         end.check(side, scene)
-    check_drift(scene)
-    check_reach(scene)
-    check_convexity(scene)
-    check_drag(scene)
-    for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
-        if trouble := trouble_with_inertia(scene, load):
-            raise SceneError(trouble)
+    for check in (check_drift, check_reach, check_inertia, check_plane):
+        check(scene)
     if (values := ordinates(scene)) and not any(map(isfinite, values)):
         raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
-    check_plane(scene)
 
 
-def check_drag(scene: Scene) -> None:
-    """Raise :class:`SceneError` where a mass is attached to a rod that has drag for its inertia."""
+def check_inertia(scene: Scene) -> None:
+    """Raise :class:`SceneError` for masses that cannot be, at any load, and for one that is attached to drag."""
     heavy = [x.s for x in scene.attachments if x.mass or x.rotary_inertia]
     if heavy and scene.inertia.order == 1:
         raise SceneError(
             f"A mass is attached at s = {heavy[0]:g} to a rod with drag: leave it out, or give an Inertia."
         )
+    for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
+        if trouble := trouble_with_inertia(scene, load):
+            raise SceneError(trouble)
 
 
 def check_load(scene: Scene) -> None:
@@ -195,7 +187,10 @@ def _trouble_with_stiffness(scene: Scene, stiffness: np.ndarray) -> str:
     if not TINIEST / scene.length**2 < largest < LARGEST / scene.length**2:
         return f"The stiffness of {largest:.3g}{{}} is so far from one that its powers are no floats: use other units."
     balanced = in_lengths(stiffness, scene)
-    if not is_definite(balanced):
+    roots = np.sqrt(abs(balanced.diagonal()))
+    roots[roots == 0.0] = 1.0
+    # scaled to a unit diagonal: stiff strains hide no bending
+    if not np.linalg.eigvalsh(balanced / roots[:, None] / roots)[0] > NEGLIGIBLE:
         least = np.linalg.eigvalsh(stiffness)[0]
         return f"The stored energy is not convex{{}}: its eigenvalue {least:.3g} is not positive; change constants."
     strains, coupling = balanced[:-3, :-3], balanced[:-3, -3:]
@@ -224,14 +219,6 @@ def round_off_of_strains(scene: Scene) -> str:
     return f"Shear or stretch is {ratio:.0e} times as stiff as bending, and its round-off {felt:.0e} of bending"
 
 
-def is_definite(matrix: np.ndarray) -> bool:
-    """Whether a symmetric matrix is positive definite, scaled to a unit diagonal: stiff strains hide no bending."""
-    if not (matrix.diagonal() > 0.0).all():
-        return False
-    roots = np.sqrt(matrix.diagonal())
-    return bool(np.linalg.eigvalsh(matrix / roots[:, None] / roots)[0] > NEGLIGIBLE)
-
-
 def check_drift(scene: Scene) -> None:
     """Raise :class:`SceneError` where the rod is held, but not in all directions; one that nothing holds may float."""
     c = scene.constants()
@@ -250,15 +237,12 @@ def check_balance(scene: Scene) -> None:
     if any(x.force for x in scene.attachments) or scene.distributed is not None or not scene.conservative:
         return
     for load in scene.loads():
-        forces = np.array([_force_on(end, scene.constants(load)) for end in scene.sides])
+        c = scene.constants(load)
+        forces = np.array([end.force(c) if end.force else (0.0, 0.0, 0.0) for end in scene.sides], dtype=float)
         total = forces.sum(axis=0)
         if abs(total).max() > NEGLIGIBLE * abs(forces).max():
             what = f"At {scene.load} = {load:g} the forces on the ends add up to {(total + 0.0).tolist()}"
             raise SceneError(f"{what}, and nothing holds the rod against that: hold an end, or let the forces balance.")
-
-
-def _force_on(end: End, c: Constants) -> list[float]:
-    return [0.0] * 3 if end.force is None else list(map(float, end.force(c)))
 
 
 def check_reach(scene: Scene) -> None:
