@@ -44,8 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     elif name == "--version":
         from rodfem.output.files import versions  # imports dolfinx, which takes a second
 
-        for library, version in {"rodfem": rodfem.__version__, **versions()}.items():
-            print(f"{library:<8}{version}")
+        print(*map("{0[0]:<8}{0[1]}".format, {"rodfem": rodfem.__version__, **versions()}.items()), sep="\n")
     elif name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")

@@ -173,7 +173,15 @@ def family(
     rods = [scene.varying(**dict(zip(values, map(float, each), strict=True))) for each in product(*values.values())]
     work = partial(_critical, plan=plan or Plan(depth=0), discretization=discretization or Discretization())
     found = many(rods, work, folder, **sharing)
+    of_rods, of_points = _columns(found)
     shape = tuple(map(len, values.values()))
+    data = {name: ([*values], column.reshape(shape)) for name, column in of_rods.items()}
+    data |= {name: ([*values, "point"], table.reshape(*shape, -1)) for name, table in of_points.items()}
+    return xarray.Dataset(data, values, {"scene": scene.name, "load": scene.load})
+
+
+def _columns(found: Sequence[dict[str, Any]]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Columns (rods,) of what rods have, and tables (rods, points) of their special points."""
     of_rods = {
         "first_loss": np.array([rod.get("first_loss") for rod in found], dtype=float),
         "trouble": np.array([rod.get("error", "") for rod in found]),
@@ -182,9 +190,7 @@ def family(
     rows = list(zip(*zip_longest(*points, fillvalue={}), strict=True)) or [()] * len(points)
     of_points = {name: np.array([[x.get(name) for x in row] for row in rows], dtype=float) for name in NUMBERS}
     of_points["kind"] = np.array([[x.get("kind", "") for x in row] for row in rows])
-    data = {name: ([*values], column.reshape(shape)) for name, column in of_rods.items()}
-    data |= {name: ([*values, "point"], table.reshape(*shape, -1)) for name, table in of_points.items()}
-    return xarray.Dataset(data, values, {"scene": scene.name, "load": scene.load})
+    return of_rods, of_points
 
 
 def _critical(rod: Scene, plan: Plan, discretization: Discretization) -> dict[str, Any]:

@@ -29,14 +29,14 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder, typical_modes
-from rodfem.modes.modes import save_modes
+from rodfem.modes.modes import Modes, save_modes
 from rodfem.output.files import load_json, save_json, save_run
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
-from rodfem.stability.assessment import Assessor
+from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.whole_files import locked, remove_earlier
 
 if TYPE_CHECKING:
@@ -186,12 +186,10 @@ class Terminal(Report):
         finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
         saved: list[tuple[str, int]] = []
         for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
-            finder, verdict, modes = finder_on(special.point.mesh), None, None
+            found: tuple[Verdict | None, Modes | None] = None, None
             with self._without(diagram, branch, special):
-                if plan.modes:
-                    verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
-                else:
-                    verdict = finder.assessor(special.point.x, plan.method)
+                found = _verdict(finder_on(special.point.mesh), special, plan)
+            verdict, modes = found
             if verdict is None:
                 continue
             self.verdict(branch.name, f"{scene.load} = {special.point.load:.10g}", verdict.at(special.point), modes)
@@ -248,6 +246,13 @@ def _files_of_a_run(folder: Path) -> list[str]:
         return [str(name) for name in load_json(folder / "diagram.json").get("files", ())]
     except InputError:
         return []
+
+
+def _verdict(finder: ModeFinder, special: SpecialPoint, plan: Plan) -> tuple[Verdict | None, Modes | None]:
+    """Verdict on a state, and its modes if the plan asks for them."""
+    if plan.modes:
+        return finder(special.point.x, plan.modes, plan.method or "auto")
+    return finder.assessor(special.point.x, plan.method), None
 
 
 def _about(diagram: Diagram) -> dict[str, Any]:

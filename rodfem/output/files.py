@@ -78,7 +78,7 @@ def as_data(
         "planar": scene.planar,
         "discretization": mesh_of(system),
         "accuracy": accuracy,
-        "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
+        "ignored_strains": list(map("v1 v2 v3".split().__getitem__, scene.ignored_strains)),
         "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE[order - 1]}),
         "branch_points_not_followed": not_followed(branches),
         "meshes": list(map(_mesh_data, systems)),

@@ -93,9 +93,12 @@ def _indices(branch: Branch) -> Iterator[tuple[int, int | None, int | None]]:
         yield int(point["row"]), point.get("negative_before"), point.get("negative_after")
         yield from _neighbours(columns, point) if point.get("negative_after") is not None else ()
     if branch.get("parent") and columns.get("undecided") and "arclength" in columns:
-        s, undecided = columns["arclength"], columns["undecided"]
-        near = [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
+        near = _at_the_origin(columns["arclength"], columns["undecided"])
         yield from ((row, *2 * (columns["negative"][near[-1] + 1],)) for row in near)
+
+
+def _at_the_origin(s: Sequence[float], undecided: Sequence[int]) -> list[int]:
+    return [row for row in range(1, len(s) - 1) if s[row] - s[0] < SAME_SPECIAL and undecided[row]]
 
 
 def _neighbours(columns: Mapping[str, Any], point: Mapping[str, Any]) -> Iterator[tuple[int, int, int]]:

@@ -61,9 +61,7 @@ def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
         figure, axes = style.sheet(diagram["title"], _about(diagram), given)
         handles, lines = draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
-        bars = [point.get("ordinate_error_estimate") or 0.0 for b in branches for point in b.get("special", [])]
-        flat = all(abs(x) <= max([0.0, *bars]) for b in branches for x in b["columns"]["ordinate"])
-        if given is None and flat:  # to the error bars of special points, as of a straight rod
+        if given is None and _is_flat(branches):
             axes.set_ylim(-1.0, 1.0)
             if len(branches) > 1:
                 words = "the ordinate is zero all over: another one tells branches apart"
@@ -73,6 +71,12 @@ def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
         style.explain(axes, handles)
         _write_indices(axes, lines, [tuple(place) for handle in handles for place in handle.get_xydata()])
     return figure
+
+
+def _is_flat(branches: Branches) -> bool:
+    """Whether the ordinate is zero all over, to the error bars that special points have of it: as of a straight rod."""
+    bars = [point.get("ordinate_error_estimate") or 0.0 for b in branches for point in b.get("special", [])]
+    return all(abs(x) <= max([0.0, *bars]) for b in branches for x in b["columns"]["ordinate"])
 
 
 def draw_branches(axes: Axes, branches: Branches) -> tuple[list[Line2D], list[Line]]:

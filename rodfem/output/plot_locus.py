@@ -40,7 +40,7 @@ def draw_locus(loci: Sequence[Locus], path: Path) -> Path:
     raises :class:`InputError` for another format of file, and :class:`ValueError` for loci of different parameters, or
     none.
     """
-    if any(one["parameters"] != loci[0]["parameters"] for one in loci) or not loci:
+    if len({tuple(one["parameters"]) for one in loci}) != 1:
         raise ValueError(
             "There is no locus, or they are of different parameters: give at least one, or draw them one by one."
         )

@@ -127,8 +127,7 @@ def _is_estimated(data: Data) -> bool:
 
 def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
     """Branch, kind, load, ordinate and index of each special point, and remarks; without bars where none is known."""
-    values = [abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"] if x is not None]
-    scale, known = max([*values, (data.get("natural") or {}).get("ordinate", 0.0)]), _is_estimated(data)
+    scale, known = _scale(data), _is_estimated(data)
     for branch, special in ((b, special) for b in data["branches"] for special in b["special"]):
         row = row_of(branch, special["row"])
         found = {name: _read(special, name, inf, scale * (name == "ordinate")) for name in READ}
@@ -136,6 +135,12 @@ def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
         load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in found.values())
         index = index_in_words(special, row) + (f", {special['zero']} zero" if special["zero"] else "")
         yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, _remarks(special, row)
+
+
+def _scale(data: Data) -> float:
+    """Size of the ordinates of a diagram."""
+    values = [abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"] if x is not None]
+    return max([*values, (data.get("natural") or {}).get("ordinate", 0.0)])
 
 
 def _read(special: Data, name: str, unknown: float | None, scale: float = 0.0) -> str:

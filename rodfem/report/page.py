@@ -116,9 +116,6 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     words = str(data.get("parameter_words") or "").replace("$", "")
     names = {"ordinate": data["ordinate"], **DERIVED}
     labels = names | {"ordinate": ordinate_in_words(data)}
-    origin = data.get("origin") or {}
-    versions = ", ".join(f"{name} {version}" for name, version in (origin.get("versions") or {}).items())
-    known = {"command": origin.get("command"), "date": origin.get("date"), "versions": versions}
     return {
         "scene": data["scene"],
         "title": plain_of(data["title"]),
@@ -136,8 +133,15 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         "meaning": data["meaning"],
         "mesh": mesh_in_words(data["discretization"]),
         "program": data["format"]["program"],
-        "origin": [[name, str(text)] for name, text in known.items() if text],
+        "origin": _origin(data.get("origin") or {}),
         "folder": str(folder),
         "loci": loci_of(folder, data),
         "glossary": {name: ENTRIES[key] for name, key in NAMES.items()},
     }
+
+
+def _origin(origin: Mapping[str, Any]) -> list[list[str]]:
+    """Command, date and versions, as far as they are recorded, each with its name."""
+    versions = ", ".join(f"{name} {version}" for name, version in (origin.get("versions") or {}).items())
+    found = {"command": origin.get("command"), "date": origin.get("date"), "versions": versions}
+    return [[name, str(text)] for name, text in found.items() if text]

@@ -56,11 +56,7 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
         traced = is_traced(branch, data["branches"])
         branches.append(shown | {"image": "" if traced else branch.get("image", "")})
     _clear_reactions(branches, data["natural"])
-    solids = []
-    for body, color in shelf:  # a box and a wedge have sharp edges
-        points, triangles = packed(body_of(body)[0]), body_of(body)[1].ravel().tolist()
-        solids.append({"points": points, "triangles": triangles, "colour": color, "flat": body in ("box", "wedge")})
-    return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": solids}
+    return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": list(map(_solid, shelf))}
 
 
 def _clear_reactions(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
@@ -83,7 +79,7 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
         if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
             shown = [mode._replace(rates=bool(branch.get("rates"))) for mode in shown]
             modes[row] = motions_of(shown, shapes, row, read_setting(group, row), stage.look)
-    return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items() if each.trouble}}
+    return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items()}}
 
 
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
@@ -134,6 +130,12 @@ def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
     """Outline of the cross-sections (1, k, 2), or (S, k, 2) at the stations where they differ."""
     whole = stage.look.radius * profile_of(shapes.s, stage.setting.section, angles)
     return whole[:1] if np.ptp(whole, axis=0).max() < SAME_SPECIAL * stage.look.radius else whole
+
+
+def _solid(of: tuple[str, str]) -> dict[str, Any]:
+    """A body in its colour; a box and a wedge have sharp edges."""
+    (points, triangles), flat = body_of(of[0]), of[0] in ("box", "wedge")
+    return {"points": packed(points), "triangles": triangles.ravel().tolist(), "colour": of[1], "flat": flat}
 
 
 # --- shapes
