@@ -531,19 +531,19 @@ TABLE = {
     },
     "rodfem/problem/trials.py": {
         "constants-are-compared": (
-            "abs(symbolic - number) <= least:", "abs(symbolic - number) <= 1e9:", "problem/test_symbols.py"),
+            "abs(symbolic - number) <= least:", "abs(symbolic - number) <= 1e9:", "problem/test_mistakes.py"),
         "energies-prefer-a-side": (
-            "abs(one - other) > NEGLIGIBLE * ", "abs(one - other) > 1e12 * ", "problem/test_scene_errors.py"),
+            "abs(one - other) > NEGLIGIBLE * ", "abs(one - other) > 1e12 * ", "problem/test_mistakes.py"),
         "energies-are-tried-at-one-load": (
-            "*map(scene.constants, scene.loads()), ", "*(), ", "problem/test_scene_errors.py"),
+            "*map(scene.constants, scene.loads()), ", "*(), ", "problem/test_mistakes.py"),
         "planes-are-tried-at-the-ends": (
             "for load in scene.loads() if scene.load in asked", "for load in scene.span if scene.load in asked",
-            "problem/test_scene_errors.py"),
+            "problem/test_mistakes.py"),
     },
     "rodfem/problem/units.py": {
     },
     "rodfem/problem/validation.py": {
-        "starts-that-jump": ("if left > TURNED / 2:", "if left > 9:", "problem/test_scene_errors.py"),
+        "starts-that-jump": ("if left > TURNED / 2:", "if left > 9:", "problem/test_mistakes.py"),
     },
     "rodfem/report/branches.py": {
         "loci-of-small-loads-start-everywhere": (
