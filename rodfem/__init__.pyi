@@ -2,6 +2,8 @@
 
 __version__: str
 
+from rodfem.app.design import Design as Design
+from rodfem.app.design import design as design
 from rodfem.app.many import family as family
 from rodfem.app.many import many as many
 from rodfem.app.run import run as run
@@ -43,6 +45,7 @@ from rodfem.problem.ends import sliding as sliding
 from rodfem.problem.ends import sliding_hinge as sliding_hinge
 from rodfem.problem.events import Event as Event
 from rodfem.problem.events import Level as Level
+from rodfem.problem.field import Field as Field
 from rodfem.problem.scene import Drag as Drag
 from rodfem.problem.scene import Inertia as Inertia
 from rodfem.problem.scene import Ordinate as Ordinate

@@ -180,8 +180,9 @@ class SingularSystem:
 
     def adjoint(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]]]:
         """Null vectors at a solution, and ``y`` (k, k), ``S y_ij = -D(S v_i) v_j`` across them; no ``y`` at folds."""
-        sides, G, _ = self._modes(self._at(x, 0.0).matrix)
-        null, bordered = [combine(sides[0], z) for z in self._split(G)[0].T], self._bordered[0]
+        (V, *_), G, _ = self._modes(self._at(x, 0.0).matrix)
+        (Z, N), bordered = self._split(G), self._bordered[0]
+        null = [combine(V, z) for z in Z.T]
         if self.fold:
             return null, []
         images = [[self.system.new_vector() for _ in null] for _ in null]
@@ -190,7 +191,14 @@ class SingularSystem:
                 matrix = self._at(x + v * (step * DIFFERENCE), 0.0, moved=True).matrix
                 for image, other in zip(row, null, strict=True):
                     image.axpy(weight / (2 * DIFFERENCE), self._image(matrix, other))
-        return null, [[bordered.solve(-image, np.zeros(len(self.psi)))[0] for image in row] for row in images]
+        return null, [[self._across(bordered.solve(-y, np.zeros(len(V))), V, (N, G)) for y in row] for row in images]
+
+    def _across(
+        self, solved: tuple[PETSc.Vec, np.ndarray], V: Vectors, near: tuple[np.ndarray, np.ndarray]
+    ) -> PETSc.Vec:
+        """Solution of bordered equations, with what modes near by have of it."""
+        y, forces = solved
+        return combine([y, *V], np.array([1.0, *(near[0] @ self._rest(*near, -forces))]))
 
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
@@ -357,7 +365,7 @@ class SingularSystem:
 
     def _own(self, at: _Linear) -> np.ndarray:
         """Columns (3 + m, 3 + k) of ``s``, both parameters and the null vectors, which modes near by follow."""
-        moved = at.N @ self._rest(at, -at.border[:, :3])
+        moved = at.N @ self._rest(at.N, at.G, -at.border[:, :3])
         return np.block([[np.eye(3, 3 + self.count)], [moved, at.Z]])
 
     def _plane(self, at: _Linear, section: Section, moved: PETSc.Vec, t: float) -> np.ndarray:
@@ -381,7 +389,7 @@ class SingularSystem:
         if self._section is not None:
             curve = self._curve(share[:2], at, noise)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
-        response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self._rest(at, -at.b[:, 0]))]))
+        response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self._rest(at.N, at.G, -at.b[:, 0]))]))
         vectors = [v.copy() for v in null]
         orthonormalize(vectors, self.inertia.metric)
         parts = np.array([[wave.dot(v) for wave in self.inertia.waves(k)] for v in vectors])
@@ -425,12 +433,12 @@ class SingularSystem:
             self._negative(at.N) if self.psi is self.phi else -1,
         )
 
-    def _rest(self, at: _Linear, forces: np.ndarray) -> np.ndarray:
+    def _rest(self, N: np.ndarray, G: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Amplitudes (m - k, ...) of modes near by under ``forces`` (m, ...); zero where nothing holds a mode."""
-        G = at.N.T @ at.G @ at.N
+        G = N.T @ G @ N
         values, vectors = np.linalg.eigh((G + G.T) / 2)
         stiff = abs(values) > FREE * self.inertia.scale
-        return np.asarray((vectors[:, stiff] / values[stiff]) @ vectors[:, stiff].T @ at.N.T @ forces)
+        return np.asarray((vectors[:, stiff] / values[stiff]) @ vectors[:, stiff].T @ N.T @ forces)
 
     def _part(self, at: _Linear, direction: np.ndarray, noise: float) -> float:
         """Part of the change of the equations along a direction of the parameters that does work on null vectors."""
