@@ -30,7 +30,7 @@ from rodfem.output.words import COUNT, INDEX, in_decimals, index_in_words, numbe
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
-from rodfem.stability.soft_mode import index_range
+from rodfem.stability.soft_mode import in_short
 from rodfem.timing import WORK, Clock
 
 WIDTH, PAUSE = 110, 30.0  # columns of a paragraph; seconds between two lines of progress
@@ -270,8 +270,11 @@ class Report(Observer):
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
         """Print what was ``found`` of the branch ``name`` at a ``load``, with its ``modes`` if there are some."""
+        index = found.negative, found.undecided, found.kink
+        words = in_short(*index, found.uncompared, found.negative_in_space)
+        words = words if self.count == INDEX else words.replace("index", "eigenvalues negative or complex:")
         zero = f", {found.zero} zero" if found.zero else ""
-        self.say(f"  {name}, {load}: {self._stability(found)}{zero}")
+        self.say(f"  {name}, {load}: {words}{zero}")
         for line in (*map(str, found.soft), *_eigenvalues(found, modes)):
             self.say(f"    {line}")
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
@@ -281,19 +284,6 @@ class Report(Observer):
             inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
             inside = f"; inside: {inside}" if inside else ""
             self.detail(f"    inertia decides beyond {found.band:.1e} (in the metric of rotations){inside}")
-
-    def _stability(self, found: Verdict) -> str:
-        if found.stable:
-            return "stable"
-        if found.negative_in_space and not found.negative and found.stable is False:
-            return f"stable in its plane, unstable in space (index {found.negative_in_space})"
-        index, one = index_range(found.negative, found.undecided), found.negative + found.undecided == 1
-        if found.stable is None:
-            of = f" of the {found.kink}" if found.kink else ""
-            return f"undecided, {self.count} {index_range(found.negative, found.undecided, found.kink)}{of}"
-        if self.count == COUNT:
-            return f"unstable, {index} eigenvalue{'s' * (not one)} negative or complex"
-        return f"unstable in {index} direction{'s' * (not one)}"
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""

@@ -15,7 +15,7 @@ from rodfem.continuation.kinds import BRANCH_POINT, NUMBER, Kind
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, InputError, many
 from rodfem.libraries import optional
 from rodfem.problem.arguments import SHORT
-from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, SoftMode, index_range, is_stable, stability
+from rodfem.stability.soft_mode import STABLE, SoftMode, in_short, is_stable, stability
 
 if TYPE_CHECKING:
     from petsc4py import PETSc
@@ -188,14 +188,9 @@ class Point:
 
     def __repr__(self) -> str:
         """Load, ordinate and stability."""
-        kind, index = self._stability, index_range(self.negative, self.undecided, self.kink)
+        word = in_short(self.negative, self.undecided, self.kink, self.uncompared, self.negative_in_space)
         plane = self.negative_in_space is None and self.solver is not None and self.solver.system.scene.planar
-        words = {
-            STABLE: "stable in its plane (not examined in space)" if plane else "stable",
-            PLANAR: f"stable in its plane, unstable in space, index {self.negative_in_space}",
-            UNDECIDED: f"undecided, index {index}",
-        }
-        word = words.get(kind, f"unstable, index {index}") + (f" of the {self.kink}" if self.kink else "")
+        word += " in its plane (not examined in space)" if plane and word == STABLE else ""
         word += ", not resolved by this mesh" if self.uncompared else ""
         return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
 

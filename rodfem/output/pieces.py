@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.errors import InputError
-from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE, index_range, stability
+from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE, in_short, index_range, stability
 from rodfem.tolerances import SAME_SPECIAL
 
 COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
@@ -211,6 +211,5 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
     s = branch["columns"]["arclength"]
     wanted = s[piece.first] + 0.6 * (s[piece.last] - s[piece.first])  # well inside
     row = min(range(piece.first, piece.last + 1), key=lambda row: abs(s[row] - wanted))
-    index = index_range(piece.negative, piece.undecided, piece.kink)
-    words = piece.kind + {STABLE: "", PLANAR: f", index {piece.in_space}"}.get(piece.kind, f", index {index}")
+    words = in_short(piece.negative, piece.undecided, piece.kink, in_space=piece.in_space)
     return branch["name"], row, f"{branch['columns']['load'][row]:.4g}, {words}"

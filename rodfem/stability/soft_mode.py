@@ -47,6 +47,13 @@ def stability(negative: int, undecided: int, doubt: str = "", in_space: int | No
     return UNDECIDED if undecided else PLANAR if in_space else STABLE
 
 
+def in_short(negative: int, undecided: int, kink: str, doubt: str = "", in_space: int | None = None) -> str:
+    """Stability with the index: ``stable``, ``unstable, index 2``, ``stability undecided, index 0 or 1``."""
+    kind, index = stability(negative, undecided, kink or doubt, in_space), index_range(negative, undecided, kink)
+    number = {STABLE: "", PLANAR: f", index {in_space}"}.get(kind, f", index {index}")
+    return kind + number + (f" of the {kink}" if kink else "")
+
+
 def is_stable(kind: str) -> bool | None:
     """Whether a state of a kind of stability is stable; None if that is undecided."""
     return None if kind == UNDECIDED else kind == STABLE

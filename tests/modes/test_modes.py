@@ -246,7 +246,7 @@ def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
     run_demo(*common, "--modes", "2", "--method", "cayley")
     out = capfd.readouterr().out
     if MPI.COMM_WORLD.rank == 0:
-        assert "straight, lam = 0.2: unstable in 2 directions" in out
+        assert "straight, lam = 0.2: unstable, index 2" in out
         assert "branch 1, lam = 0.2: stable, 1 zero" in out
         assert "cayley (as asked), counts prove that none is missing" in out
         with h5py.File(folder / "modes.h5") as file, h5py.File(folder / "states.h5") as states:
