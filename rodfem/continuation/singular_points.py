@@ -37,17 +37,19 @@ INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
 
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
-    """Cosine between a null vector and ``F_lam``, the derivative of the equations in the load at ``x``."""
+    """Cosine between a null vector and ``F_lam``, the derivative in the load at ``x``, the same in all units."""
     system = solver.system
     matrix = system.at(x).jacobian(solver.axis)
     derivative = matrix * solver.axis
     system.set_load(derivative, 0.0)
-    derivative, null_vector = system.in_units(derivative, 1), system.in_units(null_vector, -1)
     # by a load of natural size; of a trivial state the equations do not feel it
     least = max(INSENSITIVE * system.stiffness_scale, ROUNDED * system.matrix_in_units(matrix).norm())
-    if derivative.norm() * solver.units.load < least:
+    if system.in_units(derivative, 1).norm() * solver.units.load < least:
         return 0.0
-    return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
+    force, motion = derivative.duplicate(), null_vector.duplicate()
+    force.pointwiseMult(derivative, system.own_sizes)
+    motion.pointwiseDivide(null_vector, system.own_sizes)
+    return float(abs(force.dot(motion)) / (force.norm() * motion.norm()))
 
 
 def is_fold(solver: BranchSolver, x: PETSc.Vec, null: list[PETSc.Vec]) -> bool:

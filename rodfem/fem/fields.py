@@ -27,6 +27,7 @@ from rodfem.problem.arguments import convert, optional, reals, whole
 from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.functions import Constants
 from rodfem.problem.scene import Scene
+from rodfem.problem.units import Units
 from rodfem.tolerances import SAME_PLACE, same_place
 
 FACTORS = CHAIN, PETSC = "chain", "petsc"
@@ -285,8 +286,12 @@ class Fields:
 
     @cached_property
     def sizes(self) -> np.ndarray:
-        """Natural size of each local value: rotations are of order one, the others have units."""
-        units, out = self.scene.units, np.ones(len(self.number))
+        """Natural size of each local value."""
+        return self.sizes_in(self.scene.units)
+
+    def sizes_in(self, units: Units) -> np.ndarray:
+        """Size of each local value in some ``units``: rotations are of order one, the others have units."""
+        out = np.ones(len(self.number))
         for block in self.blocks:
             out[self.dofs[block.name]] = units.of_field(block)
         out[self.copies] = [*map(units.of_scalar, self.unknown_scalars), units.load]

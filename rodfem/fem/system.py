@@ -42,6 +42,7 @@ from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
 from rodfem.problem.functions import derived, floats
 from rodfem.problem.scene import Scene
+from rodfem.problem.units import own_units
 from rodfem.timing import Clock
 
 
@@ -255,6 +256,12 @@ class System:
     def sizes(self) -> PETSc.Vec:
         """Natural size of each unknown."""
         return self.vector(self.fields.sizes, [self.scene.units.moment] * len(self.drifts))
+
+    @cached_property
+    def own_sizes(self) -> PETSc.Vec:
+        """Size of each unknown by the rod's own numbers, near one or not."""
+        own = own_units(self.scene)
+        return self.vector(self.fields.sizes_in(own), [own.moment] * len(self.drifts))
 
     @cached_property
     def balanced(self) -> PETSc.Vec:

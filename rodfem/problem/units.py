@@ -51,16 +51,20 @@ ONES = Units(*[1.0] * len(Units._fields))
 
 
 def units_of(scene: Scene) -> Units:
-    """Natural sizes of a scene: by its length, bending stiffness, masses and range of loads."""
+    """Natural sizes of a scene: all one, unless one of its own is far from that."""
+    own = own_units(scene)
+    return ONES if all(size(x) == 1.0 for x in own) else own._replace(ordinate=size(_of_ordinate(scene)))
+
+
+def own_units(scene: Scene) -> Units:
+    """Sizes by a scene's length, bending stiffness, masses and range of loads; that of the ordinate is one."""
     least, middle, _ = map(float, np.linalg.eigvalsh(scene.stiffness()[-3:, -3:]))
     length, stiffness = scene.length, (least * middle) ** 0.5  # a rod may be soft in one way only, as in torsion
     mass = _mass(scene, length)
     omega2 = stiffness / (mass * length**4) if mass > 0 else 1.0
     sizes = length, stiffness / length**2, stiffness / length, stiffness / length, max(map(abs, scene.span)), omega2
-    if all(size(x) == 1.0 for x in sizes):
-        return ONES
     length, force, moment, energy, load, omega2 = (1.0 if x == 0 or not isfinite(x) else float(x) for x in sizes)
-    return Units(length, force, moment, energy, load, size(_of_ordinate(scene)), omega2)
+    return Units(length, force, moment, energy, load, 1.0, omega2)
 
 
 def _mass(scene: Scene, length: float) -> float:

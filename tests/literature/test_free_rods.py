@@ -6,6 +6,7 @@ from math import hypot, pi
 import numpy as np
 import pytest
 from numpy.polynomial import Legendre
+from scipy.interpolate import CubicSpline
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
@@ -274,3 +275,14 @@ def test_states_of_a_rod_that_a_thrust_accelerates() -> None:
     # one plane's modes are free-free: cosh x s + cos x s - ..., with nodes at 0.2242 of the length
     shape = np.linalg.norm(few.displacement[0].real, axis=1)
     assert shape.argmin() in range(1, len(shape) - 1) and abs(shape[0] - shape[-1]) < 1e-4 * shape[0]
+
+
+def test_momentum_of_modes_under_a_thrust() -> None:
+    """A thrust that turns with the tip by ``u'`` moves the centre of mass: ``mu int u ds = P u'(1)``."""
+    thrust = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
+    solver = Solver(floating(thrust, (1e-6, 50.0), distributed=lambda c: (0.0, 0.0, c.P)), MESH)
+    modes = solver.modes(solver.equilibrium(20.0), 2)
+    for value, u, turned in zip(modes.value, modes.displacement, modes.rotation, strict=True):
+        slope = 20.0 * np.cross(turned[-1], (0.0, 0.0, 1.0))
+        assert value * CubicSpline(modes.s, u).integrate(0.0, 1.0) == pytest.approx(slope, rel=1e-6, abs=1e-6)
+        assert abs(slope).max() > 1.0
