@@ -41,7 +41,7 @@ GROWN, SELDOM = 1.5, 10
 """An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
 NEAR = 0.1  # points of a branch nearer to each other than this, in arclength, are at one place
 LEAST = 1e-6  # least bound of a step next to a gap
-ARM = 0.05  # distance, in the metric, at which the four arms that would meet are looked for
+ARM = 0.05  # distance, in the metric, at which the four arms that would meet are looked for, at least
 
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:
@@ -308,11 +308,14 @@ def _index(point: Point, richer: Enriched, x: PETSc.Vec) -> int:
 
 
 class Gap(Exception):
-    """A step of continuation has jumped from one branch to another, across the gap at this special point."""
+    """A step of continuation has jumped from one branch to another, across the gap at this special point.
 
-    def __init__(self, special: SpecialPoint, unfolded: SingularState) -> None:
+    ``apart`` is how far, in the metric, the state of the branch from which the gap was seen is.
+    """
+
+    def __init__(self, special: SpecialPoint, unfolded: SingularState, apart: float) -> None:
         super().__init__(f"imperfect, unfolding {unfolded.size:.0e}")
-        self.special, self.unfolded = special, unfolded
+        self.special, self.unfolded, self.apart = special, unfolded, apart
         self.point = replace(special.point, x=unfolded.x, load=unfolded.load)
 
 
@@ -323,7 +326,7 @@ class Gaps:
         self.meshes = meshes
         self.known: list[Gap] = []
 
-    def examine(self, special: SpecialPoint, found: SingularState) -> Gap | None:
+    def examine(self, special: SpecialPoint, found: SingularState, apart: float) -> Gap | None:
         """The gap at a singular state whose unfolding parameters are not round-off; None where the mesh makes them.
 
         A mesh need not have a symmetry of the scene: on a richer one its own unfolding is smaller.
@@ -335,7 +338,7 @@ class Gaps:
         again = states.solve(richer.transfer(found.x, state=True))
         if again is not None and again.size < 0.5 * found.size + again.noise:  # lowered by half: the mesh's own
             return None
-        return Gap(special, found)
+        return Gap(special, found, apart)
 
     def open(self, gap: Gap, solver: BranchSolver) -> bool:
         """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
@@ -355,12 +358,12 @@ class Gaps:
 
 def arms(solver: BranchSolver, gap: Gap) -> list[Point]:
     """Equilibria on the branches that would cross at a gap, a little away from it: up to four."""
-    system, out = solver.system, []
+    system, arm, out = solver.system, max(ARM, gap.apart), []
     for direction in gap.unfolded.directions:
         row = solver.row(direction)
         for sign in (1.0, -1.0):
-            x = gap.unfolded.x + direction * (sign * ARM)
-            outcome = correct(system, x, row, reach=ARM)
+            x = gap.unfolded.x + direction * (sign * arm)
+            outcome = correct(system, x, row, reach=arm)
             if outcome.converged:
                 out.append(solver.point(x, 0.0, solver.tangent(row, at=x), outcome))
     return out

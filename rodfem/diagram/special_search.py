@@ -279,12 +279,18 @@ class SpecialSearch:
         for fold in {True: (turns, not turns), False: (False,)}[clearly]:
             found = tried[fold] = solved(piece.solver, at, fold=fold)
             if found is not None and (fold or found.size <= found.noise):
-                return special_point(piece, at, found, fold=fold)
+                return self._found(piece, at, found, fold=fold)
         branch = tried[False]
         special = None if branch is None else self._imperfect(piece, at, branch, ended=ended)
         if not clearly and (turns or special is None) and (found := solved(piece.solver, at, fold=True)) is not None:
-            return special_point(piece, at, found, fold=True)
+            return self._found(piece, at, found, fold=True)
         return special
+
+    def _found(self, piece: Piece, at: Candidate, found: SingularState, *, fold: bool) -> SpecialPoint:
+        """The special point at a singular state; of a fold the branch on its other side is looked for."""
+        if fold:
+            self._opposite(piece, at, found)
+        return special_point(piece, at, found, fold=fold)
 
     def _imperfect(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> SpecialPoint:
         """The branch point at a state whose unfolding parameters are not round-off."""
@@ -296,7 +302,8 @@ class SpecialSearch:
 
     def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> Gap | None:
         """The gap at a singular state whose unfolding parameters are not round-off; raised unless it is known."""
-        gap = self.gaps.examine(special_point(piece, at, found, fold=False), found)
+        apart = piece.solver.system.distance(at.x, found.x)
+        gap = self.gaps.examine(special_point(piece, at, found, fold=False), found, apart)
         if gap is not None and not ended and self.gaps.open(gap, piece.solver):
             raise gap
         return gap
@@ -309,3 +316,18 @@ class SpecialSearch:
             gap = self._open_gap(piece, at, found, ended=resolved)
             if gap is not None and resolved:
                 self.gaps.open(gap, piece.solver)
+
+    def _opposite(self, piece: Piece, at: Candidate, fold: SingularState) -> None:
+        """Look for the branch on the other side of a ``fold`` that is a branch point with an imperfection.
+
+        Of a pitchfork ``lam x - x^3 + eps`` the load of the fold is off by ``1.9 eps^(2/3)``, times the rate of the
+        eigenvalue in the load, and the least eigenvalue on the other side is ``2.4 eps^(2/3)``.
+        """
+        solver = piece.solver
+        found = SingularSystem(solver, at.modes, at.count, fold=False).solve(at.x)
+        if found is None or found.size <= found.noise:
+            return
+        if abs(found.rate * (found.load - fold.load)) < DIP * solver.inertia.scale:
+            gap = self._open_gap(piece, at, found, ended=True)
+            if gap is not None:
+                self.gaps.open(gap, solver)
