@@ -197,7 +197,8 @@ class CriticalLoads:
                 if abs(mu(load)) <= sides[low].spectrum.zero:
                     return load
             found = zero_between(mu, low, high, ROUND_OFF * max(abs(low), abs(high)))
-            pole = abs(mu(found)) > max(min(abs(mu(low)), abs(mu(high))), self.units.omega2)
+            # beyond a pole the others have other numbers: one of them jumps
+            pole = abs(mu(found)) > max(min(abs(mu(low)), abs(mu(high))) / 2, self.units.omega2)
         except (IndexError, ValueError) as trouble:
             raise ConvergenceError(
                 f"Divergence between {low:.6g} and {high:.6g} could not be located: use a smaller range."

@@ -128,8 +128,7 @@ def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
 def _in_space(branch: Branch) -> list[int]:
     """Index among all perturbations in each row, empty where it is not known."""
     column = branch["columns"].get("negative_in_space") or [None]
-    singular = {int(point["row"]) for point in branch.get("special", []) if point["kind"] in COUNTED}
-    return [] if None in column else [0 if row in singular else index for row, index in enumerate(column)]
+    return [] if None in column else column
 
 
 @dataclass(frozen=True)

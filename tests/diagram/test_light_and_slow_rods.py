@@ -10,9 +10,12 @@ from math import cos, hypot, pi, sin, sqrt
 from typing import Any
 
 import classics
+import numpy as np
 import pytest
 from classics import column, push
 from hard.thrusts import THIN
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from rodfem import (
     Attachment,
@@ -94,6 +97,30 @@ def test_what_passes_through_minus_infinity_stays_unstable(span: tuple[float, fl
     ) == 1
     assert diagram.assess(branch.points[10]).negative == branch.points[10].negative
     assert {(p.load > (1.5 * pi) ** 2, p.negative + p.zero) for p in branch.points} == {(False, 1), (True, 2)}
+
+
+@pytest.mark.usefixtures("few_loads")
+def test_a_torsion_without_inertia_that_passes_through_infinity() -> None:
+    """An arch under a pressure that follows: at the pole ``C a'' = B k k0 a``, with k of the arch, has a solution."""
+
+    def spin(P: float) -> float:  # angle, curvature, spin and its rate, force, from the tip to the clamp
+        def rates(_: float, y: np.ndarray) -> list[float]:
+            theta, k, a, da, across, along = y
+            shear = cos(theta) * across - sin(theta) * along
+            return [-k, shear, -da, -k * a / 0.1, P * cos(theta), -P * sin(theta)]
+
+        return float(solve_ivp(rates, (0, 1), [0, 1, 1, 0, 0, 0], rtol=1e-11, atol=1e-12).y[2, -1])
+
+    arch = Scene(
+        "arch", (0.0, 1.0), "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 1.0, 0.1)), {"P": 0.0}, "P",
+        (clamped(), free()), Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (-10.0, -12.0),
+        follower=lambda c: (c.P, 0.0, 0.0), inertia=Inertia(rho_A=lambda c: 1.0),
+    )  # fmt: skip
+    (branch,) = diagram = trace(arch, Discretization(elements=6), Plan(depth=0, error_bars=False))
+    assert {p.negative for p in branch.points} == {2} and not branch.unexplained  # as with a little rotary inertia
+    (said,) = diagram.warnings
+    assert float(said.split("P = ")[1].split()[0]) == pytest.approx(brentq(spin, -11.0, -10.0), abs=1e-3)
 
 
 MESH = Discretization("auto", 4, 6)

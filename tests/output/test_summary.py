@@ -140,6 +140,14 @@ def test_a_step_in_which_a_change_is_not_located_is_not_called_unstable() -> Non
         assert "no stable state" not in said(rod, stable) and "not examined" not in said(rod, stable)
 
 
+def test_out_of_the_plane_a_singular_row_has_an_index_as_others_have() -> None:
+    """Straight, it falls out of its plane in the step that ends where it buckles in the plane."""
+    rows = branch("straight", [-1.0, 0.0, 2.5, 4.0], [0, 0, 0, 1], columns={"negative_in_space": [0, 0, 1, 2]})
+    rows["special"] = [special("branch point", 2, 2.5, 0, 1)]
+    words = said(rows, planar="e2")
+    assert "is stable from P = -1 to some load between 0 and 2.5, where it loses its stability against motions" in words
+
+
 def test_states_that_the_mesh_does_not_resolve_may_coexist() -> None:
     loads = [0.0, 2.0, 4.0]
     ends = [special("end", 2, 4.0, 0, 0, resolved=resolved) for resolved in (True, False)]
