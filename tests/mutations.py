@@ -116,7 +116,6 @@ TABLE = {
             "codim2/test_places.py"),
         "loci-have-bars-at-kinks": ("                error[row] = np.nan\n", "", "diagram/test_kinks.py"),
         "locus-across-a-gap": ("if node.orientation != last.orientation and not", "if False and not", LOCI),
-        "stable-in-a-plane-is-stable": ("planar=bool(scene.planar)", "planar=False", IN_WORDS),
         "loci-of-unresolved-points-are-resolved": (
             "doubtful=doubtful or special.resolved is False", "doubtful=False", LOCI),
         "rows-of-loci-are-resolved": ("<= RESOLVED_TO", "<= 1e9", IN_WORDS),
@@ -128,6 +127,7 @@ TABLE = {
             "[bound(*pair, self.rho)", "[bound(*pair, 0.0)", "codim2/test_places.py"),
     },
     "rodfem/codim2/locus.py": {
+        "stable-in-a-plane-is-stable": ('"planar": bool(scene.planar)', '"planar": False', IN_WORDS),
         "special-points-of-small-loads-are-one": (
             "one = special.point, (units.load, units.ordinate)", "one = special.point, (1.0, 1.0)",
             "codim2/test_locus.py"),
@@ -318,7 +318,7 @@ TABLE = {
         "sides-on-both-sides-of-a-load-are-images": (
             "LOCATED * special.located_to", "1e9 * special.located_to", "hard/test_fuzz.py"),
         "a-small-imperfection-is-a-symmetry": (
-            "found = mirrors(system, first.x, found) if found else []", "", "hard/test_fuzz.py"),
+            "found = mirrors(shape, first.x, found)  #", "#", "hard/test_fuzz.py"),
     },
     "rodfem/diagram/events.py": {
         "asked-row": ("        yield arc.b\n", "        yield replace(arc.b)\n", "diagram/test_load_at_an_end.py"),
@@ -352,13 +352,14 @@ TABLE = {
     },
     "rodfem/diagram/special_search.py": {
         "what-turns-back-near-zero-is-passed": (
-            "            self._missed(piece, p, resolved=True)", "            pass", "continuation/test_unfolding.py"),
+            "            self._missed(piece, of_miss(piece, p))", "            pass", "continuation/test_unfolding.py"),
         "steps-are-short-from-where-a-branch-goes-back-to": (
             "max(largest, since - s)", "largest", "diagram/test_branches.py"),
     },
     "rodfem/diagram/sweep.py": {
         "bars-of-loads-by-those-of-ordinates": (
-            "        of_ordinate = of_load = self", "        of_ordinate = of_load = s.error_estimate = self",
+            "        of_ordinate = of_load = self",
+            "        of_ordinate = of_load = s.error_estimate = self",
             "diagram/test_sweep.py"),
         "steps-of-round-off-in-a-sweep": ("least = 1e-12", "least = 0.0", "diagram/test_flutter_at_a_row.py"),
         "the-first-mesh-that-does-not-help-is-the-last": (
@@ -366,7 +367,7 @@ TABLE = {
         "a-family-of-states-is-not-said": (
             "        if self._zeros:", "        if False:", "diagram/test_family_of_states.py"),
         "ordinate-of-a-load-that-is-exact": (
-            "of_ordinate += abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))", "pass",
+            "of_ordinate += abs(ordinate(moved) - ordinate(x))", "pass",
             "literature/test_follower.py"),
         "taut-rods-have-frequencies": (" or self._dependent(state)", "", "stability/test_frequencies.py"),
     },

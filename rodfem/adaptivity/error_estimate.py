@@ -22,7 +22,7 @@ Of an ordinate that is taken inside of an element ``rho`` is therefore of the la
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
@@ -166,7 +166,7 @@ class Enriched:
         self.transfer = partial(transferred, solver.shape, self.system)
         self.origins: list[tuple[SpecialPoint, Origin, float]] = []
         self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
-        self._ordinate = OrdinateBound(solver.shape, self.solver.shape)
+        self.of_ordinate = OrdinateBound(solver.shape, self.solver.shape)
         self._coarse, self.indicator = SmoothnessIndicator(solver), SmoothnessIndicator(self.solver)
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
@@ -227,7 +227,7 @@ class Enriched:
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
         changed = self.indicator.changed(first, x, state=True)
         rho = self.rho([point.x], [x])
-        ordinate_error = self._ordinate(point.x, x, float(left[1]), rho)
+        ordinate_error = self.of_ordinate(point.x, x, float(left[1]), rho)
         return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed, x - before)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
@@ -252,7 +252,7 @@ class Enriched:
         left = slope * along + round_off(ordinate, units.ordinate)
         changed = self.indicator.changed(x, found, state=True)
         rho = max(self.rho([point.x], [found]), LEFT)
-        ordinate_error = self._ordinate(point.x, found, left, rho)
+        ordinate_error = self.of_ordinate(point.x, found, left, rho)
         return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed, tangent * along)
 
     def _located(self, special: SpecialPoint) -> Again:
@@ -276,7 +276,7 @@ class Enriched:
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(modes[0], sharp, state=False))
         self.origins.append((special, Origin(found.x, found.load, ordinate, load_left, left), rho))
-        ordinate_error = self._ordinate(point.x, found.x, left, rho)
+        ordinate_error = self.of_ordinate(point.x, found.x, left, rho)
         return Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed, found.last)
 
 
@@ -333,8 +333,10 @@ def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
 
 
 def _vanishing(solver: BranchSolver, x: PETSc.Vec, coarse: Point) -> PETSc.Vec:
-    """State of a mesh, near ``x``, at which the smallest stretch vanishes, to round-off."""
-    states = {coarse.load: x}
+    """State of a mesh, near ``x``, at which the smallest stretch vanishes, by secants along the branch."""
+    from scipy.optimize import newton  # slow to load
+
+    states, span = {coarse.load: x}, solver.system.scene.span
 
     @cache
     def stretch(load: float) -> float:
@@ -344,20 +346,10 @@ def _vanishing(solver: BranchSolver, x: PETSc.Vec, coarse: Point) -> PETSc.Vec:
             raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")
         return solver.shape.stretch(states[load])
 
-    scene = solver.system.scene
-    load = _bracketed_zero(stretch, coarse, abs(scene.span[1] - scene.span[0]))
+    width = abs(span[1] - span[0])
+    second = coarse.load + np.copysign(2e-4 * width, coarse.slope * stretch(coarse.load))  # of the range
+    within = 0.01 * LOCATED * width
+    load, found = newton(stretch, coarse.load, x1=second, tol=within, full_output=True, disp=False)
+    if not found.converged or abs(stretch(load)) > LOCATED:
+        raise ConvergenceError("the zero of the stretch was not found on the finer mesh")
     return states[load]
-
-
-def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
-    """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
-    a, value = coarse.load, stretch(coarse.load)
-    step = np.copysign(2e-4 * span, coarse.slope if value > 0 else -coarse.slope)  # the first one: they grow
-    for _ in range(14):
-        if abs(value) <= ROUND_OFF:  # it has no sign
-            return a
-        b, other = a + step, stretch(a + step)
-        if value * other <= 0 and abs(other) > ROUND_OFF:
-            return zero_between(stretch, a, b, ROUND_OFF * span)
-        a, value, step = b, other, 1.7 * step
-    raise ConvergenceError("the zero of the stretch was not found on the finer mesh")

@@ -1,12 +1,8 @@
-"""The meshes of one run: one, or with an accuracy asked for as many as its branches need; and gaps.
+"""The meshes of one run: one, or with an accuracy asked for as many as its branches need.
 
 The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients tells
 how it has changed (:mod:`rodfem.adaptivity.grading`).  If it is too large, :class:`TooCoarse` is raised: the explorer
 has a mesh made for that state, carries the last points over, and goes on.  Every point knows the number of its mesh.
-
-At a gap an imperfection has taken a branch point apart: two branches, that would cross without it, bend away from each
-other.  The state and the load at which they would cross are known from :mod:`rodfem.continuation.singular`.  Steps in
-proportion to the distance from there follow the bend of either branch, however sharp it is.
 """
 
 from __future__ import annotations
@@ -25,13 +21,11 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.continuation.observer import Observer, Remark
-from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import correct
 from rodfem.fem.symmetries import may_slide
 from rodfem.fem.system import System
-from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.problem.scene import Scene
 from rodfem.stability.inertia import ROUGH
 from rodfem.tolerances import SAME_LOAD, TINY, unit
@@ -40,8 +34,6 @@ TRIES, MOST = 4, 16  # meshes tried at one place, and in a run
 GROWN, SELDOM = 1.5, 10
 """An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
 NEAR = 0.1  # points of a branch nearer to each other than this, in arclength, are at one place
-LEAST = 1e-6  # least bound of a step next to a gap
-ARM = 0.05  # distance, in the metric, at which the four arms that would meet are looked for, at least
 
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:
@@ -305,65 +297,3 @@ def _index(point: Point, richer: Enriched, x: PETSc.Vec) -> int:
         index = found.count()
         return point.negative if point.negative <= index.negative + max(index.zero - drifts, 0) else index.negative
     return point.negative if below <= point.negative + max(point.zero - drifts, 0) else below
-
-
-class Gap(Exception):
-    """A step of continuation has jumped from one branch to another, across the gap at this special point.
-
-    ``apart`` is how far, in the metric, the state of the branch from which the gap was seen is.
-    """
-
-    def __init__(self, special: SpecialPoint, unfolded: SingularState, apart: float) -> None:
-        super().__init__(f"imperfect, unfolding {unfolded.size:.0e}")
-        self.special, self.unfolded, self.apart = special, unfolded, apart
-        self.point = replace(special.point, x=unfolded.x, load=unfolded.load)
-
-
-class Gaps:
-    """The gaps of one run: which special points are taken apart, and the steps that resolve them."""
-
-    def __init__(self, meshes: Meshes) -> None:
-        self.meshes = meshes
-        self.known: list[Gap] = []
-
-    def examine(self, special: SpecialPoint, found: SingularState, apart: float) -> Gap | None:
-        """The gap at a singular state whose unfolding parameters are not round-off; None where the mesh makes them.
-
-        A mesh need not have a symmetry of the scene: on a richer one its own unfolding is smaller.
-        """
-        richer = self.meshes.richer(special.point.mesh)
-        modes = [richer.transfer(v, state=False) for v in special.null_vectors]
-        orthonormalize(modes, richer.system.metric)
-        states = SingularSystem(richer.solver, modes, len(modes), fold=False)
-        again = states.solve(richer.transfer(found.x, state=True))
-        if again is not None and again.size < 0.5 * found.size + again.noise:  # lowered by half: the mesh's own
-            return None
-        return Gap(special, found, apart)
-
-    def open(self, gap: Gap, solver: BranchSolver) -> bool:
-        """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
-        if min(self._distances(solver, gap.point), default=inf) < LEAST:
-            return False
-        self.known.append(gap)
-        return True
-
-    def reach(self, solver: BranchSolver, point: Point) -> float:
-        """Largest step from a point: a quarter of the distance from the nearest gap."""
-        return max(min(self._distances(solver, point), default=inf) / 4, LEAST)
-
-    def _distances(self, solver: BranchSolver, point: Point) -> list[float]:
-        """Distances of a point from all gaps."""
-        return [solver.system.distance(point.x, interpolated(gap.point, solver).x) for gap in self.known]
-
-
-def arms(solver: BranchSolver, gap: Gap) -> list[Point]:
-    """Equilibria on the branches that would cross at a gap, a little away from it: up to four."""
-    system, arm, out = solver.system, max(ARM, gap.apart), []
-    for direction in gap.unfolded.directions:
-        row = solver.row(direction)
-        for sign in (1.0, -1.0):
-            x = gap.unfolded.x + direction * (sign * arm)
-            outcome = correct(system, x, row, reach=arm)
-            if outcome.converged:
-                out.append(solver.point(x, 0.0, solver.tangent(row, at=x), outcome))
-    return out

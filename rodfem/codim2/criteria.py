@@ -71,14 +71,13 @@ class LocusPoint:
     """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
 
     ``located_to`` (2,) are the uncertainties of the parameters.  ``rest`` counts the negative (without a potential:
-    unstable) eigenvalues but for those that vanish or collide here, -1: not counted; those that collide are real on the
-    side ``lower`` of the load.  ``omega2`` is a double eigenvalue.  At folds ``coupling`` (2,) is the derivative of the
-    equations in the two parameters along the null vector, in units of the bounds, and ``curvature`` the second one
-    along it.  ``modes`` are the null vectors, as many as the ``multiplicity``, and modes near by, or a basis of the
-    double eigenvalue's invariant subspace; ``left`` are the left null vectors where they are others.  ``orientation``
-    is the side of the tangent, -1 or 1, on which the defining function grows: it changes only where two curves cross.
-    ``ended`` says why the curve ends here.  A turning point or an end is ``sought`` along the curve, and was found in
-    ``windows`` of these half widths.
+    unstable) eigenvalues but for those that vanish or collide here, -1: not counted.  ``omega2`` is a double
+    eigenvalue.  At folds ``coupling`` (2,) is the derivative of the equations in the two parameters along the null
+    vector, in units of the bounds, and ``curvature`` the second one along it.  ``modes`` are the null vectors, as many
+    as the ``multiplicity``, and modes near by, or a basis of the double eigenvalue's invariant subspace; ``left`` are
+    the left null vectors where they are others.  ``orientation`` is the side of the tangent, -1 or 1, on which the
+    defining function grows: it changes only where two curves cross.  ``ended`` says why the curve ends here.  A turning
+    point or an end is ``sought`` along the curve, and was found in ``windows`` of these half widths.
     """
 
     p: np.ndarray
@@ -89,7 +88,6 @@ class LocusPoint:
     s: float = 0.0
     ordinate: float = float("nan")
     rest: int = -1
-    lower: int = 0
     omega2: float = float("nan")
     curvature: float = 0.0
     coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))
@@ -332,7 +330,6 @@ class Collision(Criterion):
             orientation=orientation,
             modes=as_vectors(system, basis),
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
-            lower=int(np.sign(gradient[0])),
         )
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:

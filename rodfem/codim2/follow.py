@@ -42,7 +42,6 @@ from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, DIVERGENCE, FLUTTER
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.checks import Convexity, QuadratureCheck
 from rodfem.fem.shape import halved
-from rodfem.output.files import mesh_of
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import INSIDE, same_special
@@ -382,35 +381,24 @@ class Curve:
             return [node]
 
     def locus(self, error: np.ndarray, unresolved: list[int]) -> Locus:
-        """The curve, with what a file of it says about the scene."""
-        scene, nodes, names = self.solver.system.scene, self.nodes, self.plane.names
-        load, other = scene.parameters[names[0]], scene.parameters[names[1]]
+        """The rows of the curve, with their errors."""
         return Locus(
-            scene=scene.name,
-            title=scene.title or scene.name,
+            system=self.solver.system,
             kind=self.special.kind,
-            names=names,
-            labels=(load.label or names[0], other.label or names[1]),
-            ordinate_name=scene.ordinate.name,
+            names=self.plane.names,
             bounds=self.plane.intervals,
             values=self._column("p"),
             ordinate=self._column("ordinate"),
             omega2=self._column("omega2"),
             located_to=self._column("located_to"),
-            natural=self.solver.units.ordinate,
-            index=np.array([self._index(n) for n in nodes]),
+            index=np.array([self._index(n) for n in self.nodes]),
             lower=self._lower_side(),
             error=error,
             unresolved=unresolved,
-            planar=bool(scene.planar),
             marks=[Mark(kind, row) for row, kind in sorted(self.marks.items())],
             start=self.start,
             ended=self.ended,
-            constants={name: v.value for name, v in scene.parameters.items() if name not in names},
-            discretization=mesh_of(self.solver.system),
-            states=[n.x for n in nodes],
-            words=(load.words, other.words),
-            units=(load.unit, other.unit),
+            states=[n.x for n in self.nodes],
             solve=self.rows,
         )
 
@@ -427,9 +415,7 @@ class Curve:
     def _lower_side(self) -> int:
         """Side of the load, -1 or 1, on which the index is the lower one next to the special point; 0: unknown."""
         special, solver, node = self.special, self.solver, self.first
-        if special.kind == FLUTTER:
-            return node.lower
-        if special.kind == DIVERGENCE:
+        if special.kind in (FLUTTER, DIVERGENCE):
             x = self.plane.at(node.p, node.x)
             loads = node.p[0] + DIFFERENCE * self.plane.width[0] * np.array([-1.0, 1.0])
             pencils = NonsymmetricSolver(solver.system)

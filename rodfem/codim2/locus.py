@@ -13,8 +13,9 @@ from petsc4py import PETSc
 from rodfem.codim2.criteria import Interval
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.errors import InputError
+from rodfem.fem.system import System
 from rodfem.file_format import LOCUS
-from rodfem.output.files import save_json
+from rodfem.output.files import mesh_of, save_json
 from rodfem.output.table import plain
 from rodfem.output.words import number
 from rodfem.problem.arguments import finite
@@ -23,10 +24,7 @@ from rodfem.tolerances import NEGLIGIBLE, same_special
 
 COARSE = "This mesh does not resolve all states: errors of `at least` that may be larger; use more elements."
 """Under the rows of a locus of which some are not resolved."""
-AS_THEY_ARE = (
-    "scene title kind ordinate_name natural start lower planar unresolved constants discretization note bounds "
-    "crossings labels words units ended"
-).split()
+AS_THEY_ARE = "kind", "start", "lower", "unresolved", "note", "bounds", "crossings", "ended"
 COLUMNS = "ordinate", "index", "located_to", "error", "omega2"
 """Entries of a file that are attributes of a locus: as they are, and tables."""
 
@@ -73,12 +71,9 @@ class Locus:
     another eigenvalue has passed through zero, not located; ``ended`` says why it ends, at its first and last row.
     """
 
-    scene: str
-    title: str
+    system: System
     kind: str
     names: tuple[str, str]
-    labels: tuple[str, str]
-    ordinate_name: str
     bounds: tuple[Interval, Interval]
     values: np.ndarray
     ordinate: np.ndarray
@@ -90,16 +85,10 @@ class Locus:
     marks: list[Mark]
     start: int
     ended: tuple[str, str]
-    constants: dict[str, float]
-    discretization: dict[str, Any]
     solve: Callable[[int, float], list[Row]]  # rows where a parameter, 0 or 1, has a value
     states: list[PETSc.Vec] = field(default_factory=list)  # not saved
     crossings: list[tuple[float, float]] = field(default_factory=list)  # load, ordinate at the start's parameter
-    words: tuple[str, str] = ("", "")
-    units: tuple[str, str] = ("", "")
     note: str = ""  # why errors that were asked for are not estimated
-    natural: float = 1.0
-    planar: bool = False
     unresolved: list[int] = field(default_factory=list)
 
     def __repr__(self) -> str:
@@ -128,8 +117,19 @@ class Locus:
         """Plain lists, numbers and strings for a file; what was not computed is None."""
         columns = {name: self.values[:, i].tolist() for i, name in enumerate(self.names)}
         columns |= {name: plain(getattr(self, name)) for name in COLUMNS}
+        scene, own = self.system.scene, [self.system.scene.parameters[name] for name in self.names]
         return {
             "format": LOCUS.mark(),
+            "scene": scene.name,
+            "title": scene.title or scene.name,
+            "ordinate_name": scene.ordinate.name,
+            "natural": scene.units.ordinate,
+            "planar": bool(scene.planar),
+            "constants": {name: p.value for name, p in scene.parameters.items() if name not in self.names},
+            "discretization": mesh_of(self.system),
+            "labels": [p.label or name for name, p in zip(self.names, own, strict=True)],
+            "words": [p.words for p in own],
+            "units": [p.unit for p in own],
             **{name: getattr(self, name) for name in AS_THEY_ARE},
             "parameters": list(self.names),
             "columns": columns,
@@ -143,17 +143,17 @@ class Locus:
 
     def text(self, rows: int = 12) -> str:
         """Rows of the curve for the terminal: some of them, its ends, and all that are marked."""
-        n, marks = len(self.values), {m.row: m.kind for m in self.marks}
+        n, marks, scene = len(self.values), {m.row: m.kind for m in self.marks}, self.system.scene
         shown = sorted({0, n - 1, self.start, *marks, *np.linspace(0, n - 1, min(rows, n)).astype(int).tolist()})
         lines = [
             f"\nLocus of the {self.kind} in {self.names[0]} and {self.names[1]} (in parentheses the estimated error "
             "of the discretisation across the curve, where it was asked for; of the ordinate it was not)",
-            f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index{' in its plane' * self.planar}",
+            f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index{' in its plane' * bool(scene.planar)}",
         ]
         for i in shown:
             each, resolved = zip(self.values[i], self.error[i], strict=True), i not in self.unresolved
             pair = [f"{v:.10g}" if np.isnan(e) else number(v, e, resolved) for v, e in each]
-            ordinate = self.ordinate[i] if abs(self.ordinate[i]) > NEGLIGIBLE * self.natural else 0.0
+            ordinate = self.ordinate[i] if abs(self.ordinate[i]) > NEGLIGIBLE * scene.units.ordinate else 0.0
             index = f"{self.index[i, 0]}|{self.index[i, 1]}" if self.index[i, 0] >= 0 else ""
             note = "start" if i == self.start else marks.get(i, "")
             lines.append(f"  {pair[0]:<24} {pair[1]:<24} {ordinate:<14.8g} {index:<6} {note}".rstrip())

@@ -69,7 +69,7 @@ class Deflation:
                     "give equilibria at the load of the search (diagram.at(load) computes them)."
                 )
         self.start = solver.start(load)
-        self.mirrors = mirrors(self.system, self.start)
+        self.mirrors = mirrors(self.solver.shape, self.start)
         self.bases, self.energies = list[PETSc.Vec](), list[float]()
         self.found, self.tries, self.nearly = list[Point](), list[str](), 0
         for point in known:
@@ -178,7 +178,7 @@ class Deflation:
         if self.known.distance(x) > APART:
             self.known.add(x)
         for mirror in list(self.mirrors):
-            image = mirror(self.system, x)
+            image = mirror(self.solver.shape, x)
             if mirror not in self.mirrors or self.known.distance(image) <= APART:
                 continue
             point, _ = self._judge(image)
@@ -265,7 +265,7 @@ def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
     """An equilibrium with the number of its copies."""
     system, known, phase = solver.system, Orbits(solver.system), solver.system.phase
     known.add(point.x)
-    images = [mirror(system, point.x) for mirror in mirrors(system, point.x)]
+    images = [mirror(solver.shape, point.x) for mirror in mirrors(solver.shape, point.x)]
     system.phase, count = phase, 1
     for x in images:
         if known.distance(x) >= APART:

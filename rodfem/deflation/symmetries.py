@@ -36,9 +36,11 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem.fem.shape import Shape, interpolated
+from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
-from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
+from rodfem.tolerances import NEGLIGIBLE
 
 
 @dataclass(frozen=True)
@@ -66,51 +68,26 @@ class Mirror:
         signs = s if field == "r" or not self.reversal else -s
         return signs[list(scene.free_strains)] if field == "v" else signs
 
-    def __call__(self, system: System, x: PETSc.Vec) -> PETSc.Vec:
+    def __call__(self, shape: Shape, x: PETSc.Vec) -> PETSc.Vec:
         """Image of the state ``x``; drift scalars of the image are zero."""
-        f, state = system.fields, system.at(x)
-        named = state.named
+        system, f, state = shape.system, shape.system.fields, shape.system.at(x)
+        named, ends = state.named, sum(system.scene.interval) - f.all_vertices()[::-1]
         for block in f.blocks:
-            values = state.values(block.name)
+            weights = self.weights(system, block.name)
+            named[block.name] = state.values(block.name) * weights
             if self.reversal:
-                values = _reversed(system, values, block.degree)
-            values = values * self.weights(system, block.name)
-            if block.name == "r" and self.reversal:
-                values = values - _misfit(system, values)
-            named[block.name] = values
+                table = shape.from_left(state.local[shape.natural[block.name]])[::-1, ::-1] * weights
+                table = table - _misfit(state, table) if block.name == "r" else table
+                named[block.name] = interpolated(table, ends, f.coordinates(block.degree))
         named |= {f"n{i + 1}": state.scalars[f"n{i + 1}"] * float(self.weights(system, "n")[i]) for i in f.forces}
         return system.vector(f.filled(named))
 
 
-def _reversed(system: System, values: np.ndarray, degree: int) -> np.ndarray:
-    """Nodal values (cells, nodes, components) of a field as read from the other end of the rod."""
-    f = system.fields
-    order = np.argsort(f.coordinates(degree)[0])
-    here = f.vertices[:, 0].copy()
-    gathered = system.comm.allgather((here[: f.owned_cells], values[: f.owned_cells][:, order]))
-    starts = np.concatenate([start for start, _ in gathered])
-    table = np.concatenate([part for _, part in gathered])[np.argsort(starts)]
-    cell = np.searchsorted(np.sort(starts), here - SAME_PLACE * system.scene.length)
-    out = np.empty_like(values)
-    out[:, order] = table[len(starts) - 1 - cell][:, ::-1]
-    return out
-
-
-def _misfit(system: System, values: np.ndarray) -> np.ndarray:
-    """Translation (3,) by which a centreline misses the ends at which it is held, left end first."""
-    f = system.fields
-    x = f.coordinates(f.discretization.degree)
-    found = np.zeros((2, 3))
-    here = np.zeros((2, 3), dtype=bool)
-    for side, s in enumerate(system.scene.interval):
-        at_end = same_place(x, s, system.scene.length)
-        for number, value in zip(f.number[f.dofs["r"][at_end]], values[at_end], strict=True):
-            here[side], found[side] = number < 0, np.where(number < 0, value, 0.0)
-    both = system.comm.allgather((here, found))
-    shift = np.zeros(3)
-    for side in (1, 0):  # the left end has the last word
-        for held, value in both:
-            shift = np.where(held[side], value[side], shift)
+def _misfit(state: State, table: np.ndarray) -> np.ndarray:
+    """Translation (3,) by which a centreline, given in elements from left to right, misses the ends that are held."""
+    (left, right), shift = state.fields.scene.sides, np.zeros(3)
+    for end, r in ((right, table[-1, -1]), (left, table[0, 0])):  # the left end has the last word
+        shift = np.where([p is not None for p in end.held(state.constants())], r, shift)
     return shift
 
 
@@ -125,8 +102,9 @@ def candidates(system: System) -> list[Mirror]:
     return [Mirror((s1, s2, s3), reversal=s3 < 0) for s1, s2, s3 in signs]
 
 
-def mirrors(system: System, x: PETSc.Vec, among: Sequence[Mirror] | None = None) -> list[Mirror]:
+def mirrors(shape: Shape, x: PETSc.Vec, among: Sequence[Mirror] | None = None) -> list[Mirror]:
     """Discrete symmetries of the equations at the load of ``x``, among all :func:`candidates` unless given."""
+    system = shape.system
     among = candidates(system) if among is None else among
     if not among:
         return []
@@ -134,7 +112,7 @@ def mirrors(system: System, x: PETSc.Vec, among: Sequence[Mirror] | None = None)
     base = _generic_state(system, x, 1)
     other = _generic_state(system, base, 2)
     reference, scale = _work(system, base, other)
-    works = ((mirror, _work(system, mirror(system, base), mirror(system, other))[0]) for mirror in among)
+    works = ((mirror, _work(system, mirror(shape, base), mirror(shape, other))[0]) for mirror in among)
     return [mirror for mirror, work in works if abs(work - reference) < NEGLIGIBLE * scale]
 
 

@@ -203,8 +203,7 @@ class Diagram:
                 "one of diagram.special()."
             )
         low, high = sorted(load or self.span)
-        points = found[0].points
-        row = next(i for i, point in enumerate(points) if point is special.point)
+        points, row = found[0].points, special.row
         # near an index that the mesh leaves open another eigenvalue may vanish with this one
         doubtful = any(point.undecided for point in points[max(row - 1, 0) : row + 2])
         solver, bounds = self.solvers[special.point.mesh], ((low, high), interval)

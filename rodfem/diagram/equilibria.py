@@ -148,10 +148,6 @@ class LoadSteps:
     def __init__(self, solver: BranchSolver, first: Point, span: tuple[float, float]) -> None:
         self.solver, self.least = solver, LEAST * abs(span[1] - span[0])
         self.known, self.step = [first], inf
-        f = solver.system.fields
-        begin, end = solver.system.metric.getOwnershipRange()
-        numbers = [f.number[f.dofs[block.name]].ravel() for block in f.blocks if not block.multiplier]
-        self.blocks = [of[(begin <= of) & (of < end)] - begin for of in numbers]
 
     def to(self, load: float) -> PETSc.Vec:
         """Equilibrium on the path at a ``load`` further on; raises :class:`ConvergenceError`."""
@@ -206,7 +202,7 @@ class LoadSteps:
 
     def _sizes(self, change: PETSc.Vec) -> np.ndarray:
         """Largest entry of each field of a ``change`` of state, in natural sizes, the same on all ranks."""
-        system = self.solver.system
-        values = system.in_units(change, -1).array_r
-        mine = [float(abs(values[of]).max(initial=0.0)) for of in self.blocks]
+        system, units = self.solver.system, self.solver.units
+        values, blocks = system.change(change), [block for block in system.fields.blocks if not block.multiplier]
+        mine = [float(abs(values.values(block.name)).max(initial=0.0)) / units.of_field(block) for block in blocks]
         return np.max(system.comm.allgather(mine), axis=0)

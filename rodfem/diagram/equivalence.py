@@ -97,29 +97,28 @@ def _nearest(found: Factored, zero: int) -> tuple[np.ndarray, np.ndarray]:
 
 def image_of(branch: Branch, solver: BranchSolver) -> str:
     """The symmetry, in words, that carries a branch to one with the opposite ordinate; empty for none."""
-    chosen, size = _sampled(branch, solver)
+    shape, (chosen, size) = solver.shape, _sampled(branch, solver)
     if not chosen or any(abs(point.ordinate) <= OTHER * size for point in chosen):
         return ""
-    system, phase = solver.system, solver.system.phase
-    found = candidates(system)
+    found, phase = candidates(shape.system), shape.system.phase
     for point in chosen:  # the ordinate, which few of them take to its opposite, costs less than the equations
-        there = [solver.shape.ordinate(mirror(system, point.x)) + point.ordinate for mirror in found]
+        there = [shape.ordinate(mirror(shape, point.x)) + point.ordinate for mirror in found]
         opposite = [mirror for mirror, left in zip(found, there, strict=True) if abs(left) <= NEGLIGIBLE * size]
-        found = mirrors(system, point.x, opposite) if opposite else []
-    system.phase = phase
+        found = mirrors(shape, point.x, opposite)
+    shape.system.phase = phase
     found.sort(key=lambda mirror: (mirror.reversal, -sum(mirror.signs), mirror.signs))
     return found[0].in_words() if found else ""
 
 
 def other_ordinates(branch: Branch, first: Point, image: Point, solver: BranchSolver) -> str:
     """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty if it keeps their size."""
-    system, near = solver.system, CARRIED * solver.system.norm(first.x - image.x)
-    found, phase = [m for m in candidates(system) if system.norm(m(system, first.x) - image.x) <= near], system.phase
-    found = mirrors(system, first.x, found) if found else []  # a small imperfection carries the one near the other, too
+    shape, system, (chosen, size) = solver.shape, solver.system, _sampled(branch, solver)
+    near, phase = CARRIED * system.norm(first.x - image.x), system.phase
+    found = [m for m in candidates(system) if system.norm(m(shape, first.x) - image.x) <= near]
+    found = mirrors(shape, first.x, found)  # a small imperfection carries the one near the other, too
     system.phase = phase
-    chosen, size = _sampled(branch, solver)
     for mirror in found:
-        changes = [abs(solver.shape.ordinate(mirror(system, p.x))) - abs(p.ordinate) for p in chosen]
+        changes = [abs(shape.ordinate(mirror(shape, p.x))) - abs(p.ordinate) for p in chosen]
         if all(abs(change) <= OTHER * size for change in changes):
             return ""
     return found[0].in_words() if found else ""

@@ -10,7 +10,7 @@ from math import isfinite
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.mesh_sequence import TRIES, Gap, arms
+from rodfem.adaptivity.mesh_sequence import TRIES
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
@@ -21,6 +21,7 @@ from rodfem.deflation.search import Deflation, equilibria_at
 from rodfem.deflation.symmetries import Orbits
 from rodfem.diagram.equilibria import Overfull, first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
+from rodfem.diagram.special_search import Gap, arms
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.newton import NewtonResult
@@ -107,9 +108,9 @@ class Explorer(Tracer):
         """Trace what leaves the branch points of the branches from number ``first`` on, breadth first."""
         for branch in itertools.islice(self.branches, first, None):  # grows while it is walked
             if branch.depth < self.plan.depth:
-                while self._crossed < len(self.gaps.known) and not self._enough():
+                while self._crossed < len(self.specials.gaps) and not self._enough():
                     self._crossed += 1
-                    gap = self.gaps.known[self._crossed - 1]
+                    gap = self.specials.gaps[self._crossed - 1]
                     with self.without(f"The other side of the gap at {gap.point.load:.8g} was not followed"):
                         self._detached(gap, branch.depth + 1)
                 for i, special in enumerate(branch.special):

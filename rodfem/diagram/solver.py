@@ -67,7 +67,7 @@ class Solver:
         if form_compiler.ALONE:
             compile_ahead("linalg/chain", "fem/assembly", "fem/newton")
         system = System(scene, discretization or Discretization(), comm, clock)
-        self.equilibria = BranchSolver(system, spectrum)
+        self.equilibria = BranchSolver(system, spectrum if scene.conservative else 0)
 
     @classmethod
     def of(cls, equilibria: BranchSolver) -> Solver:

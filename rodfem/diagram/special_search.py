@@ -1,4 +1,9 @@
-"""Search for the special points of one branch between its rows, as they are computed."""
+"""Search for the special points of one branch between its rows, as they are computed.
+
+At a gap an imperfection has taken a branch point apart: two branches, that would cross without it, bend away from each
+other.  The state and the load at which they would cross are known from :mod:`rodfem.continuation.singular`.  Steps in
+proportion to the distance from there follow the bend of either branch, however sharp it is.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +12,15 @@ from dataclasses import replace
 from functools import cache
 from itertools import chain
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.mesh_sequence import Gap, Gaps, Meshes, interpolated
+from rodfem.adaptivity.mesh_sequence import Meshes, interpolated
 from rodfem.continuation.arc import Piece
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Node, Zeros, fourth
 from rodfem.continuation.kinds import IMPERFECT
 from rodfem.continuation.observer import Observer, Remark
@@ -29,6 +36,8 @@ from rodfem.continuation.singular_points import (
     special_point,
     taut_where_it_turns,
 )
+from rodfem.fem.newton import correct
+from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
 DIP = 0.1  # eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most
@@ -40,15 +49,30 @@ ASIDE = 0.02  # distance of a regular state from a singular one at the end of a 
 SHORTER, PARTS = 2, 8  # how many times steps are made shorter about one place of a branch, and by what factor
 
 
+LEAST = 1e-6  # least bound of a step next to a gap
+ARM = 0.05  # distance, in the metric, at which the four arms that would meet are looked for, at least
+
+
 class Unresolved(Exception):
     """A piece of a branch is to be looked at again, with shorter steps."""
 
 
-class SpecialSearch:
-    """Special points between the rows of one branch, and bounds of its steps."""
+class Gap(NamedTuple):
+    """A gap: the ``point`` at which its branches would cross, and the ``unfolded`` state there.
 
-    def __init__(self, meshes: Meshes, gaps: Gaps, observer: Observer) -> None:
-        self.meshes, self.gaps, self.observer = meshes, gaps, observer
+    ``apart`` is how far, in the metric, the state of the branch from which the gap was seen is.
+    """
+
+    point: Point
+    unfolded: SingularState
+    apart: float
+
+
+class SpecialSearch:
+    """Special points between the rows of one branch, and bounds of its steps; ``gaps`` are those of the run so far."""
+
+    def __init__(self, meshes: Meshes, observer: Observer) -> None:
+        self.meshes, self.gaps, self.observer = meshes, list[Gap](), observer
         self.undecided = 0
         self._open: list[Point] = []
         self._before: Point | None = None
@@ -79,7 +103,12 @@ class SpecialSearch:
         """Largest step from a point: near gaps, and up to and in pieces that are to be resolved, short ones."""
         s = point.arclength
         ahead = [max(largest, since - s) for since, until, largest in self._short if s < until]
-        return min([self.gaps.reach(self.meshes.solvers[point.mesh], point), *ahead])
+        return min([max(self._from_gap(point, self.meshes.solvers[point.mesh]) / 4, LEAST), *ahead])
+
+    def _from_gap(self, point: Point, solver: BranchSolver) -> float:
+        """Distance of a point from the nearest gap."""
+        known = (interpolated(gap.point, solver).x for gap in self.gaps)
+        return min((solver.system.distance(point.x, x) for x in known), default=inf)
 
     def _shorten(self, a: Point, b: Point) -> None:
         """Ask for short steps from ``a`` to beyond ``b``, unless they are short already."""
@@ -96,7 +125,7 @@ class SpecialSearch:
         try:
             self._open.append(b)
             return self._shown() if self._regular(b) or len(self._open) > PATIENCE else []
-        except (Gap, Unresolved):
+        except Unresolved:
             self._open = [settled]
             raise
 
@@ -203,7 +232,7 @@ class SpecialSearch:
             else:
                 self._missing(a, b, ended=ended)
         for node in zeros.misses:
-            self._missed(piece, node, resolved=ended)
+            self._missed(piece, of_miss(piece, node), resolved=ended)
         self._dip(piece, p, q, found=bool(out))
         return sorted(out, key=lambda special: special.point.arclength)
 
@@ -224,7 +253,7 @@ class SpecialSearch:
         """Look for a branch point taken apart where the eigenvalue nearest zero is least at a row."""
         nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
         if not found and self._nearest > nearest < ahead and nearest < DIP * piece.solver.inertia.scale:
-            self._missed(piece, p, resolved=True)
+            self._missed(piece, of_miss(piece, p))
         self._nearest = -inf if found else nearest
 
     def _turning(
@@ -289,7 +318,7 @@ class SpecialSearch:
     def _found(self, piece: Piece, at: Candidate, found: SingularState, *, fold: bool) -> SpecialPoint:
         """The special point at a singular state; of a fold the branch on its other side is looked for."""
         if fold:
-            self._opposite(piece, at, found)
+            self._missed(piece, at, fold=found)
         return special_point(piece, at, found, fold=fold)
 
     def _imperfect(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> SpecialPoint:
@@ -297,37 +326,58 @@ class SpecialSearch:
         gap = self._open_gap(piece, at, found, ended=ended)
         special = special_point(piece, at, found, fold=False)
         if gap is not None:
-            special.kind, special.note = IMPERFECT, str(gap)
+            special.kind, special.note = IMPERFECT, f"imperfect, unfolding {found.size:.0e}"
         return special
 
     def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> Gap | None:
-        """The gap at a singular state whose unfolding parameters are not round-off; raised unless it is known."""
-        apart = piece.solver.system.distance(at.x, found.x)
-        gap = self.gaps.examine(special_point(piece, at, found, fold=False), found, apart)
-        if gap is not None and not ended and self.gaps.open(gap, piece.solver):
-            raise gap
+        """The gap at a singular state whose unfolding parameters are not round-off; steps about a new one are shorter.
+
+        None where the mesh makes them, which need not have a symmetry of the scene: those of a richer one are smaller.
+        """
+        special, richer = special_point(piece, at, found, fold=False), self.meshes.richer(piece.solver.mesh)
+        modes = [richer.transfer(v, state=False) for v in special.null_vectors]
+        orthonormalize(modes, richer.system.metric)
+        again = SingularSystem(richer.solver, modes, len(modes), fold=False).solve(richer.transfer(found.x, state=True))
+        if again is not None and again.size < 0.5 * found.size + again.noise:  # lowered by half: the mesh's own
+            return None
+        point = replace(special.point, x=found.x, load=found.load)
+        gap = Gap(point, found, piece.solver.system.distance(at.x, found.x))
+        if not ended and self._add(gap, piece.solver):
+            raise Unresolved
         return gap
 
-    def _missed(self, piece: Piece, node: Node, *, resolved: bool) -> None:
-        """Look for the branch on the other side where an eigenvalue comes near zero and turns back."""
-        at = of_miss(piece, node)
-        found = SingularSystem(piece.solver, at.modes, at.count, fold=False).solve(at.x)
-        if found is not None and found.size > found.noise:
-            gap = self._open_gap(piece, at, found, ended=resolved)
-            if gap is not None and resolved:
-                self.gaps.open(gap, piece.solver)
+    def _add(self, gap: Gap, solver: BranchSolver) -> bool:
+        """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
+        new = self._from_gap(gap.point, solver) >= LEAST
+        self.gaps += [gap] * new
+        return new
 
-    def _opposite(self, piece: Piece, at: Candidate, fold: SingularState) -> None:
-        """Look for the branch on the other side of a ``fold`` that is a branch point with an imperfection.
+    def _missed(self, piece: Piece, at: Candidate, *, resolved: bool = True, fold: SingularState | None = None) -> None:
+        """Look for the branch on the other side where an eigenvalue comes near zero and turns back, or at a ``fold``.
 
-        Of a pitchfork ``lam x - x^3 + eps`` the load of the fold is off by ``1.9 eps^(2/3)``, times the rate of the
-        eigenvalue in the load, and the least eigenvalue on the other side is ``2.4 eps^(2/3)``.
+        A fold may be a branch point with an imperfection.  Of a pitchfork ``lam x - x^3 + eps`` its load is off by
+        ``1.9 eps^(2/3)``, times the rate of the eigenvalue in the load, and the least eigenvalue on the other side is
+        ``2.4 eps^(2/3)``.
         """
         solver = piece.solver
         found = SingularSystem(solver, at.modes, at.count, fold=False).solve(at.x)
         if found is None or found.size <= found.noise:
             return
-        if abs(found.rate * (found.load - fold.load)) < DIP * solver.inertia.scale:
-            gap = self._open_gap(piece, at, found, ended=True)
-            if gap is not None:
-                self.gaps.open(gap, solver)
+        if fold is not None and abs(found.rate * (found.load - fold.load)) >= DIP * solver.inertia.scale:
+            return
+        gap = self._open_gap(piece, at, found, ended=resolved)
+        if gap is not None and resolved:
+            self._add(gap, solver)
+
+
+def arms(solver: BranchSolver, gap: Gap) -> list[Point]:
+    """Equilibria on the branches that would cross at a gap, a little away from it: up to four."""
+    system, arm, out = solver.system, max(ARM, gap.apart), []
+    for direction in gap.unfolded.directions:
+        row = solver.row(direction)
+        for sign in (1.0, -1.0):
+            x = gap.unfolded.x + direction * (sign * arm)
+            outcome = correct(system, x, row, reach=arm)
+            if outcome.converged:
+                out.append(solver.point(x, 0.0, solver.tangent(row, at=x), outcome))
+    return out

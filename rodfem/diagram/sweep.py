@@ -17,7 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import OrdinateBound, bound, derived
+from rodfem.adaptivity.error_estimate import Enriched, bound, derived
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
@@ -33,12 +33,13 @@ from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_f
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError, many
 from rodfem.fem.fields import Discretization
-from rodfem.fem.shape import halved, richer_system, transferred
+from rodfem.fem.shape import halved
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, without
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.dependence import may_depend, require_independent_constraints
+from rodfem.stability.inertia import Index
 from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, begins_slowly, named
 from rodfem.stability.spectrum import SHIFT
 from rodfem.tolerances import DRIFT, ROUND_OFF, round_off, unit
@@ -221,22 +222,9 @@ class Sweep:
 
     def _evaluated(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of a state ``x`` that do not depend on its frequencies."""
-        solver, load = self.solver, self.solver.system.scalar(x)
-        return Point(
-            x=x,
-            tangent=None,
-            arclength=abs(load - self.span[0]),
-            load=load,
-            ordinate=solver.shape.ordinate(x),
-            **solver.energies(x)._asdict(),
-            stretch=solver.shape.stretch(x),
-            negative=0,
-            zero=solver.system.active_drifts(x),
-            slope=float("nan"),
-            drift=0.0,
-            error=0.0,
-            solver=solver,
-        )
+        system = self.solver.system
+        index = Index(0, system.active_drifts(x))
+        return self.solver.point(x, abs(system.scalar(x) - self.span[0]), None, index=index)
 
     def _record(self, row: Row, *, on_the_way: bool) -> None:
         """Record the frequencies of a row at its point; a special point is not ``on_the_way`` of the curves."""
@@ -336,29 +324,26 @@ class Sweep:
                     s.note = s.note or f"accuracy {asked:g} not reached"
 
 
-class SweepErrors:
-    """Estimates the errors of special points on the mesh of one solver, over a ``span`` of loads."""
+class SweepErrors(Enriched):
+    """Estimates the errors of special points of a sweep over a ``span`` of loads."""
 
     def __init__(self, solver: BranchSolver, span: tuple[float, float]) -> None:
-        self.solver, self.span, self.units = solver, span, solver.system.scene.units
-        system = solver.system
-        self.richer = BranchSolver(richer_system(system))
-        self.eigensolver = NonsymmetricSolver(self.richer.system)
-        self.transfer = partial(transferred, solver.shape, self.richer.system)
-        self.rho = halved(system.fields.discretization.degree)
-        self.ordinate = OrdinateBound(solver.shape, self.richer.shape)
+        super().__init__(solver)
+        self.span, self.units, self.eigensolver = span, solver.units, NonsymmetricSolver(self.system)
+        self.part = halved(solver.system.fields.discretization.degree)
 
     def estimate(self, s: SpecialPoint) -> None:
         """Set all error bars of a special point, or none: then raises :class:`~rodfem.errors.ConvergenceError`."""
-        point, rho = s.point, self.rho
+        point, rho, ordinate = s.point, self.part, self.solver.shape.ordinate
         guess = self.transfer(point.x, state=True)
-        x = at_load(self.richer, guess, point.load)
-        left = round_off(point.ordinate, self.units.ordinate)
-        of_ordinate = of_load = self.ordinate(point.x, x, left, rho)
-        moved = x
+        x = moved = at_load(self.solver, guess, point.load)
+        of_ordinate = of_load = self.of_ordinate(point.x, x, round_off(point.ordinate, self.units.ordinate), rho)
         if s.cluster is not None:
-            measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._cluster(s.cluster)
-            if s.kind == FLUTTER and self.solver.system.scene.inertia.order == 2:
+            vectors = as_vectors(self.coarse.system, s.cluster.basis)
+            columns = [self.transfer(v, state=False).array_r.real for v in vectors]
+            cluster = Cluster(np.stack(columns, axis=1), s.cluster.mean)
+            measured = Measuring(self.solver, self.eigensolver, guess)
+            if s.kind == FLUTTER and self.system.scene.inertia.order == 2:
                 load, left = self._flutter(measured, cluster, s)
             else:
                 zeros = cluster.size - abs(s.negative_after - s.negative_before)
@@ -367,22 +352,12 @@ class SweepErrors:
                 if s.kind == FLUTTER:
                     s.omega2_error = bound(s.omega2, measured(load, cluster).frequency ** 2, ROUND_OFF * s.omega2, rho)
             of_load = max(bound(point.load, load, left, rho), s.located_to)
-            moved = self._moved(x, point.load, of_load)
-            of_ordinate += abs(self.richer.shape.ordinate(moved) - self.richer.shape.ordinate(x))
+            low, high = sorted(self.span)  # into which the state goes on over the bar, up to half of the range
+            step = min(of_load, (high - low) / 2) * (1.0 if point.load < (low + high) / 2 else -1.0)
+            moved = at_load(self.solver, x, point.load + step)
+            of_ordinate += abs(ordinate(moved) - ordinate(x))
         s.error_estimate, s.ordinate_error = of_load, of_ordinate  # none of them where one is not estimated
-        s.bounds = cache(partial(derived, (self.solver, self.richer), (point.x, x, moved - x), rho))
-
-    def _moved(self, x: PETSc.Vec, load: float, bar: float) -> PETSc.Vec:
-        """State from ``x``, at a load, on over the ``bar`` of that, up to half of the range."""
-        low, high = sorted(self.span)
-        step = min(bar, (high - low) / 2) * (1.0 if load < (low + high) / 2 else -1.0)
-        return at_load(self.richer, x, load + step)
-
-    def _cluster(self, cluster: Cluster) -> Cluster:
-        """A cluster on the richer discretisation."""
-        vectors = as_vectors(self.solver.system, cluster.basis)
-        columns = [self.transfer(v, state=False).array_r.real for v in vectors]
-        return Cluster(np.stack(columns, axis=1), cluster.mean)
+        s.bounds = cache(partial(derived, (self.coarse, self.solver), (point.x, x, moved - x), rho))
 
     def _flutter(self, measured: Measuring, cluster: Cluster, s: SpecialPoint) -> tuple[float, float]:
         """Flutter load on the richer discretisation and its uncertainty there; sets the error of the eigenvalue."""
@@ -394,7 +369,7 @@ class SweepErrors:
             located = located_flutter(measured, cluster, load, width)
             load, left = located.load, located.uncertainty
             mu, doubt = located.cluster.mean, located.mean_uncertainty
-        s.omega2_error = bound(s.omega2, mu, max(doubt, 10.0 * abs(mu) * ROUND_OFF), self.rho)
+        s.omega2_error = bound(s.omega2, mu, max(doubt, 10.0 * abs(mu) * ROUND_OFF), self.part)
         return load, left
 
 

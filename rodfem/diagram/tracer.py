@@ -8,7 +8,7 @@ from math import isnan
 from typing import NoReturn
 
 from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible
-from rodfem.adaptivity.mesh_sequence import AccuracyControl, Gap, Gaps, Meshes, TooCoarse, interpolated
+from rodfem.adaptivity.mesh_sequence import AccuracyControl, Meshes, TooCoarse, interpolated
 from rodfem.adaptivity.soft_states import SoftRows
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
@@ -53,9 +53,8 @@ class Tracer:
         self.branches: list[Branch] = []
         self.meshes = Meshes(solver, plan.accuracy)
         self.solvers: Sequence[BranchSolver] = self.meshes.solvers
-        self.gaps = Gaps(self.meshes)
         self.zeros = PersistentZeros(observer, self.high - self.low)
-        self.specials = SpecialSearch(self.meshes, self.gaps, observer)
+        self.specials = SpecialSearch(self.meshes, observer)
         self.events = Events(plan.events)
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         self.quadrature = Quadrature(self.meshes.solvers, observer, self.scene.load)
@@ -157,7 +156,7 @@ class Tracer:
                     self._rest(branch)
                     raise Ended(item)
                 self._take(branch, history, item)
-        except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
+        except Unresolved:  # the step was too long, or led to another branch: back, to smaller ones
             branch.cut(self.specials.settled)
             history[:] = [p for p in history if p.arclength <= self.specials.settled]
             return False

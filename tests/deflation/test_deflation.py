@@ -121,7 +121,7 @@ def test_ruler() -> None:
     assert (buckled.energy, buckled.ordinate) == pytest.approx((p.energy, p.ordinate), abs=1e-10)
     assert (buckled.negative, buckled.zero, plane.negative) == (0, 0, 1)
     (mirror,) = search.mirrors
-    image = mirror(found.follower.system, buckled.x)
+    image = mirror(found.follower.shape, buckled.x)
     assert found.follower.system.distance(image, buckled.x) > 0.5
     assert force(found.follower, image) < 1e-9
     assert search.known.distance(image) < APART
@@ -161,12 +161,12 @@ def test_mirrors_are_those_of_the_equations(formulation: str, units: tuple[float
     expected = {"cord": {(1, -1, 1), (1, 1, -1), (1, -1, -1)}, "ruler": {(1, -1, 1)}}
     for name, signs in expected.items():
         follower = Solver(rescaled(scene(name), *units), Discretization(formulation)).equilibria
-        found = mirrors(follower.system, follower.start(5.0))
+        found = mirrors(follower.shape, follower.start(5.0))
         assert {m.signs for m in found} == signs
         x = turned_state(follower.system, follower.start(5.0), 1.0, [1, 2])
         for mirror in found:
-            image = mirror(follower.system, x)
-            assert follower.system.distance(mirror(follower.system, image), x) < 1e-12
+            image = mirror(follower.shape, x)
+            assert follower.system.distance(mirror(follower.shape, image), x) < 1e-12
             if formulation == "reduced" or not mirror.reversal:  # a reversal may move the reaction to the other end
                 assert force(follower, image) == pytest.approx(force(follower, x), rel=1e-12)
 

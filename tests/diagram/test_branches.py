@@ -52,8 +52,8 @@ def test_steps_are_short_about_pieces_that_are_to_be_resolved_and_not_for_ever()
     def row(arclength: float) -> Any:
         return SimpleNamespace(arclength=arclength, mesh=0)
 
-    meshes, gaps = SimpleNamespace(solvers=[None]), SimpleNamespace(reach=lambda solver, point: inf)
-    search, asked = SpecialSearch(meshes, gaps, Observer()), 0  # type: ignore[arg-type]
+    meshes = SimpleNamespace(solvers=[None])
+    search, asked = SpecialSearch(meshes, Observer()), 0  # type: ignore[arg-type]
     for first in (3.0, 5.0) * 10:
         try:
             search._shorten(row(first), row(first + 0.2))
@@ -91,7 +91,7 @@ def test_the_other_side_of_a_pitchfork(folder: Any) -> None:
     (words,) = (t.get_text() for t in axes.get_legend().get_texts() if t.get_text().startswith("image, not traced"))
     assert words.endswith(buckled.image)
     solver, point = found.solvers[0], buckled.points[-1]  # the image is an equilibrium, and not the same one
-    image, rest = Mirror((-1, 1, 1), reversal=False)(solver.system, point.x), solver.system.new_vector()
+    image, rest = Mirror((-1, 1, 1), reversal=False)(solver.shape, point.x), solver.system.new_vector()
     solver.system.at(image).residual(rest)
     assert rest.norm() < 1e-9 and solver.shape.ordinate(image) == pytest.approx(-point.ordinate, rel=1e-9)
 
