@@ -24,9 +24,20 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
 from rodfem.modes.modes import Modes
+from rodfem.output.files import mesh_of
 from rodfem.output.summary import called, in_sentences
 from rodfem.output.table import row_data, special_data
-from rodfem.output.words import COUNT, INDEX, in_decimals, index_in_words, number, rounded_up, special_lines
+from rodfem.output.words import (
+    COUNT,
+    INDEX,
+    eigenvalue_in_words,
+    in_decimals,
+    index_in_words,
+    mesh_in_words,
+    number,
+    rounded_up,
+    special_lines,
+)
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -35,17 +46,6 @@ from rodfem.timing import WORK, Clock
 
 WIDTH, PAUSE = 110, 30.0  # columns of a paragraph; seconds between two lines of progress
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
-
-
-def _mesh(system: System) -> str:
-    """Discretisation in words."""
-    d = system.fields.discretization
-    words = f"{d.elements} elements of degree {d.degree}"
-    if d.vertices is not None:
-        sizes = np.diff(d.vertices)
-        if sizes.max() > 1.1 * sizes.min():
-            words += f", {sizes.min():.2g} to {sizes.max():.2g} long"
-    return f"{words}, {system.fields.unknowns} unknowns"
 
 
 def _roots(point: Point, one: float, order: int) -> dict[str, str]:
@@ -70,10 +70,8 @@ def _eigenvalues(found: Verdict, modes: Modes | None) -> Iterator[str]:
     if modes is not None:
         rows = zip(modes.value, modes.residual, modes.error, modes.motion, strict=True)
     for value, residual, error, motion in rows:
-        doubt = f" ({rounded_up(error):.0e})" if isfinite(error) else ""
-        number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
         known = f"residual {residual:.0e}" if isfinite(residual) else ""
-        yield f"mu = {number + doubt:<28} {known:<15} {motion}".rstrip()
+        yield f"mu = {eigenvalue_in_words(complex(value), error):<28} {known:<15} {motion}".rstrip()
     if modes is not None and modes.note:
         yield modes.note
 
@@ -120,11 +118,7 @@ class Report(Observer):
     def system(self, system: System, accuracy: float | None = None) -> None:
         """Say what is solved, with how many unknowns, what was left out, and the accuracy asked for."""
         scene, f = system.scene, system.fields
-        d = f.discretization
-        self.say(
-            f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, "
-            f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
-        )
+        self.say(f"{scene.title or scene.name}: {scene.rod} rod, {mesh_in_words(mesh_of(system))}")
         if accuracy is not None and scene.conservative:
             self.detail(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.detail(f"  unknowns: {f.describe()}, load {scene.load}")
@@ -160,12 +154,13 @@ class Report(Observer):
 
     def mesh(self, system: System, load: float, why: str) -> None:
         """Say that a branch goes on with another mesh, and why."""
-        self.detail(f"  from {system.scene.load} = {load:.6g} on {_mesh(system)} ({why})")
+        self.detail(f"  from {system.scene.load} = {load:.6g} on {mesh_in_words(mesh_of(system))} ({why})")
 
     def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
         """Say with which meshes a branch was traced, and the error of the worst of its points."""
         word = "" if worst <= asked else f", above the {asked:g} asked for"
-        self.detail(f"  largest error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
+        meshes = "; ".join(map(mesh_in_words, map(mesh_of, used)))
+        self.detail(f"  largest error {rounded_up(worst):.0e}{word}; {meshes}")
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""

@@ -21,6 +21,7 @@ from rodfem.continuation.kinds import KINDS
 from rodfem.output import style
 from rodfem.output.pieces import COUNTED, Piece, endings, pieces_of
 from rodfem.output.style import END, FONT, HALO, LINES, PALETTE
+from rodfem.output.words import mesh_in_words, rounded_up
 from rodfem.stability.soft_mode import STABLE
 from rodfem.tolerances import TINY
 
@@ -208,7 +209,7 @@ def _label_places(curve: Floats, half: Floats) -> Floats:
 def _about(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
     d, special = diagram.get("discretization"), [s for b in diagram["branches"] for s in b.get("special", [])]
-    parts = [style.mesh_in_words(d)] if d else []
+    parts = [mesh_in_words(d)] if d else []
     if d and diagram.get("accuracy"):
         parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
     coarse = sum(point.get("resolved") is False for point in special)
@@ -221,7 +222,7 @@ def _accuracy(special: Branches) -> list[str]:
     bars = [point.get("error_estimate") for point in special if point.get("resolved") is not False]
     known = [abs(bar) for bar in bars if bar is not None and isfinite(bar)]
     share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
-    return [f"error of the loads of special points at most {style.at_most(max(known))}{share}"] if known else []
+    return [f"error of the loads of special points at most {rounded_up(max(known)):.0e}{share}"] if known else []
 
 
 # --- branches between their rows

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
 from rodfem.modes.modes import RIGID
 from rodfem.output.pieces import Interval, intervals_of
-from rodfem.output.style import HALO, PALETTE, STYLE, at_most, axis_label, explain, mesh_in_words, save, sheet
+from rodfem.output.style import HALO, PALETTE, STYLE, axis_label, explain, save, sheet
+from rodfem.output.words import mesh_in_words, rounded_up
 from rodfem.stability.soft_mode import STABLE
 
 Member = tuple[float, int, complex, str]  # load, row, eigenvalue and motion of a point of a curve
@@ -68,8 +69,9 @@ def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
 def _accuracy(branches: Sequence[Mapping[str, Any]]) -> str:
     """Greatest bound of the errors of the special loads."""
     found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
-    kinds = " and ".join(kind for kind in SPECIAL if kind in {s["kind"] for s in found})
-    return f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}" if found else ""
+    kinds, bars = {s["kind"] for s in found}, [s["error_estimate"] for s in found]
+    words = " and ".join(kind for kind in SPECIAL if kind in kinds)
+    return f"; error of {words} loads at most {rounded_up(max(bars)):.0e}" if found else ""
 
 
 def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]]) -> list[Artist]:

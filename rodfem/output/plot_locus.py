@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, KINDS, USER
 from rodfem.file_format import LOCUS
-from rodfem.output.style import FONT, HALO, PALETTE, STYLE, at_most, explain, mesh_in_words, named, save, sheet
+from rodfem.output.style import FONT, HALO, PALETTE, STYLE, explain, named, save, sheet
+from rodfem.output.words import mesh_in_words, rounded_up
 from rodfem.tolerances import TINY
 
 Floats = NDArray[np.float64]
@@ -98,7 +99,7 @@ def _about(loci: Sequence[Locus]) -> str:
     points = sum(len(one["columns"]["error"]) for one in loci)
     failed = sum(len(one.get("without_estimate", [])) for one in loci)
     if errors:
-        text += f"; curves accurate to {at_most(max(errors))} (estimated at {len(errors)} of {points} points"
+        text += f"; curves accurate to {rounded_up(max(errors)):.0e} (estimated at {len(errors)} of {points} points"
         text += f", without success at {failed} more)" if failed else ")"
     elif failed:
         text += f"; the error could not be estimated at any of {failed} points"

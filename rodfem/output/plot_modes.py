@@ -22,6 +22,7 @@ from rodfem.output.glyphs import POINT, Glyph, Look, Solid, between, glyphs_of, 
 from rodfem.output.render import axes_of, axis_of
 from rodfem.output.states import curve_of
 from rodfem.output.style import DPI, FREE, GROWS, REST, STYLE, SWINGS
+from rodfem.output.words import eigenvalue_in_words
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
@@ -74,13 +75,11 @@ class _Panel:
     def _title(self, modes: Modes, number: int) -> str:
         """Write eigenvalue and motion above the picture, in the colour of what the mode does, which is returned."""
         mu, error, motion = complex(modes.value[number]), modes.error[number], modes.motion[number]
-        root, known = exponent(mu, modes.rates), bool(np.isfinite(error))
-        free = motion == SYMMETRY or abs(mu) <= (error if known else 0.0)
+        root = exponent(mu, modes.rates)
+        free = motion == SYMMETRY or bool(abs(mu) <= np.nan_to_num(error, posinf=0.0))
         color = FREE if free else GROWS if root.real > GROWTH * abs(root) else SWINGS
-        doubt = f" ({error:.0e})" if known else ""
-        value = f"{mu.real:.6g}" if mu.imag == 0 else f"{mu.real:.5g} {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.5g}i"
         what = {FREE: "zero", SWINGS: "stable", GROWS: "unstable" if mu.imag == 0 else "flutter"}[color]
-        words = f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {motion}"
+        words = f"{number + 1}: $\\mu$ = {eigenvalue_in_words(mu, error)}\n{what}: {motion}"
         self.axes.set_title(words, fontsize=12.5, color=color)
         return color
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from io import BytesIO
-from math import ceil, floor, log10
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from matplotlib.transforms import offset_copy
 from rodfem.errors import InputError
 from rodfem.output.words import with_unit
 from rodfem.stability.soft_mode import PLANAR, STABLE, UNDECIDED, UNSTABLE
-from rodfem.tolerances import NEGLIGIBLE
 from rodfem.whole_files import draft_of
 
 DPI, SIZE, FONT = 200, (7.5, 5.0), 11.0  # 1500 x 1000 pixels
@@ -139,14 +137,3 @@ def ordinate_in_words(diagram: Mapping[str, Any]) -> str:
     name, label = diagram["ordinate"], diagram.get("ordinate_label") or ""
     symbol = label.startswith("$") and label.endswith("$") and label.count("$") == 2
     return with_unit(f"{name} {label}" if symbol else label or name, str(diagram.get("ordinate_unit") or ""))
-
-
-def mesh_in_words(d: Mapping[str, Any]) -> str:
-    """Discretisation, as files record it, in words."""
-    return f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
-
-
-def at_most(error: float) -> str:
-    """Return a bound with two digits, never smaller than it is."""
-    step = 10.0 ** (floor(log10(error)) - 1) if error > 0 else 1.0
-    return f"{ceil(error / step * (1 - NEGLIGIBLE)) * step:.1e}".replace("e-0", "e-")

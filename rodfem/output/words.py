@@ -74,10 +74,15 @@ def with_unit(text: str, unit: str) -> str:
     return f"{text} [{unit.replace('$', '')}]" if unit else text
 
 
+def mesh_in_words(d: Data) -> str:
+    """Discretisation, as files record it, in words."""
+    return f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
+
+
 def eigenvalue_in_words(mu: complex, error: float) -> str:
-    """An eigenvalue with the bound of its error, once; empty where that is not known."""
+    """An eigenvalue with the bound of its error, once; with eight digits where that is not known."""
     if not isfinite(error):
-        return ""
+        return f"{mu.real:.8g}" + (f" {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.8g} i" if mu.imag else "")
     (real, bar), (imaginary, other) = (number(x, error).split(" ", 1) for x in (mu.real, abs(mu.imag)))
     if not mu.imag:
         return f"{real} {bar}"

@@ -23,8 +23,9 @@ import h5py
 
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.output.states import check_run
-from rodfem.output.style import mesh_in_words, ordinate_in_words
+from rodfem.output.style import ordinate_in_words
 from rodfem.output.table import ENTRIES, NAMES
+from rodfem.output.words import mesh_in_words
 from rodfem.report.branches import DERIVED, html_of, label_of, loci_of, ordinates_of, plain_of, script_json
 from rodfem.report.rods import rods_of
 from rodfem.whole_files import write_whole

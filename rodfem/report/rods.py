@@ -266,7 +266,7 @@ def _about(mode: Shown) -> dict[str, Any]:
     zero = exact or mode.zero or bool(abs(mode.value) <= np.nan_to_num(mode.error, posinf=0.0))
     mu = 0j if zero and (exact or not known) else mode.value
     root = exponent(mu, mode.rates)
-    words = "0 (exact)" if exact else eigenvalue_in_words(mu, mode.error) or "0" * zero
+    words = "0 (exact)" if exact else eigenvalue_in_words(mu, mode.error) if known else "0" * zero
     return {
         "value": [mu.real, mu.imag],
         "words": words,
