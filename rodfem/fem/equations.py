@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 from copy import copy
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import dolfinx.mesh
 import numpy as np
@@ -25,8 +25,10 @@ from rodfem.forms.kinematics import curvature, strain
 from rodfem.forms.rotation import rotation
 from rodfem.problem.contribution import Site
 from rodfem.problem.functions import Constants, Place, derived, place
-from rodfem.problem.scene import Part, Scene
 from rodfem.tolerances import same_place
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Part, Scene
 
 
 class Equations:

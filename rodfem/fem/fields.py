@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,9 +26,11 @@ from rodfem.fem.state import LOAD
 from rodfem.problem.arguments import convert, optional, reals, whole
 from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.functions import Constants
-from rodfem.problem.scene import Scene
 from rodfem.problem.units import Units
 from rodfem.tolerances import SAME_PLACE, same_place
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
 
 FACTORS = CHAIN, PETSC = "chain", "petsc"
 """What assembles and factors the matrices of a discretisation."""

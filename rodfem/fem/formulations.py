@@ -12,9 +12,8 @@ from rodfem.errors import InputError
 from rodfem.forms import lagrangian
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
-from rodfem.problem.functions import LETTERS, SIDES, needs_centreline
+from rodfem.problem.functions import LETTERS, PLACES, SIDES, needs_centreline
 from rodfem.problem.quaternions import of_vector, product
-from rodfem.problem.validation import PLACES
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations

@@ -37,12 +37,12 @@ from rodfem.fem.state import LOAD, NodalValues
 from rodfem.forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.linalg.matrices import times
 from rodfem.problem.contribution import Motion
-from rodfem.problem.scene import Scene
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
     from rodfem.fem.state import Line, State
     from rodfem.fem.system import System
+    from rodfem.problem.scene import Scene
 
 SYMMETRIC_STATE = 1e-4
 """A generator smaller than this (in the metric) is zero: the state has the symmetry itself.

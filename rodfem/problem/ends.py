@@ -137,7 +137,15 @@ class End(Contribution):
     @property
     def dead(self) -> bool:
         """Whether dead forces are all that acts on the position where it is free."""
-        return self.energy is None
+        return self.energy is None and not self.guiding()
+
+    def guiding(self) -> list[Direction | None]:
+        """Forces of a guide, each along its direction in space, None for one that turns."""
+        return []
+
+    def distances(self, at: Site) -> list[Any]:
+        """Distances from the guide, which these forces keep at zero."""
+        return []
 
     def torque(self, kind: Load) -> Load:
         """Return a ``kind`` of moment as it acts here: about the axis of a hinge it has the potential ``-T angle``."""
@@ -157,18 +165,24 @@ class End(Contribution):
         return (axis / (np.linalg.norm(axis) or 1.0)).tolist()
 
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
-        """Moments of a moving clamp or a hinge."""
+        """Moments of a moving clamp or a hinge, and forces of a guide."""
         directions = self._stiff(normal)
         motion = Motion.MIXED if len(directions) == 2 else Motion.VECTOR
         words = f"moment at the {SIDES[number]} end"
         group = Group(f"m{LETTERS[number]}", words, "rotation of an end, direction {}", motion, moment=True)
-        return [Unknown(group, i, direction) for i, direction in enumerate(directions)]
+        words = f"force of the guide at the {SIDES[number]} end"
+        guide = Group(f"f{LETTERS[number]}", words, "guide of an end, direction {}", Motion.MIXED)
+        moments = [Unknown(group, i, direction) for i, direction in enumerate(directions)]
+        return moments + [Unknown(guide, i, direction) for i, direction in enumerate(self.guiding())]
 
     def lagrangian(self, at: Site) -> Iterator[Any]:
-        """Loads, and the misalignment of a moving clamp or a hinge with its moments."""
+        """Loads, the misalignment of a moving clamp or a hinge, and distances from a guide, with their multipliers."""
         yield from super().lagrangian(at)
-        for moment, direction in zip(at.y, self._stiff(at.normal), strict=False):
+        directions = self._stiff(at.normal)
+        for moment, direction in zip(at.y, directions, strict=False):
             yield moment * ufl.dot(loads.misalignment(at.x.q, self.frame(at.c)), ufl.as_vector(direction))
+        for force, distance in zip(at.y[len(directions) :], self.distances(at), strict=True):
+            yield force * distance
 
     def _stiff(self, normal: int | None) -> list[Direction]:
         """Directions about which moments, as unknowns, keep the end from turning; in a plane the normal or none."""
@@ -341,30 +355,16 @@ class SlidingHinge(End):
         """Directions across the guide, (2, 3)."""
         return np.array(across(self.guide))
 
-    @property
-    def dead(self) -> bool:
-        """Whether there is no force of the guide, nor an energy."""
-        return super().dead and not self._guiding()
-
-    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
-        """Moments of the hinge, and forces of the guide."""
-        words = f"force of the guide at the {SIDES[number]} end"
-        group = Group(f"f{LETTERS[number]}", words, "guide of an end, direction {}", Motion.MIXED)
-        forces = [Unknown(group, i, direction) for i, direction in enumerate(self._guiding())]
-        return super().unknowns(number, normal, centreline) + forces
-
-    def lagrangian(self, at: Site) -> Iterator[Any]:
-        """Terms of the hinge, and the distance from the guide with its forces."""
-        yield from super().lagrangian(at)
-        guiding, point = self._guiding(), super().held(at.c)
-        for force, direction in zip(at.y[len(at.y) - len(guiding) :], guiding, strict=True):
-            yield force * sum(d * (at.x.r[i] - point[i]) for i, d in enumerate(direction) if d)
-
-    def _guiding(self) -> list[Direction]:
+    def guiding(self) -> list[Direction | None]:
         """Unit vectors across the direction, among the components that move."""
         moving = np.flatnonzero(self.guide)
         vectors = np.array(across(tuple(self.guide[i] for i in moving))).reshape(-1, len(moving))
         return [tuple(map(float, row)) for row in vectors @ np.eye(3)[moving]]
+
+    def distances(self, at: Site) -> list[Any]:
+        """Distances along these vectors."""
+        apart = [r - p for r, p in zip((at.x.r[i] for i in range(3)), super().held(at.c), strict=True)]
+        return [sum(d * x for d, x in zip(v, apart, strict=True) if d) for v in self.guiding() if v]
 
     def check(self, side: str, scene: Scene) -> None:
         """Check the direction and the point, and what is checked of every end; raises :class:`SceneError`."""
@@ -386,22 +386,14 @@ class CircularGuide(End):
         """Position of the end: None in the plane of the circle."""
         return [p if i == self.normal else None for i, p in enumerate(super().held(c))]
 
-    @property
-    def dead(self) -> bool:
-        """No: the circle pushes."""
-        return False
+    def guiding(self) -> list[Direction | None]:
+        """One force, towards the centre."""
+        return [None]
 
-    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
-        """Force of the circle, towards its centre."""
-        words = f"force of the guide at the {SIDES[number]} end"
-        group = Group(f"f{LETTERS[number]}", words, "guide of an end, direction {}", Motion.MIXED)
-        return [Unknown(group, 0)]
-
-    def lagrangian(self, at: Site) -> Iterator[Any]:
-        """Loads, and the distance from the circle, to first order, with its force."""
-        yield from super().lagrangian(at)
-        centre, plane = End.held(self, at.c), [i for i in range(3) if i != self.normal]
-        yield at.y[-1] * (sum((at.x.r[i] - centre[i]) ** 2 for i in plane) - self.radius**2) / (2 * self.radius)
+    def distances(self, at: Site) -> list[Any]:
+        """Distance from the circle, to first order."""
+        centre, plane = super().held(at.c), [i for i in range(3) if i != self.normal]
+        return [(sum((at.x.r[i] - centre[i]) ** 2 for i in plane) - self.radius**2) / (2 * self.radius)]
 
     def check(self, side: str, scene: Scene) -> None:
         """Check that the circle is in the plane of a planar rod, and what is checked of every end."""

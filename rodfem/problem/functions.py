@@ -33,6 +33,7 @@ Place = SimpleNamespace
 Quaternion = tuple[float, float, float, float]
 Given: TypeAlias = Any  # a function of the constants ``c``, or a constant in the place of one; None if there is none
 SIDES, LETTERS = ("left", "right"), "ab"  # the two ends in words, and in names of unknowns
+PLACES = 1001  # arclengths at which a start is evaluated
 LOG_OF_UFL = getLogger("UFL")
 UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
 MEANINGS = {

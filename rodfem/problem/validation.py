@@ -12,7 +12,7 @@ import numpy as np
 
 from rodfem.errors import SceneError
 from rodfem.problem.arguments import number_of
-from rodfem.problem.functions import SIDES, STATES, asked_for, asks_where, floats, functions_of_places
+from rodfem.problem.functions import PLACES, SIDES, STATES, asked_for, asks_where, floats, functions_of_places
 from rodfem.problem.trials import check_functions, check_plane, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
 
@@ -24,7 +24,6 @@ FLEXIBLE = "choose a kind of rod without the stiff strains"
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
 NEXT = 1e-6  # least distance of two places, over the length: an element between them loses as many digits
-PLACES = 1001  # arclengths at which a start is evaluated
 TURNED = 0.3  # angle, in radian, between neighbours that may be a jump
 
 
