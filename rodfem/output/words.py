@@ -80,9 +80,9 @@ def mesh_in_words(d: Data) -> str:
 
 
 def eigenvalue_in_words(mu: complex, error: float) -> str:
-    """An eigenvalue with the bound of its error, once; with eight digits where that is not known."""
+    """An eigenvalue with the bound of its error, once; with ten digits where that is not known."""
     if not isfinite(error):
-        return f"{mu.real:.8g}" + (f" {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.8g} i" if mu.imag else "")
+        return f"{mu.real:.10g}" + (f" {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.10g} i" if mu.imag else "")
     (real, bar), (imaginary, other) = (number(x, error).split(" ", 1) for x in (mu.real, abs(mu.imag)))
     if not mu.imag:
         return f"{real} {bar}"
