@@ -89,7 +89,7 @@ def sentences(parser: Parser) -> Iterator[None]:
         yield
     except (InputError, SetupError, ConvergenceError) as trouble:
         complain(parser.in_options(str(trouble)))
-    except PETSc.Error as trouble:
+    except (PETSc.Error, MemoryError) as trouble:
         complain(in_words(trouble))
 
 

@@ -59,17 +59,13 @@ def main(words: Sequence[str]) -> None:
     start_petsc(petsc)
     earlier = _written(options.output)
 
-    def kept() -> str:
-        done = _written(options.output) != earlier
-        return f"the branches that were finished are in {options.output}" if done else "no branch was finished"
-
     try:
         with sentences(parser):
             _run(statement, options, petsc, parser.in_options)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {kept()}") from None
-    except MemoryError:
-        complain(f"Memory is exhausted: use fewer elements or a lower degree; {kept()}.")
+        done = _written(options.output) != earlier
+        kept = f"the branches that were finished are in {options.output}" if done else "no branch was finished"
+        raise KeyboardInterrupt(f"interrupted; {kept}") from None
 
 
 def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:

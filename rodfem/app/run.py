@@ -275,9 +275,10 @@ def draw(output: Path, report: Report) -> None:
     from rodfem.output.plot_diagram import draw_diagram
     from rodfem.output.plot_frequencies import draw_frequencies
     from rodfem.output.render import draw_shape_safely
+    from rodfem.output.words import is_sweep
 
     data = load_json(output / "diagram.json")
-    if any("omega2" in branch["columns"] for branch in data["branches"]):
+    if is_sweep(data):
         draw_frequencies(data, output / "diagram.png")
         report.say(f"Picture in {output}{os.sep}: diagram.png")
         return

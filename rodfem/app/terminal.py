@@ -235,10 +235,9 @@ class Report(Observer):
             own = "drag" if scene.inertia.order == 1 else "inertia"
             inertia = f"the scene's {own}" if scene.has_inertia else "unit rotary inertia"
             self.say(f"\nLeft-most {scene.inertia.words} for {inertia} (symmetry modes left out; no error bars)")
-        wide = max((len(kind) for _, kind, _ in rows), default=0)
         for name, kind, point in rows:
             values = "  ".join(f"{mu:.6g}" for mu in point.spectrum)
-            self.say(f"  {name:<12} {kind:<{wide}} {point.load:<13.8g} {values}")
+            self.say(f"  {name:<12} {kind:<14} {point.load:<13.8g} {values}")
 
     def frequencies(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the square roots of the left-most eigenvalues, or rates, at about ten loads, if the scene has them."""
