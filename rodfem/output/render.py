@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, and the share of the height above the caption
+FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 SHINE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
 TILT = np.radians(20.0)  # by which a picture is seen from above
@@ -64,6 +65,8 @@ def draw_shape(
     :class:`ImportError` without PyVista, and :class:`RuntimeError` where the picture comes out blank.
     """
     path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise ValueError(f"picture {path} has an unknown format: expected one of {FORMATS}, try shape.png")
     state = _read(Path(states), branch, row)
     look = Look(radius or thickness(state.centres), state.view() if view is None else view)
     pyvista = _import_pyvista()
