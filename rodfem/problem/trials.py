@@ -168,8 +168,14 @@ class _Trial:
             if self.of_place:
                 self.expressions(state)  # what it raises is no matter of the state
             for there in self._constants(state):
-                numbers = self._numbers(there, state)
-                c, expressions = self.expressions(state) if numbers else (there, [])
+                try:
+                    numbers = self._called(there, state)
+                except SceneError:
+                    if self.of_place:  # it may be undefined: the rod need not take the state
+                        continue
+                    raise
+                self._check(numbers)
+                c, expressions = self.expressions(state)
                 for name, symbol in vars(c).items():
                     if isinstance(symbol, Symbol):
                         symbol.value = vars(there)[name]
@@ -184,17 +190,6 @@ class _Trial:
             yield from (scene.constants(load, s) for load in scene.loads())
         if self.role.along and not self.of_place:
             yield from (scene.constants(s=place) for place in scene.samples())
-
-    def _numbers(self, there: Constants, state: int) -> list[Any]:
-        """Numbers that the function returns; none if it is undefined: the rod need not take the state."""
-        try:
-            values = self._called(there, state)
-        except SceneError:
-            if self.of_place:
-                return []
-            raise
-        self._check(values)
-        return values
 
     def _called(self, c: Constants, state: int, wrap: Callable[[Any], Any] | None = None) -> list[Any]:
         """Components of what the function returns for constants and a state, whose vectors pass through ``wrap``."""
