@@ -425,14 +425,14 @@ TABLE = {
     },
     "rodfem/fem/form_compiler.py": {
         "constants-of-what-is-not-derived": (
-            "derived = differentiated(form)", "derived = form", "fem/test_form_constants.py"),
+            "derived = differentiated(form)", "derived = form", "fem/test_compat.py"),
     },
     "rodfem/fem/invariance.py": {
         "what-closes-a-ring-has-no-part": ("    table -= across @ (across.T @ table)\n", "", HARD),
         "stiff-strains-hide-bending": ("INVARIANT = 1e-12", "INVARIANT = 1e-9", "fem/test_symmetries.py"),
-        "a-stiff-twist-hides-a-load": ("zero = 1e-10", "zero = 1e-4", "fem/test_near_symmetries.py"),
+        "a-stiff-twist-hides-a-load": ("zero = 1e-10", "zero = 1e-4", "fem/test_symmetries.py"),
         "weak-springs-are-round-off": (
-            "    if not found or equations.loads is None:", "    if True:", "fem/test_near_symmetries.py"),
+            "    if not found or equations.loads is None:", "    if True:", "fem/test_symmetries.py"),
     },
     "rodfem/fem/known.py": {
         "rows-of-a-table-in-an-element-do-not-count": (
@@ -456,9 +456,9 @@ TABLE = {
         "free-rod-drifts-without-a-moment": (
             "uniform(-0.3, 0.3, (len", "uniform(-0.0, 0.0, (len", "literature/test_free_rods.py"),
         "a-ring-nearly-breaks-its-motion-along-itself": (
-            "_jumps(state), 1e-5", "_jumps(state), 1e-3", "fem/test_near_symmetries.py"),
+            "_jumps(state), 1e-5", "_jumps(state), 1e-3", "fem/test_symmetries.py"),
         "a-bent-rod-breaks-a-symmetry": (
-            "SYMMETRIC_STATE = 1e-4", "SYMMETRIC_STATE = 1e-6", "fem/test_near_symmetries.py"),
+            "SYMMETRIC_STATE = 1e-4", "SYMMETRIC_STATE = 1e-6", "fem/test_symmetries.py"),
     },
     "rodfem/linalg/chain.c": {
         "scales-start-from-one": (
