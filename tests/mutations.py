@@ -122,7 +122,6 @@ TABLE = {
         "every-crossing-of-loci-is-a-gap": (
             "                return False\n        return True\n",
             "                return False\n        return False\n", LOCI),
-        "closed-locus-goes-round-again": ("< 0.1 * (b.s - a.s)", "< 1e-4 * (b.s - a.s)", LOCI),
         "bar-of-a-locus-without-what-is-left": (
             "[bound(*pair, self.rho)", "[bound(*pair, 0.0)", "codim2/test_places.py"),
     },
@@ -147,7 +146,8 @@ TABLE = {
         "cusps-hide-in-a-step": ("pairwise([a, *self._parts(a, b), b])", "pairwise([a, b])", LOCI),
         "the-end-of-a-fold-has-no-bar": (
             "np.maximum(abs(node.p - a.p), abs(node.p - b.p)) + a.located_to", "a.located_to", LOCI),
-        "a-gap-of-loci-is-a-crossing-for-sure": (", or turns back within {GAP:g} of the bounds from one", "", LOCI),
+        "a-gap-of-loci-is-a-crossing-for-sure": (
+            ", or turns back within {GAP:g} of the bounds from one", "", "codim2/test_places.py"),
     },
     "rodfem/continuation/arc.py": {
         "events-where-the-sign-changes-from-row-to-row-alone": (
@@ -242,7 +242,8 @@ TABLE = {
         "the-sign-of-round-off-along-a-locus": (
             "self.inertia.move(-self.inertia.tolerance)", "pass", "codim2/test_locus.py"),
         "states-drift-along-null-vectors": (
-            "constant = -at.Z.T @ at.b[:, 0]", "constant = -0.0 * at.Z.T @ at.b[:, 0]", LOCI),
+            "constant = -at.Z.T @ at.b[:, 0]", "constant = -0.0 * at.Z.T @ at.b[:, 0]",
+            "continuation/test_unfolding.py"),
     },
     "rodfem/continuation/singular_points.py": {
         "loads-felt-by-their-unit": (

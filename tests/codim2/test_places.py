@@ -128,3 +128,4 @@ def test_fold_that_ends_on_a_branch_point() -> None:
     diagram = trace(model, Discretization("auto", 4, 3), Plan(depth=1))
     found = diagram.locus(diagram.special(FOLD)[0], "b", (-0.3, 0.1), (-0.3, 0.3))
     check(found, "the fold ends on a branch point", (0.0, -1 / 6))
+    assert any("or turns back within 1e-05 of the bounds from one" in why for why in found.ended)
