@@ -64,6 +64,7 @@ _HOMES = {
         "continuation.branch": "Branch Point SpecialPoint",
         "app.many": "family many",
         "app.design": "design Design",
+        "app.identify": "identify Identified",
         "modes.modes": "Modes load_modes",
         "errors": "InputError SceneError ConvergenceError SetupError",
         "output.files": "load_json",

@@ -4,6 +4,8 @@ __version__: str
 
 from rodfem.app.design import Design as Design
 from rodfem.app.design import design as design
+from rodfem.app.identify import Identified as Identified
+from rodfem.app.identify import identify as identify
 from rodfem.app.many import family as family
 from rodfem.app.many import many as many
 from rodfem.app.run import run as run

@@ -1,4 +1,4 @@
-"""Design: constants, and fields along the rod, that make a rod carry most.
+"""Design: fields along a rod for which it carries most.
 
 The first critical loads of a rod are found once, and again near by as its numbers change
 (:mod:`rodfem.codim2.neighbours`).  The *first loss* is the least of them, which has a kink where two meet: what is best
@@ -14,40 +14,34 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
-from rodfem.codim2.neighbours import Neighbours, gradient
-from rodfem.continuation.branch import SpecialPoint
-from rodfem.continuation.kinds import FOLD
+from rodfem.codim2.neighbours import Neighbours, gradient, losses
 from rodfem.diagram.diagram import MESH, PLAN, Diagram, trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import SCENE
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
-from rodfem.problem.arguments import checked, whole
+from rodfem.problem.arguments import checked
 from rodfem.problem.field import Field, names, with_fields
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import unit
 
 FIRST_LOSS = "first loss"
-ROUNDS = 6
-"""Times that an optimiser begins, at most, with the loads that are first where it ended."""
-MOVES = 20
-"""Times that it goes on from where it is, at most."""
+LOADS, ROUNDS, MOVES = 3, 6, 20
+"""Critical loads that take part, times that an optimiser begins with those that are first, and that it goes on."""
 SAME = 1e-6
-"""Part of the first loss by which that of the diagram may be less."""
-ENDED = 1e-9  # change of the aim, over its size, at which the optimiser ends
-SLOPE = 1e-5  # step of the differences of a person's function of the loads, over their size
+"""Part of an aim by which two are the same."""
 Loads = Callable[[np.ndarray], float]
 
 
 @dataclass(frozen=True, repr=False)
 class Design:
-    """A rod that is best: its ``scene``, the numbers of each of its fields and constants, and the first ``loads``.
+    """A rod that is best: its ``scene``, the ``numbers`` of each of its ``fields``, and the first ``loads``, in order.
 
     ``diagram`` is that of the scene, with error bars, which says that it loses its stability there.  ``reached`` says
     whether the optimiser ended by itself, ``message`` how.
@@ -69,18 +63,18 @@ class Design:
     def along(self, name: str, s: Sequence[float] | np.ndarray) -> np.ndarray:
         """A field at arclengths (m,)."""
         t = (np.asarray(s, dtype=float) - self.scene.interval[0]) / self.scene.length
-        return self.fields[name].at(self.numbers[name], t)
+        return np.asarray(self.fields[name].table(t) @ self.numbers[name])
 
     def __repr__(self) -> str:
+        """Load and how it was reached."""
         return f"<Design: first loss at {self.load:.8g}, {self.message}>"
 
 
-@checked(scene=SCENE, plan=PLAN, discretization=MESH, loads=whole(3, 1))
+@checked(scene=SCENE, plan=PLAN, discretization=MESH)
 def design(
     scene: Scene,
     fields: Mapping[str, Field],
     maximise: str | Loads = FIRST_LOSS,
-    loads: int = 3,
     plan: Plan | None = None,
     discretization: Discretization | None = None,
 ) -> Design:
@@ -89,76 +83,65 @@ def design(
     ``fields`` are :class:`~rodfem.Field` by the name of the constant, as in ``{"A": Field(9, bounds=(0.1, 3.0),
     mean=1.0)}``: numbers along the rod with bounds, and a mean, where a volume is given.  ``maximise`` is the "first
     loss", or a function of the first critical loads (k,), in order, as ``lambda P: -(P[0] - 5.0) ** 2`` for a rod that
-    buckles at 5.  So many ``loads`` of the first branch, at which its index grows, take part; the range of the scene,
-    or of the ``plan``, has them.  By default the ``discretization`` has two elements for each number.  Raises
+    buckles at 5.  Three loads take part at which the index of the first branch grows, or as many as there are in the
+    range of the scene, or of the ``plan``.  By default the ``discretization`` has two elements for each number.  Raises
     :class:`~rodfem.errors.InputError` for what is no constant, or no critical load in the range, and
     :class:`~rodfem.errors.ConvergenceError` where the loads are lost on the way.
     """
     _check(fields, maximise)
-    mesh = discretization or Discretization(elements=max([8, *(2 * len(f.breaks) + 2 for f in fields.values())]))
-    search = _Search(with_fields(scene, fields), fields, maximise)
-    plan, first = replace(plan or Plan(depth=0), error_bars=False), -np.inf
+    mesh = discretization or Discretization(elements=max(8, *(2 * field.pieces for field in fields.values())))
+    search, reached = _Search(with_fields(scene, fields), dict(fields), maximise), -np.inf
+    plan = plan or Plan(depth=0)
     for _ in range(ROUNDS):
-        rod = search.rod()
-        points = losses(trace(rod, mesh, plan), loads)
+        points = losses(trace(search.rod, mesh, replace(plan, error_bars=False))[0], LOADS)
         if not points:
             low, high = plan.over(scene)
             raise InputError(f"The first branch loses no stability from {low:g} to {high:g}: give a wider range.")
-        now = search.value(np.array([special.point.load for special in points]))
-        if now >= first - SAME * unit(first, one=1.0) and np.isfinite(first):
+        if search.aim(np.array([special.point.load for special in points])) >= reached - SAME * abs(reached) > -np.inf:
             break
-        first = search.run(Neighbours(points))
-    diagram = trace(rod, mesh, replace(plan, error_bars=True))
-    final = np.array([special.point.load for special in losses(diagram, loads) for _ in special.null_vectors])
-    own = {name: np.array([rod.parameters[n].value for n in names(name, f)]) for name, f in fields.items()}
-    return Design(rod, dict(fields), own, final, diagram, search.reached, search.message)
+        reached = search.run(Neighbours(points))
+    return search.answer(trace(search.rod, mesh, replace(plan, error_bars=True)))
 
 
 def _check(fields: Mapping[str, Field], maximise: str | Loads) -> None:
+    """Raise :class:`InputError` for another aim, and for what are no fields."""
     if maximise != FIRST_LOSS and not callable(maximise):
         raise InputError(f"maximise is {maximise!r}: give 'first loss', or a function of the first critical loads.")
     if not fields or not all(isinstance(field, Field) for field in fields.values()):
         raise InputError(f"fields is {fields!r}: give them by name, as in fields={{'A': Field(9, mean=1.0)}}.")
 
 
-def losses(diagram: Diagram, number: int) -> list[SpecialPoint]:
-    """First special points of the first branch at which its index grows, up to the first fold."""
-    found = list[SpecialPoint]()
-    for special in diagram[0].special:
-        if special.kind.singular and special.negative_after > special.negative_before:
-            found.append(special)
-            if special.kind == FOLD:
-                break
-    return found[:number]
-
-
 class _Search:
     """Numbers of the fields of a scene, and how an optimiser changes them."""
 
-    def __init__(self, scene: Scene, fields: Mapping[str, Field], maximise: str | Loads) -> None:
-        self.scene, self.maximise, self.reached, self.message = scene, maximise, False, ""
-        self.names = [n for name, field in fields.items() for n in names(name, field)]
+    def __init__(self, scene: Scene, fields: dict[str, Field], maximise: str | Loads) -> None:
+        self.scene, self.fields, self.reached, self.message = scene, fields, False, ""
+        self.bound = maximise == FIRST_LOSS
+        self.aim: Loads = (lambda loads: float(loads.min())) if self.bound else maximise  # type: ignore[assignment]
+        own = [names(name, field) for name, field in fields.items()]
+        self.names = [*chain(*own)]
         self.numbers = np.array([scene.parameters[n].value for n in self.names])
-        self.bounds = [field.bounds for field in fields.values() for _ in field.groups]
-        ends = np.cumsum([0, *(len(field.groups) for field in fields.values())])
-        self.volumes = [
-            (field, slice(*pair)) for field, pair in zip(fields.values(), pairwise(ends.tolist()), strict=True)
-        ]
+        self.limits = np.repeat([field.bounds for field in fields.values()], [*map(len, own)], axis=0)
+        ends = np.cumsum([0, *map(len, own)]).tolist()
+        self.own = [slice(*pair) for pair in pairwise(ends)]
 
+    @property
     def rod(self) -> Scene:
         """The scene with these numbers."""
         return self.scene.varying(**dict(zip(self.names, self.numbers.tolist(), strict=True)))
 
-    def value(self, loads: np.ndarray) -> float:
-        """What is made largest."""
-        return float(loads.min() if self.maximise == FIRST_LOSS else self.maximise(np.sort(loads)))  # type: ignore[operator]
+    def answer(self, diagram: Diagram) -> Design:
+        """The best rod, with its ``diagram``."""
+        loads = [special.point.load for special in losses(diagram[0], LOADS) for _ in special.null_vectors]
+        numbers = {name: self.numbers[own] for name, own in zip(self.fields, self.own, strict=True)}
+        return Design(diagram.scene, self.fields, numbers, np.sort(loads), diagram, self.reached, self.message)
 
     def run(self, near: Neighbours) -> float:
-        """Improve the numbers, with critical loads ``near`` those of the rod; the value that is reached.
+        """Improve the numbers, with critical loads ``near`` those of the rod; the aim that is reached.
 
         They move by a share of themselves at a time, which is halved if the loads are lost.
         """
-        share, value = 0.5, self.value(self._loads(near, self.numbers)[0])
+        share, value = 0.5, self.aim(self._loads(near, self.numbers)[0])
         for _ in range(MOVES):
             before = value
             try:
@@ -166,7 +149,7 @@ class _Search:
             except ConvergenceError as trouble:
                 self.reached, self.message, share = False, str(trouble), share / 2
                 continue
-            if value - before <= SAME * unit(before, one=1.0):
+            if value - before <= SAME * unit(before, one=SAME):
                 break
         return value
 
@@ -175,41 +158,41 @@ class _Search:
         from scipy.optimize import minimize
 
         n, begin = len(self.names), self._loads(near, self.numbers)[0]
-        size, extra = float(abs(begin).max()), int(self.maximise == FIRST_LOSS)
+        size, extra = float(abs(begin).max()), int(self.bound)
         room = share * np.maximum(abs(self.numbers), abs(self.numbers).mean())
-        low, high = (np.clip(self.numbers + side * room, *np.transpose(self.bounds)) for side in (-1, 1))
+        low, high = (np.clip(self.numbers + side * room, *self.limits.T) for side in (-1, 1))
         answer = minimize(
-            partial(self._aim, near, size),
+            partial(self._least, near, size),
             np.append(self.numbers, [begin.min() / size] * extra),
             jac=True,
             method="SLSQP",
             bounds=[*zip(low, high, strict=True), *[(None, None)] * extra],
-            constraints=[*self._volumes(), *([self._bound(near, size)] if extra else [])],
-            options={"maxiter": 200, "ftol": ENDED},
+            constraints=[*self._means(), *([self._bounded(near, size)] if extra else [])],
+            options={"maxiter": 200, "ftol": SAME**1.5},
         )
         self.numbers, self.reached, self.message = answer.x[:n], bool(answer.success), str(answer.message)
-        return self.value(self._loads(near, self.numbers)[0])
+        return self.aim(self._loads(near, self.numbers)[0])
 
     def _loads(self, near: Neighbours, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Critical loads (k,), and their derivatives (k, n)."""
+        """Critical loads (k,) in order, and their derivatives (k, n)."""
 
         def make() -> tuple[np.ndarray, np.ndarray]:
-            found = near.at(dict(zip(self.names, numbers.tolist(), strict=True)))
+            found = sorted(near.at(dict(zip(self.names, numbers.tolist(), strict=True))), key=lambda each: each.load)
             return np.array([x.load for x in found]), np.array([gradient(x, self.names) for x in found])
 
         return derived(near, numbers.tobytes(), make)
 
-    def _aim(self, near: Neighbours, size: float, z: np.ndarray) -> tuple[float, np.ndarray]:
+    def _least(self, near: Neighbours, size: float, z: np.ndarray) -> tuple[float, np.ndarray]:
         """What is made least, and its derivatives: minus the bound ``t``, or minus a person's function of the loads."""
         n = len(self.names)
-        if len(z) > n:
+        if self.bound:
             return -float(z[n]), -np.eye(n + 1)[n]
         loads, slopes = self._loads(near, z)
-        steps = SLOPE * size * np.eye(len(loads))
-        parts = [(self.value(loads + step) - self.value(loads - step)) / (2 * step.max()) for step in steps]
-        return -self.value(loads), -np.array(parts) @ slopes
+        steps = SAME * size * np.eye(len(loads))
+        parts = [(self.aim(loads + step) - self.aim(loads - step)) / (2 * step.max()) for step in steps]
+        return -self.aim(loads), -np.array(parts) @ slopes
 
-    def _bound(self, near: Neighbours, size: float) -> dict[str, Any]:
+    def _bounded(self, near: Neighbours, size: float) -> dict[str, Any]:
         """Each load is ``t`` at least."""
         n = len(self.names)
 
@@ -219,20 +202,16 @@ class _Search:
 
         return {"type": "ineq", "fun": lambda z: self._loads(near, z[:n])[0] / size - z[n], "jac": slopes}
 
-    def _volumes(self) -> list[dict[str, Any]]:
-        """Means of the fields."""
+    def _means(self) -> list[dict[str, Any]]:
+        """Means of the fields that are given."""
+
+        def value(field: Field, own: slice, z: np.ndarray) -> float:
+            return field.volume(z[own])[0] - (field.mean or 0.0)
 
         def slopes(field: Field, own: slice, z: np.ndarray) -> np.ndarray:
             row = np.zeros(len(z))
             row[own] = field.volume(z[own])[1]
             return row
 
-        return [
-            {
-                "type": "eq",
-                "fun": lambda z, field=field, own=own: field.volume(z[own])[0] - field.mean,
-                "jac": partial(slopes, field, own),
-            }
-            for field, own in self.volumes
-            if field.mean is not None
-        ]
+        given = [pair for pair in zip(self.fields.values(), self.own, strict=True) if pair[0].mean is not None]
+        return [{"type": "eq", "fun": partial(value, *pair), "jac": partial(slopes, *pair)} for pair in given]

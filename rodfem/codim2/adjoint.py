@@ -19,10 +19,12 @@ there of the density ``dlam/dp(s)``.  What acts at points, as a load at an end, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.criteria import IMPERFECT
+from rodfem.codim2.criteria import IMPERFECT, kept
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.singular import SHARP, SingularSystem
 from rodfem.errors import ConvergenceError
@@ -45,21 +47,23 @@ class Adjoint:
         """Take the null vectors at ``x``, a solution of ``states``."""
         self.solver, self.system, self.x, self.fold = solver, solver.system, x, states.fold
         self.values = dict(zip(self.system.scene.parameters, self.system.line.origin.tolist(), strict=True))
-        null, y = states.adjoint(x)
-        self.null, self.y = null, y
+        self.null, self.y = states.adjoint(x)
         matrix = solver.inertia.at(x).matrix
         # rounding errors, independent, a hundred times, or all that is zero
-        self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * solver.inertia.scale for v in null]  # round-off
-        rates = self._work(self.system.scene.load)
+        self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * solver.inertia.scale for v in self.null]  # round-off
+        self._normalise(self._work(self.system.scene.load))
+
+    def _normalise(self, rates: np.ndarray) -> None:
+        """Take null vectors by which ``R``, the ``rates`` (k, k), has plus or minus one on its diagonal."""
         values, turn = (rates[0], np.ones((1, 1))) if self.fold else np.linalg.eigh(rates)
         if not abs(values).min() > TINY:
             raise ConvergenceError("the load does not change the eigenvalue that vanishes")
         self.signs = np.sign(values)
-        turn = turn / (abs(values) if self.fold else np.sqrt(abs(values)))
-        self.null = [combine(null, column) for column in turn.T]
-        if y:
-            flat = [vector for row in y for vector in row]
-            self.y = [[combine(flat, np.outer(a, b).ravel()) for b in turn.T] for a in turn.T]
+        turn = (turn / (abs(values) if self.fold else np.sqrt(abs(values)))).T
+        flat = [vector for row in self.y for vector in row]
+        self.null = [combine(self.null, column) for column in turn]
+        if flat:
+            self.y = [[combine(flat, np.outer(a, b).ravel()) for b in turn] for a in turn]
 
     def splitting(self, parameter: str) -> np.ndarray:
         """Matrix of splitting for a ``parameter``; raises :class:`ConvergenceError` for an imperfection."""
@@ -135,3 +139,24 @@ class Adjoint:
             h = 1.0 / self.system.norm(v)
             out += sum(sign * weight / h * product(self.x + v * (place * h), v) for place, weight in DIFFERENCES)
         return out
+
+
+# --- of a state
+
+
+def state_derivative(
+    solver: BranchSolver, x: PETSc.Vec, parameter: str, of: Callable[[PETSc.Vec], np.ndarray]
+) -> np.ndarray:
+    """Derivative of numbers ``of`` an equilibrium in a parameter, at its load: along the change of state, a tangent."""
+    system = solver.system
+    scene, there, load = system.scene, x.copy(), system.scalar(x)
+    at = {**dict(zip(scene.parameters, system.line.origin.tolist(), strict=True)), scene.load: load}
+    with kept(system):
+        system.set_load(there, at[parameter])
+        system.line = line(scene, {**at, parameter: 0.0}, {parameter: 1.0})
+        tangent = solver.load_tangent(there, increasing=True)
+        slope = system.scalar(tangent)
+        if not slope > TINY:
+            raise ConvergenceError(f"The state at {scene.load} = {load:.8g} is singular, and has no derivative.")
+        parts = [weight / slope * of(there + tangent * place) for place, weight in DIFFERENCES]
+    return np.asarray(sum(parts))

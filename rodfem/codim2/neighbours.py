@@ -6,15 +6,16 @@ method instead of a diagram.  All modes are in the border, so that loads may mee
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Mapping, Sequence
+from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.codim2.adjoint import Adjoint
 from rodfem.codim2.criteria import kept
-from rodfem.continuation.branch import SpecialPoint
+from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.singular import SingularSystem
 from rodfem.errors import ConvergenceError
@@ -24,6 +25,24 @@ from rodfem.tolerances import SAME_SPECIAL, unit
 PARTS = (1, 2, 4, 8)
 """Numbers of parts into which a change of the constants is divided, in turn."""
 PARALLEL = 0.9  # cosine of two null vectors of one special point
+Values = Mapping[str, float]
+
+
+def in_parts(solve: Callable[[Any, Values], Any], known: Any, values: tuple[Values, Values]) -> Any:
+    """Go from a ``known`` solution to other ``values`` of constants, in as few parts as it takes, and solve at each.
+
+    Raises :class:`ConvergenceError` if the most parts are too few.
+    """
+    begin, end = values
+    for parts in PARTS:
+        try:
+            found = known
+            for part in range(1, parts + 1):
+                found = solve(found, {name: x + (end[name] - x) * part / parts for name, x in begin.items()})
+            return found
+        except ConvergenceError as error:
+            trouble = error
+    raise ConvergenceError(f"A solution is lost on the way to other constants: {trouble}") from trouble
 
 
 class Neighbours:
@@ -32,43 +51,38 @@ class Neighbours:
     def __init__(self, specials: Sequence[SpecialPoint]) -> None:
         self.solver = specials[0].point.own_solver
         self.system = self.solver.system
-        self.values = {name: p.value for name, p in self.system.scene.parameters.items()}
+        self.values: Values = {name: p.value for name, p in self.system.scene.parameters.items()}
         self._folds = [special.kind == FOLD for special in specials]
         self._known = [(special.point.x, list(special.null_vectors)) for special in specials]
 
     def at(self, values: Mapping[str, float]) -> list[Adjoint]:
         """Each special point at these ``values`` of constants; raises :class:`ConvergenceError` if one is lost."""
-        begin, end = self.values, {**self.values, **values}
-        for parts in PARTS:
-            known = self._known
-            try:
-                with kept(self.system):
-                    for part in range(1, parts + 1):
-                        there = {name: begin[name] + (end[name] - begin[name]) * part / parts for name in begin}
-                        found = self._solved(known, there)
-                        known = [(each.x, each.null) for each in found]
-            except ConvergenceError:
-                continue
-            self._known, self.values = known, end
-            return found
-        raise ConvergenceError("A special point is not found again with other constants.")
+        end = {**self.values, **values}
+        with kept(self.system):
+            found: list[Adjoint] = in_parts(self._solved, self._known, (self.values, end))
+        self._known, self.values = [(each.x, each.null) for each in found], end
+        return found
 
-    def _solved(self, known: Sequence[tuple[PETSc.Vec, list[PETSc.Vec]]], values: Mapping[str, float]) -> list[Adjoint]:
-        """The special points from ``known`` ones near by."""
+    def _solved(self, near: Sequence[Adjoint | tuple[PETSc.Vec, list[PETSc.Vec]]], values: Values) -> list[Adjoint]:
+        """The special points from those ``near`` them."""
+        known = [(each.x, each.null) if isinstance(each, Adjoint) else each for each in near]
         scene = self.system.scene
         self.system.line = line(scene, {**values, scene.load: 0.0}, {scene.load: 1.0})
-        found = list[Adjoint]()
-        for i, ((x, null), fold) in enumerate(zip(known, self._folds, strict=True)):
-            others = [] if fold else [v for j, (_, vectors) in enumerate(known) if j != i for v in vectors]
-            states = SingularSystem(self.solver, [*null, *others], len(null), fold=fold)
-            there = states.solve(x)
-            if there is None:
-                raise ConvergenceError("Newton's method does not converge")
-            found.append(Adjoint(self.solver, there.x, states))
+        found = [self._one(known, number) for number in range(len(known))]
         for a, b in pairwise(sorted(found, key=lambda each: each.load)):
             if abs(a.load - b.load) < SAME_SPECIAL * unit(a.load, one=self.solver.units.load) and self._alike(a, b):
-                raise ConvergenceError("Two special points have become one")
+                raise ConvergenceError("two special points have become one")
         return found
+
+    def _one(self, known: Sequence[tuple[PETSc.Vec, list[PETSc.Vec]]], number: int) -> Adjoint:
+        """Special point of a ``number``, with the null vectors of the others in the border."""
+        (x, null), fold = known[number], self._folds[number]
+        others = chain(*(vectors for j, (_, vectors) in enumerate(known) if j != number))
+        states = SingularSystem(self.solver, [*null, *([] if fold else others)], len(null), fold=fold)
+        there = states.solve(x)
+        if there is None:
+            raise ConvergenceError("Newton's method does not converge")
+        return Adjoint(self.solver, there.x, states)
 
     def _alike(self, a: Adjoint, b: Adjoint) -> bool:
         """Whether two special points have a null vector in common."""
@@ -79,3 +93,10 @@ class Neighbours:
 def gradient(found: Adjoint, names: Sequence[str]) -> np.ndarray:
     """Derivatives of the mean load of a special point in constants."""
     return np.array([np.trace(found.splitting(name)) / len(found.null) for name in names])
+
+
+def losses(branch: Branch, number: int) -> list[SpecialPoint]:
+    """First special points of a branch at which its index grows, a ``number`` of them at most, up to the first fold."""
+    found = [x for x in branch.special if x.kind.singular and x.negative_after > x.negative_before]
+    last = next((i for i, x in enumerate(found) if x.kind == FOLD), number)
+    return found[: min(last + 1, number)]

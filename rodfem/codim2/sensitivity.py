@@ -14,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
-from rodfem.codim2.adjoint import DIFFERENCES, Adjoint
+from rodfem.codim2.adjoint import Adjoint, state_derivative
 from rodfem.codim2.criteria import Plane, kept
 from rodfem.codim2.follow import Curve, RicherMesh, check_special
 from rodfem.continuation.branch import Point, SpecialPoint
@@ -23,11 +23,10 @@ from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.singular import SingularSystem
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.shape import halved
-from rodfem.fem.state import line
 from rodfem.output.words import number
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import TINY, unit
+from rodfem.tolerances import unit
 
 PIECES = 4
 """Pieces of each element on which a density is known."""
@@ -191,32 +190,11 @@ def ordinate_derivative(point: Point, parameter: str) -> Derivative:
         x, outcome = richer.solver.at_load(richer.transfer(point.x, state=True), point.load)
         if not outcome.converged:
             return float("inf"), float("nan")
-        again = _of_ordinate(richer.solver, x, parameter)
-        return bound(value, again, ROUNDED * abs(value), halved(solver.system.fields.discretization.degree)), float(
-            "nan"
-        )
+        again, rho = _of_ordinate(richer.solver, x, parameter), halved(solver.system.fields.discretization.degree)
+        return bound(value, again, ROUNDED * abs(value), rho), float("nan")
 
     return Derivative(value, bounds)
 
 
-def response(solver: BranchSolver, x: PETSc.Vec, parameter: str) -> PETSc.Vec:
-    """Change of an equilibrium with a parameter at its load, with a one in the place of the load."""
-    system, there = solver.system, x.copy()
-    scene, load = system.scene, system.scalar(x)
-    system.set_load(there, scene.parameters[parameter].value)
-    system.line = line(scene, {scene.load: load, parameter: 0.0}, {parameter: 1.0})
-    tangent = solver.load_tangent(there, increasing=True)
-    slope = system.scalar(tangent)
-    if not slope > TINY:
-        raise ConvergenceError(f"The state at {scene.load} = {load:.8g} is singular: its ordinate has no derivative.")
-    return tangent * (1.0 / slope)
-
-
 def _of_ordinate(solver: BranchSolver, x: PETSc.Vec, parameter: str) -> float:
-    """Derivative of the ordinate along the change of state: the ordinate is a number by itself."""
-    with kept(solver.system):
-        change, there = response(solver, x, parameter), x.copy()
-        solver.system.set_load(there, solver.system.scene.parameters[parameter].value)
-        h = 1.0 / max(solver.system.norm(change), 1.0 / unit(solver.system.scalar(there), one=1.0))
-        parts = [weight / h * solver.shape.ordinate(there + change * (place * h)) for place, weight in DIFFERENCES]
-    return float(sum(parts))
+    return float(state_derivative(solver, x, parameter, lambda y: np.array([solver.shape.ordinate(y)]))[0])

@@ -21,9 +21,8 @@ from rodfem.problem.arguments import a, convert, interval, optional, real, whole
 from rodfem.problem.functions import Role, changes
 from rodfem.problem.scene import Parameter, Scene
 
-LINEAR, CONSTANT, SINES = "linear", "constant", "sines"
 POINTS = 8  # of a rule for means, on each piece
-KINDS = (LINEAR, CONSTANT, SINES)
+KINDS = LINEAR, CONSTANT, SINES = "linear", "constant", "sines"
 """Values at equal distances with lines in between, values of equal parts, and a mean with amplitudes of sines."""
 
 
@@ -46,57 +45,47 @@ class Field:
 
     def __post_init__(self) -> None:
         """Raise :class:`InputError` for another kind."""
-        convert(
-            self,
-            numbers=whole(9, 2),
-            kind=a(str, f"one of {', '.join(KINDS)}"),
-            bounds=interval(0.1, 3.0, real),
-            mean=optional(real(1.0)),
-            power=real(0.5),
-            symmetric=yes_or_no,
-        )
+        word = a(str, f"one of {', '.join(KINDS)}")
+        convert(self, numbers=whole(9, 2), kind=word, bounds=interval(0.1, 3.0, real))
+        convert(self, mean=optional(real(1.0)), power=real(0.5), symmetric=yes_or_no)
         if self.kind not in KINDS:
             raise InputError(f"A field has the kind {self.kind!r}: choose one of {', '.join(KINDS)}.")
 
     @property
-    def breaks(self) -> np.ndarray:
-        """Places inside the rod, in parts of its length, at which the field has a corner or a jump."""
-        pieces = {LINEAR: self.numbers - 1, CONSTANT: self.numbers, SINES: 1}[self.kind]
-        return np.arange(1, pieces) / pieces
+    def pieces(self) -> int:
+        """Equal parts of the rod on which the field is smooth."""
+        return {LINEAR: self.numbers - 1, CONSTANT: self.numbers, SINES: 1}[self.kind]
 
-    @property
-    def groups(self) -> list[list[int]]:
-        """Functions that share a number."""
+    def functions(self, t: Any) -> list[Any]:
+        """What each number multiplies at the part ``t`` of the rod, in UFL or as a number."""
         n = self.numbers
-        if not self.symmetric:
-            return [[i] for i in range(n)]
         if self.kind == SINES:
-            return [[i] for i in range(n) if not i or i % 2]
-        return [sorted({i, n - 1 - i}) for i in range((n + 1) // 2)]
+            waves = [(sin if isinstance(t, Real) else ufl.sin)(i * pi * t) for i in range(1, n)]
+            return [1.0, *(waves[::2] if self.symmetric else waves)]
+        each = [self._local(i, t) for i in range(n)]
+        pairs = [each[i] + each[-1 - i] for i in range(n // 2)]
+        return [*pairs, *each[n // 2 : n - n // 2]] if self.symmetric else each
 
-    def function(self, i: int, t: Any) -> Any:
-        """Function number ``i`` at the part ``t`` of the rod, in UFL or as a number."""
-        known = isinstance(t, Real)
-        if self.kind == SINES:
-            return (sin if known else ufl.sin)(i * pi * t) if i else 1.0
+    def _local(self, i: int, t: Any) -> Any:
+        """What the value number ``i`` multiplies."""
+        n, known = self.numbers, isinstance(t, Real)
         if self.kind == LINEAR:
-            return (max if known else ufl.max_value)(0.0, 1.0 - abs((self.numbers - 1) * t - i))
+            return (max if known else ufl.max_value)(0.0, 1.0 - abs((n - 1) * t - i))
         if known:
-            return float(min(int(self.numbers * t), self.numbers - 1) == i)
-        return ufl.conditional(ufl.lt(abs(self.numbers * t - i - 0.5), 0.5), 1.0, 0.0)
+            return float(min(int(n * t), n - 1) == i)
+        return ufl.conditional(ufl.lt(abs(n * t - i - 0.5), 0.5), 1.0, 0.0)
+
+    def table(self, t: np.ndarray) -> np.ndarray:
+        """The same at parts ``t`` (m,) of the rod, (m, numbers): times the numbers it is the field."""
+        return np.array([self.functions(float(x)) for x in t])
 
     @cached_property
     def _rule(self) -> tuple[np.ndarray, np.ndarray]:
-        """Functions at the points of Gauss's rule on pieces of the rod (m, numbers), and weights (m,)."""
-        ends = np.linspace(0.0, 1.0, (self.numbers - 1 if self.kind == LINEAR else self.numbers) + 1)
-        x, w = np.polynomial.legendre.leggauss(POINTS)
-        half, middle = np.diff(ends) / 2, (ends[1:] + ends[:-1]) / 2
-        t = (middle[:, None] + half[:, None] * x).ravel()
-        return self._table(t), (half[:, None] * w).ravel()
-
-    def _table(self, t: np.ndarray) -> np.ndarray:
-        """What each number multiplies at parts ``t`` (m,) of the rod."""
-        return np.array([[sum(self.function(i, float(x)) for i in group) for group in self.groups] for x in t])
+        """Functions at the points of Gauss's rule on pieces of the rod, and weights."""
+        pieces = max(self.pieces, self.numbers)
+        x, w = np.polynomial.legendre.leggauss(POINTS * (pieces // self.pieces))
+        t = (np.arange(self.pieces)[:, None] + (1.0 + x) / 2.0) / self.pieces
+        return self.table(t.ravel()), np.tile(w / 2.0 / self.pieces, self.pieces)
 
     def volume(self, numbers: np.ndarray) -> tuple[float, np.ndarray]:
         """Mean along the rod of the field, or of its ``power``, and its derivatives in the numbers."""
@@ -104,32 +93,28 @@ class Field:
         values = table @ numbers
         return float(weights @ values**self.power), self.power * (weights * values ** (self.power - 1)) @ table
 
-    def uniform(self, value: float) -> np.ndarray:
-        """Numbers of a field that is the same all along."""
-        return np.where([self.kind != SINES or not group[0] for group in self.groups], value, 0.0)
-
-    def at(self, numbers: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """The field at parts ``t`` (m,) of the rod."""
-        return np.asarray(self._table(t) @ numbers)
+    def parameters(self, name: str, constant: Parameter) -> dict[str, Parameter]:
+        """Numbers of a uniform field in the place of a ``constant``, which has the mean if one is given."""
+        value = constant.value if self.mean is None else self.mean ** (1.0 / self.power)
+        waves, admissible = self.kind == SINES, (-inf, inf) if self.kind == SINES else constant.admissible
+        each = enumerate(names(name, self))
+        return {n: Parameter(0.0 if i and waves else value, admissible=admissible) for i, n in each}
 
 
 def names(constant: str, field: Field) -> list[str]:
     """Names of the numbers of a field."""
-    return [f"{constant}_{i}" for i in range(len(field.groups))]
+    return [f"{constant}_{i}" for i in range(len(field.functions(0.5)))]
 
 
 def with_fields(scene: Scene, fields: Mapping[str, Field]) -> Scene:
     """The scene with ``fields`` in the place of constants, which begin uniform; points keep the constant."""
     parameters, breaks = dict(scene.parameters), {*scene.breaks}
     for name, field in fields.items():
-        if name not in parameters or name == scene.load:
-            known = ", ".join(other for other in parameters if other != scene.load)
+        if name not in scene.parameters or name == scene.load:
+            known = ", ".join(other for other in scene.parameters if other != scene.load)
             raise InputError(f"{name!r} is no constant that could vary along the rod: choose one of {known}.")
-        value = parameters[name].value if field.mean is None else field.mean ** (1.0 / field.power)
-        begin = field.uniform(value)
-        inner = parameters[name].admissible if field.kind != SINES else (-inf, inf)
-        parameters |= {n: Parameter(float(x), admissible=inner) for n, x in zip(names(name, field), begin, strict=True)}
-        breaks |= {scene.interval[0] + float(t) * scene.length for t in field.breaks}
+        parameters |= field.parameters(name, parameters[name])
+        breaks |= {scene.interval[0] + i / field.pieces * scene.length for i in range(1, field.pieces)}
 
     def visit(words: str, function: Callable[..., Any], role: Role) -> Callable[..., Any]:
         if not (role.along or role.call == "W(v, k, c)") or not callable(function):
@@ -150,12 +135,6 @@ class _Varying:
         c, scene, fields = self._given
         if name not in fields:
             return getattr(c, name)
-        field, t = fields[name], (c.s - scene.interval[0]) / scene.length
-        parts = (sum(field.function(i, t) for i in group) for group in field.groups)
-        own = [(n, part) for n, part in zip(names(name, field), parts, strict=True) if not is_zero(part)]
-        return sum(getattr(c, n) * part for n, part in own)
-
-
-def is_zero(part: Any) -> bool:
-    """Whether a number, or an expression of UFL, is zero by itself."""
-    return isinstance(part, Real) and part == 0.0
+        parts = fields[name].functions((c.s - scene.interval[0]) / scene.length)
+        pairs = zip(names(name, fields[name]), parts, strict=True)
+        return sum(getattr(c, n) * part for n, part in pairs if not (isinstance(part, Real) and part == 0.0))

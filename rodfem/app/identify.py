@@ -1,0 +1,241 @@
+"""Identification: constants and fields of a rod from what was measured of it.
+
+Least squares by Gauss and Newton's method within a trust region (scipy), with the derivatives of critical loads and of
+states; these are found again near by as the unknowns ``p`` change.  With the Jacobian ``J`` of the residuals ``f``,
+each over the standard deviation of its datum, the covariance of ``p`` is ``(J^t J)^-1``, times ``f . f / (m - n)`` if
+the deviations are not known (m data, n unknowns).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.codim2.adjoint import state_derivative
+from rodfem.codim2.criteria import kept
+from rodfem.codim2.neighbours import Neighbours, Values, gradient, in_parts, losses
+from rodfem.continuation.branch import Point
+from rodfem.diagram.diagram import MESH, trace
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import SCENE, Solver
+from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.fields import Discretization
+from rodfem.fem.state import line
+from rodfem.output.words import number
+from rodfem.problem.arguments import checked
+from rodfem.problem.field import Field, names, with_fields
+from rodfem.problem.scene import Scene
+
+CRITICAL, ORDINATE, SHAPE = "critical loads", "ordinate", "shape"
+"""What may be measured: see :func:`identify`."""
+WIDTHS = {CRITICAL: 1, ORDINATE: 2, SHAPE: 5}
+"""Numbers in a row of each."""
+BLIND = 1e-9
+"""Least singular value of the Jacobian, of columns of size one, over the largest: less is not determined."""
+Rows = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, repr=False)
+class Identified:
+    """Constants of a rod by what was measured, with standard ``errors`` and their ``covariance``, in the same order.
+
+    ``scene`` has them, ``residuals`` (m,) are model minus data, and ``points`` the equilibria at the loads of the data,
+    with their index.
+    """
+
+    scene: Scene
+    values: dict[str, float]
+    errors: dict[str, float]
+    covariance: np.ndarray
+    residuals: np.ndarray
+    points: list[Point]
+
+    def __repr__(self) -> str:
+        """Each constant with its standard error."""
+        each = ", ".join(f"{name} = {number(value, self.errors[name])}" for name, value in self.values.items())
+        return f"<Identified: {each}>"
+
+
+@checked(scene=SCENE, discretization=MESH)
+def identify(
+    scene: Scene,
+    data: Mapping[str, Any],
+    unknown: Sequence[str] | Mapping[str, Field],
+    deviations: Mapping[str, float] | None = None,
+    discretization: Discretization | None = None,
+) -> Identified:
+    """Constants of a ``scene``, or fields in their place, for which it fits what was measured best.
+
+    ``data`` has at least one of ``"critical loads"``: those at which the index of the first branch grows, in their
+    order; ``"ordinate"``: rows of load and ordinate; ``"shape"``: rows of load, arclength and position.  States are
+    followed from the first load of the data on, without jumps, on the mesh of the ``discretization``.  ``unknown`` are
+    names of constants, whose values are the first guess, or :class:`~rodfem.Field` by name.  ``deviations`` are
+    standard deviations of the data by kind; if they are not given those of one kind are alike, and of several relative
+    to their largest datum.  Raises :class:`~rodfem.errors.InputError` for data and names that make no sense, and
+    :class:`~rodfem.errors.ConvergenceError` for what the data do not determine.
+    """
+    tables = _tables(data, deviations)
+    model = _Model(*_unknowns(scene, unknown), tables, discretization or Discretization())
+    sizes = {kind: float(abs(table[:, -1]).max()) if len(tables) > 1 else 1.0 for kind, table in tables.items()}
+    weights = np.repeat([(deviations or sizes)[kind] for kind in tables], [*map(model.count, tables)])
+    return _fitted(model, weights, known=bool(deviations))
+
+
+def _unknowns(scene: Scene, unknown: Sequence[str] | Mapping[str, Field]) -> tuple[Scene, list[str]]:
+    """The scene with fields, if there are any, and names of its unknown constants; raises :class:`InputError`."""
+    fields = dict(unknown) if isinstance(unknown, Mapping) else {}
+    rod, chosen = with_fields(scene, fields), [n for name, field in fields.items() for n in names(name, field)]
+    chosen = chosen or list(unknown)
+    for name in chosen:
+        if name not in rod.parameters or name == rod.load:
+            raise InputError(f"{name!r} is no constant of the scene apart from its load: choose another unknown.")
+    return rod, chosen
+
+
+def _fitted(model: _Model, weights: np.ndarray, *, known: bool) -> Identified:
+    """Least squares of the residuals over their ``weights`` (m,), which are their deviations if these are ``known``."""
+    from scipy.optimize import least_squares
+
+    rod, chosen, exact = model.scene, model.chosen, float(np.finfo(float).eps) ** 0.8
+    answer = least_squares(
+        lambda p: model.at(p)[0] / weights,
+        [rod.parameters[n].value for n in chosen],
+        lambda p: model.at(p)[1] / weights[:, None],
+        bounds=tuple(np.transpose([rod.parameters[n].admissible for n in chosen])),
+        x_scale="jac",
+        **dict.fromkeys(("xtol", "ftol", "gtol"), exact),
+    )
+    covariance, free = _covariance(answer.jac, chosen), len(weights) - len(chosen)
+    if not known:
+        covariance = covariance * (2 * answer.cost / free if free else np.nan)
+    found = dict(zip(chosen, answer.x.tolist(), strict=True))
+    errors = dict(zip(chosen, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    return Identified(rod.varying(**found), found, errors, covariance, answer.fun * weights, model.points(found))
+
+
+def _tables(data: Mapping[str, Any], deviations: Mapping[str, float] | None) -> dict[str, np.ndarray]:
+    """Data as tables of rows; raises :class:`InputError`."""
+    out = {}
+    for kind, rows in data.items():
+        if kind not in WIDTHS:
+            raise InputError(f"Data of the kind {kind!r} are not known: choose one of {', '.join(WIDTHS)}.")
+        try:
+            out[kind] = np.array(rows, dtype=float).reshape(-1, WIDTHS[kind])
+        except (TypeError, ValueError):
+            out[kind] = np.zeros((0, 0))
+        if not (out[kind].size and np.isfinite(out[kind]).all()):
+            raise InputError(f"Data of the {kind} are no table: give rows of {WIDTHS[kind]} finite numbers each.")
+        if deviations is not None and not deviations.get(kind, 0.0) > 0.0:
+            raise InputError(f"deviations has none for the {kind}: give a positive one for each kind of data, or none.")
+    if not out:
+        raise InputError("There are no data: give some, as in {'critical loads': [9.87]}.")
+    return out
+
+
+def _covariance(J: np.ndarray, chosen: Sequence[str]) -> np.ndarray:
+    """``(J^t J)^-1``; raises :class:`ConvergenceError` for unknowns that the data do not determine."""
+    size = np.linalg.norm(J, axis=0)
+    _, s, rows = np.linalg.svd(J / np.where(size, size, 1.0), full_matrices=True)
+    if len(s) < len(chosen) or s[-1] <= BLIND * s[0]:
+        name = chosen[int(abs(rows[-1]).argmax())]
+        raise ConvergenceError(f"The data do not determine {name}: give more of them, or fewer unknowns.")
+    inverse = np.linalg.inv((J / size).T @ (J / size))
+    return np.asarray(inverse / np.outer(size, size))
+
+
+class _Model:
+    """Residuals of the data of a scene, and their derivatives in the ``chosen`` constants."""
+
+    def __init__(self, scene: Scene, chosen: list[str], tables: dict[str, np.ndarray], mesh: Discretization) -> None:
+        self.scene, self.tables, self.chosen, self.mesh = scene, tables, chosen, mesh
+        self.solver, self._values = Solver(scene, mesh), {name: p.value for name, p in scene.parameters.items()}
+        loads = sorted({float(row[0]) for kind in (ORDINATE, SHAPE) for row in tables.get(kind, ())})
+        ascending = scene.span[0] <= scene.span[1]
+        self._states, self._last = dict[float, PETSc.Vec](), dict[bytes, Rows]()
+        point = None
+        for load in loads if ascending else loads[::-1]:
+            point = self.solver.equilibrium(load, point)
+            self._states[load] = point.x
+        self._critical = None
+        if wanted := len(tables.get(CRITICAL, ())):
+            found = losses(trace(scene, mesh, Plan(depth=0, error_bars=False))[0], wanted)
+            if len(found) < wanted:
+                raise InputError(f"The first branch has {len(found)} critical loads, not {wanted}: give a wider range.")
+            self._critical = Neighbours(found)
+
+    def count(self, kind: str) -> int:
+        """Number of residuals of a kind."""
+        return len(self.tables[kind]) * (3 if kind == SHAPE else 1)
+
+    def at(self, p: np.ndarray) -> Rows:
+        """Residuals (m,) and their derivatives (m, n); not finite where the rod is lost."""
+        key = np.asarray(p).tobytes()
+        if key not in self._last:
+            try:
+                self._last[key] = self._rows(dict(zip(self.chosen, p.tolist(), strict=True)))
+            except ConvergenceError:
+                m = sum(map(self.count, self.tables))
+                self._last[key] = np.full(m, np.inf), np.zeros((m, len(p)))
+        return self._last[key]
+
+    def _rows(self, values: Values) -> Rows:
+        own, equilibria = {**self._values, **values}, self.solver.equilibria
+        with kept(equilibria.system):
+            self._states = in_parts(self._moved, self._states, (self._values, own))
+            self._values = own
+            parts = [getattr(self, OF[kind])(table) for kind, table in self.tables.items()]
+        return np.concatenate([f for f, _ in parts]), np.concatenate([J for _, J in parts])
+
+    def _moved(self, states: Mapping[float, PETSc.Vec], values: Values) -> dict[float, PETSc.Vec]:
+        """States at their loads with other constants."""
+        equilibria, out = self.solver.equilibria, {}
+        equilibria.system.line = line(self.scene, {**values, self.scene.load: 0.0}, {self.scene.load: 1.0})
+        for load, x in states.items():
+            out[load], outcome = equilibria.at_load(x, load)
+            if not outcome.converged:
+                raise ConvergenceError(f"No equilibrium was found at {self.scene.load} = {load:g}.")
+        return out
+
+    def _loads(self, table: np.ndarray) -> Rows:
+        assert self._critical is not None
+        found = sorted(self._critical.at({n: self._values[n] for n in self.chosen}), key=lambda each: each.load)
+        return np.array([x.load for x in found]) - table[:, 0], np.array([gradient(x, self.chosen) for x in found])
+
+    def _ordinates(self, table: np.ndarray) -> Rows:
+        shape = self.solver.equilibria.shape
+        rows = [self._of(load, lambda x: np.array([shape.ordinate(x)])) for load in table[:, 0].tolist()]
+        return np.concatenate([f for f, _ in rows]) - table[:, 1], np.concatenate([J for _, J in rows])
+
+    def _shapes(self, table: np.ndarray) -> Rows:
+        shape, system = self.solver.equilibria.shape, self.solver.equilibria.system
+        f, J = np.empty((len(table), 3)), np.empty((len(table), 3, len(self.chosen)))
+        for load in self._states:
+            here = np.flatnonzero(table[:, 0] == load)
+            weights = [(s, shape.weights(s)) for s in table[here, 1].tolist()]
+
+            def places(x: PETSc.Vec, weights: list[Any] = weights) -> np.ndarray:
+                return np.array([shape.place(system.at(x), *each)[0] for each in weights]).ravel()
+
+            if len(here):
+                of, slopes = self._of(load, places)
+                f[here], J[here] = of.reshape(-1, 3) - table[here, 2:], slopes.reshape(len(here), 3, -1)
+        return f.ravel(), J.reshape(f.size, -1)
+
+    def _of(self, load: float, of: Callable[[PETSc.Vec], np.ndarray]) -> Rows:
+        """Numbers of a state, and their derivatives."""
+        x = self._states[load]
+        slopes = [state_derivative(self.solver.equilibria, x, name, of) for name in self.chosen]
+        return of(x), np.transpose(slopes)
+
+    def points(self, found: Values) -> list[Point]:
+        """Equilibria of the rod that was found, with their index."""
+        solver = self.solver.rebind(**found)
+        return [solver.equilibrium(load, x) for load, x in self._states.items()]
+
+
+OF = {CRITICAL: "_loads", ORDINATE: "_ordinates", SHAPE: "_shapes"}
+"""Methods that compare a model with each kind of data."""

@@ -1,0 +1,90 @@
+"""Constants from what was measured, of closed forms with and without noise."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+import rodfem
+from rodfem import Field, Ordinate, Parameter, Scene, clamped, free
+from rodfem.errors import ConvergenceError, InputError
+from rodfem.forms.energy import bending_and_twist
+
+
+def arc() -> Scene:
+    """A strip with a natural curvature K in its plane, bent by a couple M and pushed across by a force F."""
+    return Scene(
+        name="arc",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist((k[0] - c.K, k[1], k[2]), (c.B, 1.0, 1.0)),
+        parameters={"M": Parameter(0.0), "B": Parameter(1.0), "K": Parameter(0.0), "F": Parameter(0.0)},
+        load="M",
+        ends=(clamped(), free(force=lambda c: (0.0, c.F, 0.0), moment=lambda c: (c.M, 0.0, 0.0))),
+        ordinate=Ordinate("deflection", s=1.0, of=lambda r, q: r[1]),
+        span=(0.0, 3.0),
+        planar="e1",
+    )
+
+
+def deflection(k: np.ndarray) -> np.ndarray:
+    """Of the end of a circle of curvature k."""
+    return -(1 - np.cos(k)) / k
+
+
+def test_stiffness_and_natural_curvature_from_a_curve() -> None:
+    """k = M / B + K: exact data give B and K, and noise of 1e-3 errors of Gauss's theory, from the closed form."""
+    M, B, K = np.linspace(0.2, 2.6, 7), 2.0, 0.4
+    exact = deflection(M / B + K)
+    found = rodfem.identify(arc(), {"ordinate": np.column_stack([M, exact])}, ("B", "K"))
+    assert [found.values["B"], found.values["K"]] == pytest.approx([B, K], abs=1e-8)
+    assert [point.index for point in found.points] == [0] * len(M)
+
+    noisy = exact + 1e-3 * np.random.default_rng(3).standard_normal(len(M))
+    again = rodfem.identify(arc(), {"ordinate": np.column_stack([M, noisy])}, ("B", "K"), {"ordinate": 1e-3})
+    h = 1e-5
+    slopes = np.column_stack(
+        [
+            (deflection(M / (B + h) + K) - deflection(M / (B - h) + K)) / (2 * h),
+            (deflection(M / B + K + h) - deflection(M / B + K - h)) / (2 * h),
+        ]
+    )
+    sigma = 1e-3 * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    assert [again.errors["B"], again.errors["K"]] == pytest.approx(sigma, rel=0.05)
+    assert abs(again.values["B"] - B) < 3 * sigma[0] and abs(again.values["K"] - K) < 3 * sigma[1]
+
+
+def test_natural_curvature_for_a_wanted_shape() -> None:
+    """Straight under a force across its end: the natural curvature is minus the moment, F (1 - s) / B, and stable."""
+    s = np.linspace(0.1, 1.0, 10)
+    straight = np.column_stack([0 * s, s, 0 * s, 0 * s, s])
+    found = rodfem.identify(arc().varying(F=0.8), {"shape": straight}, {"K": Field(5)})
+    signed = np.array(list(found.values.values())) * np.sign(found.values["K_0"])
+    assert signed == pytest.approx(0.8 * np.linspace(1.0, 0.0, 5), abs=1e-6)
+    assert [point.index for point in found.points] == [0]
+
+
+def test_from_critical_loads_and_what_is_not_determined() -> None:
+    column = Scene(
+        name="column",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (c.A, c.B, 1.0)),
+        parameters={"P": Parameter(0.0), "A": Parameter(1.0), "B": Parameter(1.5), "F": Parameter(0.0)},
+        load="P",
+        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        span=(0.0, 6.0),
+    )
+    found = rodfem.identify(column, {"critical loads": [0.3 * pi**2, 0.45 * pi**2]}, ("A", "B"))
+    assert found.values == pytest.approx({"A": 1.2, "B": 1.8})
+    with pytest.raises(ConvergenceError, match="do not determine B"):
+        rodfem.identify(column, {"critical loads": [0.3 * pi**2]}, ("A", "B"))
+    with pytest.raises(InputError, match="choose one of critical loads, ordinate, shape"):
+        rodfem.identify(column, {"loads": [1.0]}, ("A",))
+    with pytest.raises(InputError, match="give rows of 2 finite numbers"):
+        rodfem.identify(column, {"ordinate": [1.0, 2.0, 3.0]}, ("A",))
+    with pytest.raises(InputError, match="give a positive one for each kind"):
+        rodfem.identify(column, {"critical loads": [1.0]}, ("A",), {"shape": 0.1})
+    with pytest.raises(InputError, match="no constant of the scene"):
+        rodfem.identify(column, {"critical loads": [1.0]}, ("P",))
