@@ -25,7 +25,7 @@ from panels import draw, legend_of
 
 from rodfem.output.plot_diagram import draw_diagram
 from rodfem.output.plot_frequencies import draw_frequencies
-from rodfem.output.render import draw_shape, view_in
+from rodfem.output.render import draw_shape, read_state
 from rodfem.output.style import STYLE, axis_label
 
 HOME = Path(__file__).parents[1]
@@ -92,7 +92,7 @@ def shapes(states: Sequence[tuple[str, str, float]], path: Path) -> None:
     """Draw states of demos, each by its demo, branch and load, beside each other, as the last of its demo is seen."""
     pictures, rows = [], [row_of(*state) for state in states]
     views = {
-        name: view_in(RESULTS / name / "states.h5", branch, row)
+        name: read_state(RESULTS / name / "states.h5", branch, row).view()
         for (name, branch, _), row in zip(states, rows, strict=True)
     }
     panels = {name: PANELS.get(name, PANEL) if len(views) == 1 else FLAT for name in views}

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from rodfem.errors import InputError
 from rodfem.file_format import STATES
-from rodfem.output.glyphs import POINT, Glyph, Look, Solid, glyphs_of, sign_of, striped
+from rodfem.output.glyphs import POINT, Glyph, Look, Solid, between, glyphs_of, sign_of, striped
 from rodfem.output.states import curve_at
 from rodfem.output.style import DARK, FIRST, LOAD, ROD, SECOND, STRIPE
 from rodfem.problem.arguments import checked
@@ -67,16 +67,15 @@ def draw_shape(
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise ValueError(f"picture {path} has an unknown format: expected one of {FORMATS}, try shape.png")
-    state = _read(Path(states), branch, row)
+    state = read_state(Path(states), branch, row)
     look = Look(radius or thickness(state.centres), state.view() if view is None else view)
     pyvista = _import_pyvista()
     plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
     plotter.set_background("white")
     solids = state.solids(look)
-    for solid in solids:
+    for solid in (*solids, *state.arrows(look.radius)):
         surface = pyvista.PolyData.from_regular_faces(solid.points, solid.triangles)
         plotter.add_mesh(surface, color=solid.color, split_sharp_edges=True, feature_angle=40.0, **SHINE)
-    _add_directors(pyvista, plotter, state, look.radius)
     _look_at(plotter, np.concatenate([solid.points for solid in solids]), look, size[0] / size[1])
     plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", color=DARK, x_color=DARK, y_color=DARK, z_color=DARK)
     _write(plotter, state.caption if caption is None else caption, state.setting.notes, solids)
@@ -87,11 +86,6 @@ def draw_shape(
     if np.ptp(picture) == 0:
         raise RuntimeError(f"the picture {path} came out blank: {LIBRARIES}")
     return path
-
-
-def view_in(states: Path, branch: str, row: int) -> Floats:
-    """Axes (3, 3) of the picture of one state of a file, for those of others; raises as :func:`draw_shape` does."""
-    return _read(Path(states), branch, row).view()
 
 
 @dataclass(frozen=True)
@@ -115,8 +109,14 @@ class State:
         rods = striped((self.s, *pose), self.setting.section, look.radius, (ROD, STRIPE))
         return [*rods, *glyphs_of(self.setting, self.s, pose, look)]
 
+    def arrows(self, radius: float) -> list[Glyph]:
+        """The directors d1 and d2 at 25 places of a rod of this ``radius``."""
+        places = np.linspace(0, len(self.s) - 1, 27).round().astype(int)[1:-1]
+        ways = [(self.centres[i], self.directors[i, :, k], c) for i in places for k, c in ((0, FIRST), (1, SECOND))]
+        return [between("arrow", at, at + 4.5 * radius * way, 0.12 * radius, color) for at, way, color in ways]
 
-def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
+
+def read_state(states: Path, branch: str, row: int, count: int = 800) -> State:
     """Read a state of a file, interpolated at ``count`` places; raises ValueError where there is none."""
     unfit = f"cannot read {states} ({{}}): try the states.h5 of a scene"
     with STATES.opened(states, ("branches", "parameter", "scene"), unfit) as file:
@@ -146,16 +146,6 @@ def _import_pyvista() -> Any:
         advice = 'try pip install "rodfem[viz]"' if isinstance(error, ModuleNotFoundError) else LIBRARIES
         raise ImportError(f"pyvista cannot be loaded ({error}): {advice}") from error
     return pyvista
-
-
-def _add_directors(pyvista: Any, plotter: Any, state: State, radius: float) -> None:
-    stations = np.linspace(0, len(state.s) - 1, 27).round().astype(int)[1:-1]
-    arrow = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
-    for index, colour in ((0, FIRST), (1, SECOND)):
-        points = pyvista.PolyData(state.centres[stations])
-        points["director"] = state.directors[stations, :, index]
-        arrows = points.glyph(orient="director", scale=False, factor=4.5 * radius, geom=arrow)
-        plotter.add_mesh(arrows, color=colour, **SHINE)
 
 
 def _look_at(plotter: Any, points: Floats, look: Look, aspect: float) -> None:

@@ -321,7 +321,7 @@ def read(folder: Path) -> list[Callable[[], Any]]:
         lambda: rodfem.load_json(folder / "diagram.json"),
         lambda: rodfem.load(folder, euler),
         lambda: load_state(folder / "states.h5", *at, Solver(euler, MESH).equilibria),
-        lambda: render._read(folder / "states.h5", *at),
+        lambda: render.read_state(folder / "states.h5", *at),
         lambda: rodfem.load_modes(folder / "modes.h5", *modes),
         lambda: plot_modes.draw_modes(folder / "modes.h5", *modes, folder / "modes.png"),
         lambda: draw_locus([json.loads(locus.read_text())], folder / "locus.png"),

@@ -18,7 +18,7 @@ from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import SIDES, Look, glyphs_of, profile_of, turn
 from rodfem.output.pieces import typical_state
-from rodfem.output.render import _read, draw_shape_safely, view_of
+from rodfem.output.render import draw_shape_safely, read_state, view_of
 from rodfem.output.style import DARK, GREY, LOAD, STEEL
 from rodfem.problem.ends import End, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.problem.supports import foundation_of, supports_of, write, write_section
@@ -73,7 +73,7 @@ def saved(path: Path, scene: Scene, load: float = 4.0, **state: Any) -> Path:
 
 def colors(path: Path) -> set[str]:
     """Colours of what is drawn at the right end, beside the rod."""
-    state = _read(path, "straight", 0)
+    state = read_state(path, "straight", 0)
     return {x.color for x in state.solids(Look(0.01, state.view()))[2:] if x.points[:, 2].mean() > 0.5}
 
 
@@ -90,7 +90,7 @@ def test_constraints_are_named(folder: Path) -> None:
         integral(lambda x, c: x.k[2], lambda c: c.P),
         everywhere(lambda x, c: x.k[2], strain=True),
     )
-    state = _read(saved(folder / "states.h5", column(constraints=kept)), "straight", 0)
+    state = read_state(saved(folder / "states.h5", column(constraints=kept)), "straight", 0)
     assert state.setting.notes == ("constraint at s = 1", "integral constraint", "constraint all along the rod")
 
 
@@ -99,15 +99,15 @@ def test_foundation_is_a_row_of_springs(folder: Path) -> None:
     found = foundation_of(bed, STRAIGHT | {"load": 4.0})
     assert found is not None
     np.testing.assert_allclose(found[1], np.tile(np.diag([300.0, 300.0, 0.0]), (9, 1, 1)), atol=1e-3)
-    state = _read(saved(folder / "states.h5", bed), "straight", 0)
+    state = read_state(saved(folder / "states.h5", bed), "straight", 0)
     assert [x.color for x in state.solids(Look(0.01, state.view()))].count(STEEL) == 9
     blown = column(potential=lambda x, c: loads.pressure(x.r, x.dr, c.P))
-    state = _read(saved(folder / "states.h5", blown), "straight", 0)
+    state = read_state(saved(folder / "states.h5", blown), "straight", 0)
     assert state.setting.notes == ("load by a potential along the rod",)
 
 
 def test_what_slides_goes_along_with_a_motion_and_its_rails_stay(folder: Path) -> None:
-    state = _read(saved(folder / "states.h5", column(clamped(), ENDS["slide"])), "straight", 0)
+    state = read_state(saved(folder / "states.h5", column(clamped(), ENDS["slide"])), "straight", 0)
     moved = state.centres + 0.1 * np.outer(state.s, E3)
     here, there = (
         glyphs_of(state.setting, state.s, (r, state.directors), Look(0.01, np.eye(3)), state.centres)
@@ -249,7 +249,7 @@ def test_a_load_arrow_has_the_direction_of_the_load(folder: Path) -> None:
     """A follower force turns with the end: the arrow's head is where the director points."""
     half = sqrt(0.5)
     turned = {"q": np.tile([half, 0, half, 0], (31, 1)), "r": np.outer(S, E1)}  # d3 = e1
-    state = _read(saved(folder / "states.h5", column(clamped(), free(follower=push)), **turned), "straight", 0)
+    state = read_state(saved(folder / "states.h5", column(clamped(), free(follower=push)), **turned), "straight", 0)
     (arrow,) = [x for x in state.solids(Look(0.01, state.view())) if x.color == LOAD]
     head, tail = (arrow.points[arrow.points[:, 0].argsort()[[0, -1]]]) @ E1
     assert 1.0 < head < tail  # it pushes against the tip, from outside

@@ -29,7 +29,7 @@ from rodfem import (
 )
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import Look
-from rodfem.output.render import _read
+from rodfem.output.render import read_state
 from rodfem.output.style import STEEL
 
 E2 = (0.0, 1.0, 0.0)
@@ -124,7 +124,7 @@ def test_it_is_stored_and_drawn_as_what_it_is(folder: Path) -> None:
         np.testing.assert_allclose(end.attrs["guide"], INCLINED)
         np.testing.assert_allclose(end["force"][-1], -np.array(INCLINED))
         assert file["branches/straight/fb1"][-1] == pytest.approx(np.tan(TILT))
-    state = _read(folder / "states.h5", "straight", 0)
+    state = read_state(folder / "states.h5", "straight", 0)
     rails = [x.points for x in state.solids(Look(0.01, state.view())) if x.color == STEEL]
     assert len(rails) == 2
     for points in rails:
