@@ -6,7 +6,7 @@ without a potential the derivative is the slope of the tangent of their locus.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 
@@ -26,7 +26,7 @@ from rodfem.fem.shape import halved
 from rodfem.output.words import number
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import unit
+from rodfem.tolerances import TINY, unit
 
 PIECES = 4
 """Pieces of each element on which a density is known."""
@@ -87,6 +87,40 @@ def derivative(special: SpecialPoint, parameter: str, *, along_the_rod: bool = F
         along = adjoint.density(parameter, PIECES) if along_the_rod else ()
         found = Derivative(float(np.trace(splitting)) / len(splitting), splitting=splitting)
     return Derivative(found.value, partial(_bounds, special, parameter, found.value, along), splitting, *along)
+
+
+@dataclass(frozen=True, repr=False)
+class Tolerance:
+    """A critical ``load`` with its standard deviations by some constants, and a bound of the error of its ``mesh``."""
+
+    load: float
+    parts: dict[str, float]
+    mesh: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation by all constants, which vary independently."""
+        return float(np.linalg.norm([*self.parts.values()]))
+
+    def __str__(self) -> str:
+        """As ``12.3 +- 0.4 (stiffness), +- 0.1 (mesh)``, of what is more than the mesh's error."""
+        parts = {words: part for words, part in self.parts.items() if not part <= self.mesh}
+        parts |= {"mesh": self.mesh} if np.isfinite(self.mesh) else {}
+        largest = max([*parts.values(), abs(self.load) * ROUNDED, TINY])
+        said = ", ".join(f"+- {part:.2g} ({words})" for words, part in parts.items())
+        return f"{self.load:.{max(1 - int(np.floor(np.log10(largest))), 0)}f} {said}"
+
+    __repr__ = __str__
+
+
+def tolerance(special: SpecialPoint, deviations: Mapping[str, float]) -> Tolerance:
+    """Deviations of the load of a special point by those of constants, to first order: ``|dlam/dp|`` times them."""
+    known = special.point.own_solver.system.scene.parameters
+    if not all(deviation > 0.0 for deviation in deviations.values()):
+        raise InputError(f"deviations is {dict(deviations)}: give positive ones, as in {{'A': 0.02}}.")
+    slopes = {name: abs(derivative(special, name).value) for name in deviations}
+    parts = {known[name].words or name: deviations[name] * slope for name, slope in slopes.items()}
+    return Tolerance(special.point.load, parts, special.error_estimate)
 
 
 def check_parameter(scene: Scene, parameter: str) -> None:

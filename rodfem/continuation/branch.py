@@ -20,7 +20,7 @@ from rodfem.stability.soft_mode import STABLE, SoftMode, in_short, is_stable, st
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from rodfem.codim2.sensitivity import Derivative
+    from rodfem.codim2.sensitivity import Derivative, Tolerance
     from rodfem.continuation.branch_solver import BranchSolver
     from rodfem.fem.resultants import Profile, Reactions
     from rodfem.problem.events import Event, Level
@@ -297,6 +297,15 @@ class SpecialPoint:
         from rodfem.codim2.sensitivity import derivative
 
         return derivative(self, parameter, along_the_rod=along_the_rod)
+
+    def tolerance(self, deviations: Mapping[str, float]) -> Tolerance:
+        """Standard deviation of its load by those of constants, ``{"A": 0.02}``, to first order; and the mesh's error.
+
+        Raises :class:`~rodfem.errors.InputError` for one that is not positive, and what :meth:`derivative` does.
+        """
+        from rodfem.codim2.sensitivity import tolerance
+
+        return tolerance(self, deviations)
 
     @property
     def names(self) -> tuple[str, ...]:

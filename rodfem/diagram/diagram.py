@@ -39,7 +39,7 @@ from rodfem.modes.finder import typical_modes
 from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, origin, save_run
 from rodfem.output.table import REMARK
-from rodfem.problem.arguments import Check, a, checked, finite, interval, path, text, whole, yes_or_no
+from rodfem.problem.arguments import Check, a, checked, finite, interval, path, text, whole
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains, statement
@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rodfem.codim2.locus import Locus
-    from rodfem.codim2.sensitivity import Derivative
     from rodfem.output.render import Snapshot
     from rodfem.report.page import Page
 
@@ -208,15 +207,6 @@ class Diagram:
         doubtful = any(point.undecided for point in points[max(row - 1, 0) : row + 2])
         solver, bounds = self.solvers[special.point.mesh], ((low, high), interval)
         return locus(solver, special, parameter, bounds, steps or STEPS, doubtful=doubtful)
-
-    @checked(
-        special=a(SpecialPoint, "a special point, as in diagram.special('fold')[0]"),
-        parameter=text("A"),
-        along_the_rod=yes_or_no,
-    )
-    def derivative(self, special: SpecialPoint, parameter: str, *, along_the_rod: bool = False) -> Derivative:
-        """Derivative of the load of a special point in a ``parameter``: see :meth:`rodfem.SpecialPoint.derivative`."""
-        return special.derivative(parameter, along_the_rod=along_the_rod)
 
     @checked(load=finite(1.0), tries=whole(24, 0), seed=whole(0, 0))
     def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:
