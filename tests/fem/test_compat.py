@@ -173,16 +173,11 @@ def test_least_stretch_is_that_of_all_elements() -> None:
 def column(stiffness: float, weight: float) -> Scene:
     """Euler's column of that bending stiffness, whose dead load is ``weight`` times the parameter."""
     return Scene(
-        name="column",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: 0.5 * stiffness * (k[0] ** 2 + 2.6 * k[1] ** 2 + k[2] ** 2),
-        parameters={"P": 0.0},
-        load="P",
-        ends=(clamped(), free(lambda c: (0.0, 0.0, -weight * c.P))),
-        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        span=(0.0, 1.2 * stiffness / weight * pi**2 / 4),
-    )
+        "column", (0.0, 1.0), "unshearable and inextensible",
+        lambda v, k, c: 0.5 * stiffness * (k[0] ** 2 + 2.6 * k[1] ** 2 + k[2] ** 2), {"P": 0.0}, "P",
+        (clamped(), free(lambda c: (0.0, 0.0, -weight * c.P))), Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        (0.0, 1.2 * stiffness / weight * pi**2 / 4),
+    )  # fmt: skip
 
 
 @pytest.mark.long

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from math import cos, pi, sin
@@ -20,7 +21,6 @@ from rodfem import (
     Attachment,
     Discretization,
     Ordinate,
-    Parameter,
     Plan,
     Scene,
     Solver,
@@ -38,8 +38,16 @@ TIP = (0.15, 0.1, 0.9)
 FORCE = (0.4, -0.3, 0.2)
 
 
+MIDDLE = Ordinate("middle", s=0.5, of=lambda r, q: r[0])
+
+
 def turned(angle: Any) -> tuple[Any, ...]:
     return (ufl.cos(angle / 2), 0.0, ufl.sin(angle / 2), 0.0)
+
+
+def bowed(half: Callable[[Any], Any]) -> Callable[[np.ndarray], np.ndarray]:
+    """A start that is turned by twice an angle about e2."""
+    return lambda s: np.stack([np.cos(half(s)), 0 * s, np.sin(half(s)), 0 * s], axis=1)
 
 
 LEFT: dict[str, Any] = {
@@ -58,21 +66,13 @@ RIGHT: dict[str, Any] = {
 
 def rod(left: Any, right: Any, formulation: str = "auto") -> rodfem.Point:
     """The rod between two ends, pulled aside at 0.4, at the end of its range."""
-    scene = Scene(
-        "reactions",
-        (0.0, 1.0),
-        "flexible",
-        lambda v, k, c: (
+    scene = classics.column(
+        "reactions", (left, right), (0.0, 1.5), rod="flexible", ordinate=MIDDLE, start=bowed(lambda s: 0.25 * s),
+        energy=lambda v, k, c: (
             bending_and_twist(k, (1.0, 1.5, 0.8)) + 50.0 * (v[0] ** 2 + v[1] ** 2 + 2.0 * (v[2] - 1.0) ** 2)
         ),
-        {"P": Parameter(0.0)},
-        "P",
-        (left, right),
-        Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
-        (0.0, 1.5),
         attachments=() if formulation == "reduced" else (Attachment(0.4, force=lambda c: [c.P * x for x in FORCE]),),
-        start=lambda s: np.stack([np.cos(0.25 * s), 0 * s, np.sin(0.25 * s), 0 * s], axis=1),
-    )
+    )  # fmt: skip
     diagram = rodfem.trace(scene, Discretization(formulation), Plan(depth=0, error_bars=False))
     return diagram[0].points[-1]
 
@@ -111,18 +111,11 @@ def test_supports_resist_what_they_hold_alone() -> None:
 
 def test_a_turning_clamp_has_the_moment_that_does_its_work() -> None:
     """``dV = moment . dangle``: the difference of the potential of two states at neighbouring angles of the clamp."""
-    scene = Scene(
-        "turning",
-        (0.0, 1.0),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.0, 1.5, 0.8)),
-        {"a": Parameter(0.0)},
-        "a",
-        (clamped(lambda c: (0.0, 0.0, 0.0), lambda c: turned(c.a)), clamped(lambda c: (0.2, 0.0, 0.9))),
-        Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
-        (0.0, 1.0),
-        start=lambda s: np.stack([np.cos(0.5 * np.sin(pi * s)), 0 * s, np.sin(0.5 * np.sin(pi * s)), 0 * s], axis=1),
-    )
+    scene = classics.column(
+        "turning", (clamped(rotation=lambda c: turned(c.a)), clamped((0.2, 0.0, 0.9))), (0.0, 1.0), load="a",
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.5, 0.8)), constants={"a": 0.0}, ordinate=MIDDLE,
+        start=bowed(lambda s: 0.5 * np.sin(pi * s)),
+    )  # fmt: skip
     solver, h = rodfem.Solver(scene), 1e-4
     middle = solver.equilibrium(0.5, solver.equilibrium(0.25, solver.equilibrium(0.0)))
     above, below = solver.equilibrium(0.5 + h, middle), solver.equilibrium(0.5 - h, middle)
@@ -133,25 +126,13 @@ def test_a_turning_clamp_has_the_moment_that_does_its_work() -> None:
 
 def cable() -> Scene:
     """Power cable of 300 m: EI = 1e4 N m2, EA = 3e8 N, 250 N/m, clamped level at the sea bed, pinned 90 m up."""
-
-    def start(s: np.ndarray) -> np.ndarray:
-        turn = 0.6 - 1.05 * np.cos(pi * s / 300.0)
-        return np.stack([np.cos(turn), 0 * s, np.sin(turn), 0 * s], axis=1)
-
     return Scene(
-        "cable",
-        (0.0, 300.0),
-        "unshearable",
-        lambda v, k, c: 1.5e8 * (v[2] - 1) ** 2 + 5e3 * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
-        {"x": Parameter(170.0)},
-        "x",
-        (clamped(), pinned(lambda c: (90.0, 0.0, c.x))),
-        Ordinate("height", s=150.0, of=lambda r, q: r[0]),
-        (170.0, 171.0),
-        distributed=lambda c: (-250.0, 0.0, 0.0),
-        planar="e2",
-        start=start,
-    )
+        "cable", (0.0, 300.0), "unshearable",
+        lambda v, k, c: 1.5e8 * (v[2] - 1) ** 2 + 5e3 * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2), {"x": 170.0}, "x",
+        (clamped(), pinned(lambda c: (90.0, 0.0, c.x))), Ordinate("height", s=150.0, of=lambda r, q: r[0]),
+        (170.0, 171.0), distributed=(-250.0, 0.0, 0.0), planar="e2",
+        start=bowed(lambda s: 0.6 - 1.05 * np.cos(pi * s / 300.0)),
+    )  # fmt: skip
 
 
 def test_a_helical_spring_of_natural_curvature_and_twist() -> None:
@@ -164,16 +145,11 @@ def test_a_helical_spring_of_natural_curvature_and_twist() -> None:
     c, s, length = R / size, 0.3 / size, 2 * pi * turns * size
     axis, height = np.array([0.0, c, s]), 2 * pi * turns * 0.3
     spring = Scene(
-        "spring",
-        (0.0, length),
-        "unshearable and inextensible",
-        lambda v, k, _: bending_and_twist((k[0], k[1] - c / size, k[2] - s / size), (B, B, C)),
-        {"x": Parameter(0.0)},
-        "x",
+        "spring", (0.0, length), "unshearable and inextensible",
+        lambda v, k, _: bending_and_twist((k[0], k[1] - c / size, k[2] - s / size), (B, B, C)), {"x": 0.0}, "x",
         (clamped(), clamped(lambda p: tuple((height - p.x) * float(a) for a in axis))),
-        Ordinate("middle", s=length / 2, of=lambda r, q: float(r @ axis)),
-        (0.0, 1e-3),
-    )
+        Ordinate("middle", s=length / 2, of=lambda r, q: float(r @ axis)), (0.0, 1e-3),
+    )  # fmt: skip
     point = rodfem.Solver(spring, Discretization(elements=32)).equilibrium(1e-3)
     soft = R**2 * length * (c**2 / C + s**2 / B)
     soft -= (R * length * s * c * (1 / C - 1 / B)) ** 2 / (length * (s**2 / C + c**2 / B))
@@ -216,19 +192,10 @@ def test_what_follows_from_a_state_is_within_its_bar(elements: int) -> None:
     """The elastica of 20 degrees at its tip, by elliptic integrals: energy, and the moment at the clamp."""
     modulus = sin(pi / 18)  # of half the angle of the tip
     load = float(ellipk(modulus**2)) ** 2
-    scene = Scene(
-        "elastica",
-        (0.0, 1.0),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 0.8)),
-        {"P": Parameter(load)},
-        "P",
-        (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        (load, load + 0.1),
-        planar="e2",
-        start=lambda s: np.stack([np.cos(0.17 * np.sin(s)), 0 * s, np.sin(0.17 * np.sin(s)), 0 * s], axis=1),
-    )
+    scene = classics.column(
+        "elastica", classics.SUPPORTS["clamped-free"], (load, load + 0.1), planar="e2", constants={"B2": 1.0},
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]), start=bowed(lambda s: 0.17 * np.sin(s)),
+    )  # fmt: skip
     diagram = rodfem.trace(scene, Discretization(elements=elements, degree=3), Plan(at=(load,), depth=0))
     special = next(s for s in diagram[0].special if s.kind == "user")
     moment = 2 * modulus * load**0.5
@@ -241,18 +208,13 @@ def test_what_follows_from_a_state_is_within_its_bar(elements: int) -> None:
 def test_profiles_of_a_helix() -> None:
     """A hemitropic rod that is free at one end, under a moment along its axis, is straight: by Hooke's law alone."""
     scene = Scene(
-        "twisted",
-        (0.0, 2.0),
-        "flexible",
+        "twisted", (0.0, 2.0), "flexible",
         lambda v, k, c: (
             hemitropic(v, k, stretching=10.0, coupling=-1.0, twisting=1.0, bending=1.0) + 50.0 * (v[0] ** 2 + v[1] ** 2)
         ),
-        {"P": Parameter(0.0)},
-        "P",
-        (clamped(), free(lambda c: (0.0, 0.0, c.P))),
-        Ordinate("end", s=2.0, of=lambda r, q: r[2]),
+        {"P": 0.0}, "P", (clamped(), free(lambda c: (0.0, 0.0, c.P))), Ordinate("end", s=2.0, of=lambda r, q: r[2]),
         (0.0, 1.0),
-    )
+    )  # fmt: skip
     point = rodfem.Solver(scene).equilibrium(1.0)
     stretch, twist = np.linalg.solve([[10.0, -1.0], [-1.0, 1.0]], [1.0, 0.0])
     places = np.array([0.0, 0.3, 1.1, 2.0])

@@ -70,17 +70,12 @@ def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
 def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> None:
     """Also where the ends are: the ordinate is measured from them."""
     rod = Scene(
-        name="moved",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)),
-        parameters={"d": Parameter(0.1), "e": Parameter(0.0), "B": Parameter(2.0)},
-        load="d",
-        ends=(clamped(lambda c: (c.e, 0.0, 0.0)), clamped(lambda c: (c.e, 0.0, 1.0 - c.d))),
+        "moved", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)),
+        {"d": 0.1, "e": 0.0, "B": 2.0}, "d",
+        (clamped(lambda c: (c.e, 0.0, 0.0)), clamped(lambda c: (c.e, 0.0, 1.0 - c.d))),
+        Ordinate("place of the middle", s=0.5, of=lambda r, q: r[0]), (0.05, 0.5),
         start=lambda s: np.stack([np.cos(np.sin(pi * s)), 0 * s, np.sin(np.sin(pi * s)), 0 * s], axis=1),
-        ordinate=Ordinate("place of the middle", s=0.5, of=lambda r, q: r[0]),
-        span=(0.05, 0.5),
-    )
+    )  # fmt: skip
     moved = replace(rod, parameters={"d": Parameter(0.1), "e": Parameter(0.7), "B": Parameter(3.0)})
     discretization = Discretization(formulation, 4, 3)
     given, expected = (BranchSolver(System(scene, discretization)) for scene in (rod, moved))
