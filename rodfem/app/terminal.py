@@ -45,6 +45,8 @@ from rodfem.stability.soft_mode import in_short
 from rodfem.timing import WORK, Clock
 
 WIDTH, PAUSE = 110, 30.0  # columns of a paragraph; seconds between two lines of progress
+MOTIONS = ("rates", "rates of negative real part:"), ("frequencies", "eigenvalues negative or complex:")
+"""Eigenvalues of a rod without a potential, and the unstable ones, by the order of the equations of motion in time."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
@@ -90,6 +92,7 @@ class Report(Observer):
         """Print what ``words`` makes of each line, if ``verbose`` of technical ones too, to ``stream`` on rank 0."""
         self.verbose = verbose
         self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6
+        self.eigenvalues, self.unstable = MOTIONS[1]
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.known: list[Branch] = []
@@ -124,10 +127,11 @@ class Report(Observer):
         self.detail(f"  unknowns: {f.describe()}, load {scene.load}")
         self.units, self.load = scene.units, scene.load
         self.count = INDEX if scene.conservative else COUNT
+        self.eigenvalues, self.unstable = MOTIONS[scene.inertia.order - 1]
         self.wide = len("0->1 (in space 2)") if scene.planar and scene.conservative else max(6, len(self.count))
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
-            self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
+            self.say(f"  not conservative ({loads}): stability is a matter of {self.eigenvalues}, not of an index")
         for line in f.left_out():
             self.detail(f"  left out: {line}")
         self._ignored(scene)
@@ -266,7 +270,7 @@ class Report(Observer):
         """Print what was ``found`` of the branch ``name`` at a ``load``, with its ``modes`` if there are some."""
         index = found.negative, found.undecided, found.kink
         words = in_short(*index, found.uncompared, found.negative_in_space)
-        words = words if self.count == INDEX else words.replace("index", "eigenvalues negative or complex:")
+        words = words if self.count == INDEX else words.replace("index", self.unstable)
         zero = f", {found.zero} zero" if found.zero else ""
         self.say(f"  {name}, {load}: {words}{zero}")
         for line in (*map(str, found.soft), *_eigenvalues(found, modes)):
@@ -285,7 +289,7 @@ class Report(Observer):
 
     def timing(self, clock: Clock, points: int) -> None:
         """Print how long it took, and where the time went."""
-        known = "index" if self.count == INDEX else "frequencies"
+        known = "index" if self.count == INDEX else self.eigenvalues
         self.say(f"\n{many(points, 'point')} with {'its' if points == 1 else 'their'} {known} in {clock.total():.1f} s")
         names = ("setup", *WORK, "location", "error bars", "modes", "files")
         took = {name: f"{clock.seconds.get(name, 0.0):.2f} s" for name in names}

@@ -11,6 +11,7 @@ square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0
 of ``D`` vanishes (Seyranian & Mailybaev, *Multiparameter Stability Theory with Mechanical Applications*, World
 Scientific 2003, chapters 2 and 5).  A point of it is found on a line of the plane by the secant method for ``D``, its
 tangent from central differences.  Pairs that are equal by a symmetry have one ``D``; where they part, the curve ends.
+At flutter of a rod with drag the mean of two conjugate rates vanishes, which is as smooth: it takes the place of ``D``.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from rodfem.fem.state import Line, line
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.units import size
-from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure, noise_of
+from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, as_vectors, measure, noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import NEGLIGIBLE, ROUND_OFF, TINY
 
@@ -51,7 +52,7 @@ Prediction = tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]
 Guess = tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec | None]
 """The same with a direction of any size, which may be one of the parameters alone."""
 Zero = tuple[float, float, Measured, PETSc.Vec]
-"""Place of a zero of ``D`` on a line of parameters, its uncertainty, the cluster and the state there."""
+"""Place of what vanishes on a line of parameters, its uncertainty, the cluster and the state there."""
 
 
 class Destroyed(ConvergenceError):
@@ -289,6 +290,26 @@ class Collision(Criterion):
         super().__init__(solver, plane)
         self.eigensolver = NonsymmetricSolver(solver.system)
 
+    def value(self, here: Measured) -> float:
+        """What vanishes on the curve, of a cluster at a state."""
+        return here.discriminant
+
+    def sharp(self, noise: ClusterNoise) -> tuple[float, float]:
+        """The same by both subspaces, and its round-off."""
+        return noise.two_sided, noise.discriminant
+
+    def split(self, here: Measured) -> tuple[float, float]:
+        """By how much it may differ among pairs that are taken for one, and what is large."""
+        return here.split, max(here.cluster.mean**2, self.solver.units.omega2**2)
+
+    def squared(self, here: Measured) -> float:
+        """Square of the frequency."""
+        return here.cluster.mean
+
+    def mean(self, near: LocusPoint) -> float:
+        """Mean of the eigenvalues of the cluster at a point."""
+        return near.omega2
+
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step: parameters over the widths of their bounds."""
         return float(np.linalg.norm(dp / self.plane.width))
@@ -299,32 +320,33 @@ class Collision(Criterion):
         forward = guess[2] / plane.width / np.linalg.norm(guess[2] / plane.width)
         across = np.array([-forward[1], forward[0]]) * plane.width
         system.line = plane.line(guess[0], across)
-        t, last, here, x = self._collide(guess[1], Cluster(basis, near.omega2), reach)
-        p, omega2 = guess[0] + t * across, here.cluster.mean
+        t, last, here, x = self._collide(guess[1], Cluster(basis, self.mean(near)), reach)
+        p, omega2 = guess[0] + t * across, self.squared(here)
         gradient, clearest = np.zeros(2), here
         for which, name in enumerate(plane.names):
             system.line = plane.line(p, plane.axis(which))
             # D has a pole at what is not admissible, as a mass of zero
             room = min(abs(end - p[which]) for end in system.scene.parameters[name].admissible)
             step = float(min(DIFFERENCE, room / 100 / plane.width[which]))
-            low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-step, step))
-            gradient[which] = (high.discriminant - low.discriminant) / (2 * step)
+            low, high = (self._measured(h, x, Cluster(basis, here.cluster.mean))[0] for h in (-step, step))
+            gradient[which] = (self.value(high) - self.value(low)) / (2 * step)
             clearest = max((clearest, low, high), key=lambda m: m.spread)
         if not np.linalg.norm(gradient):
-            raise ConvergenceError("the discriminant is constant")
-        if here.split > FEWER * max(omega2**2, system.scene.units.omega2**2):
+            raise ConvergenceError("what vanishes on the curve is constant")
+        split, large = self.split(here)
+        if split > FEWER * large:
             raise Destroyed(f"its {here.cluster.size // 2} pairs of eigenvalues do not meet together any more")
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
         orientation = 1 if dq @ forward >= 0 else -1
         basis = clearest.cluster.basis
         rest = unstable(self.eigensolver.at(plane.at(p, x)), basis.shape[1], basis)
-        split = SPLIT * here.split * abs(gradient) / (gradient @ gradient) * plane.width
+        apart = SPLIT * split * abs(gradient) / (gradient @ gradient) * plane.width
         return LocusPoint(
             p,
             x,
             orientation * dq * plane.width,
             system.new_vector(),
-            plane.round_off(p, last * across) + split,
+            plane.round_off(p, last * across) + apart,
             ordinate=self.solver.shape.ordinate(x),
             omega2=omega2,
             orientation=orientation,
@@ -333,36 +355,37 @@ class Collision(Criterion):
         )
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
-        """Zero of ``D`` on the system's line of parameters: by secants, the last digits by both subspaces."""
+        """Zero on the system's line of parameters: by secants, the last digits by both subspaces."""
         t, other, before = 0.0, FIRST, np.inf
         now, x = self._measured(t, x, cluster)
-        at_other = self._measured(other, x, cluster)[0].discriminant
-        slope = (at_other - now.discriminant) / (other - t)
+        here, at_other = self.value(now), self.value(self._measured(other, x, cluster)[0])
+        slope = (at_other - here) / (other - t)
         for _ in range(12):
-            if now.discriminant == at_other:
+            if here == at_other:
                 break
-            step = -now.discriminant * (other - t) / (at_other - now.discriminant)
+            step = -here * (other - t) / (at_other - here)
             if abs(step) < NEGLIGIBLE or (abs(step) < FIRST and abs(step) > 0.3 * before):
                 return self._by_both_sides((t, abs(step), now, x), slope)
             if abs(other - t) > 1e-6:  # else round-off hides the slope
-                slope = (at_other - now.discriminant) / (other - t)
-            other, at_other, before = t, now.discriminant, abs(step)
+                slope = (at_other - here) / (other - t)
+            other, at_other, before = t, here, abs(step)
             t += step
             if abs(t) > reach:
                 break
             now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
+            here = self.value(now)
         raise ConvergenceError("two eigenvalues do not collide near by")
 
     def _by_both_sides(self, found: Zero, slope: float) -> Zero:
-        """Correct a zero of ``D`` twice, by its ``slope``, unless its left vectors are not found (a double zero)."""
+        """Correct a zero twice, by its ``slope``, unless its left vectors are not found (a double zero)."""
         t, _, now, x = found
         with suppress(ConvergenceError):
             for _ in range(2):
-                noise = noise_of(self.eigensolver.at(x), now)
-                step = -noise.two_sided / slope
+                here, noise = self.sharp(noise_of(self.eigensolver.at(x), now))
+                step = -here / slope
                 t += step
                 now, x = self._measured(t, x, now.cluster)
-                found = t, abs(step) + abs(noise.discriminant / slope), now, x
+                found = t, abs(step) + abs(noise / slope), now, x
         return found
 
     def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
@@ -371,6 +394,31 @@ class Collision(Criterion):
         if not outcome.converged:
             raise ConvergenceError("no equilibrium is found there")
         return measure(self.eigensolver.at(x), cluster), x
+
+
+class Oscillation(Collision):
+    """Corrects points of the plane to where two conjugate rates of a rod with drag have no real part."""
+
+    def value(self, here: Measured) -> float:
+        """See :class:`Collision`."""
+        return here.cluster.mean
+
+    def sharp(self, noise: ClusterNoise) -> tuple[float, float]:
+        """See :class:`Collision`."""
+        return noise.two_sided_mean, noise.mean
+
+    def split(self, here: Measured) -> tuple[float, float]:
+        """See :class:`Collision`."""
+        apart = float(abs(here.values.real - here.cluster.mean).max())
+        return apart, max(here.frequency, self.solver.units.omega2)
+
+    def squared(self, here: Measured) -> float:
+        """See :class:`Collision`; negative of two real rates of opposite sign."""
+        return -here.discriminant
+
+    def mean(self, near: LocusPoint) -> float:
+        """See :class:`Collision`."""
+        return 0.0
 
 
 def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None = None) -> int:

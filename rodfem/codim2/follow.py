@@ -25,6 +25,7 @@ from rodfem.codim2.criteria import (
     Destroyed,
     Interval,
     LocusPoint,
+    Oscillation,
     Plane,
     Singular,
     between,
@@ -54,7 +55,9 @@ NEAREST = "the index is that of the frequencies nearest zero: the mesh has too m
 
 def criterion_of(solver: BranchSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
     """Defining equations in a ``plane`` of a ``kind`` of special points, ``near`` one; ``solver`` has the mesh."""
-    return Collision(solver, plane) if kind == FLUTTER else Singular(solver, plane, near, fold=kind == FOLD)
+    if kind != FLUTTER:
+        return Singular(solver, plane, near, fold=kind == FOLD)
+    return (Collision if solver.system.scene.inertia.order == 2 else Oscillation)(solver, plane)
 
 
 class Half:
@@ -435,7 +438,5 @@ def check_special(solver: BranchSolver, special: SpecialPoint) -> None:
     if special.kind.singular and not solver.conservative:
         raise InputError("The locus of a fold or a branch point needs the solver that found it.")
     if special.kind == FLUTTER:
-        unknown = "it was not found by a sweep" * (special.cluster is None)
-        rates = ["that of a rod with drag is not followed; ask for one of divergence, or give an Inertia", ""]
-        if why := special.note or unknown or rates[solver.system.scene.inertia.order - 1]:
+        if why := special.note or "it was not found by a sweep" * (special.cluster is None):
             raise InputError(f"This flutter has no locus: {why}.")

@@ -47,7 +47,8 @@ def same(a: list[float | None], b: list[float | None]) -> bool:
 def _numbers(shape: Shape, mass: PETSc.Mat, load: float, units: PETSc.Vec) -> list[float]:
     """Residual's norm, stored energy, ordinate, kinetic energy and potential at a load; nan where there is none.
 
-    The kinetic metric of the system is written into ``mass``; ``shape`` evaluates its states.
+    What a drag dissipates, in the place of a kinetic energy, is negative.  The kinetic metric of the system is written
+    into ``mass``; ``shape`` evaluates its states.
     """
     system = shape.system
     x, change = _waves(system, load), system.vector(system.fields.sizes * system.fields.wave())
@@ -59,6 +60,7 @@ def _numbers(shape: Shape, mass: PETSc.Mat, load: float, units: PETSc.Vec) -> li
     state.assemble_into(mass, system.equations.kinetic)
     mass.assemble()
     kinetic, potential = (mass * change).dot(change).real / 2, system.equations.potential
+    kinetic = kinetic if system.scene.inertia.order == 2 else -kinetic
     energy = float("nan") if potential is None else state.integral(potential)
     return [residual.norm(), state.energy(), shape.ordinate(x), kinetic, energy]
 

@@ -149,7 +149,8 @@ def real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
 class ClusterNoise(NamedTuple):
     """Uncertainty of the ``mean`` and of the ``discriminant`` of a cluster by round-off in the matrix.
 
-    ``mean_left`` and ``discriminant_left`` are what the eigensolver left open; ``two_sided`` is ``D`` by both bases.
+    ``mean_left`` and ``discriminant_left`` are what the eigensolver left open; ``two_sided`` is ``D`` by both bases,
+    ``two_sided_mean`` the mean.
     """
 
     mean: float
@@ -157,6 +158,7 @@ class ClusterNoise(NamedTuple):
     mean_left: float
     discriminant_left: float
     two_sided: float
+    two_sided_mean: float
 
     @property
     def of_mean(self) -> float:
@@ -189,4 +191,4 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     inside = B - off * np.eye(size)
     discriminant = float(np.trace(inside @ inside)) / size
     left = abs(off), abs(discriminant - measured.discriminant)
-    return ClusterNoise(of(W), of(2 * W @ B.T), *left, discriminant)
+    return ClusterNoise(of(W), of(2 * W @ B.T), *left, discriminant, mean + off)

@@ -15,6 +15,7 @@ import rodfem
 from rodfem import (
     Attachment,
     Discretization,
+    Drag,
     Event,
     Inertia,
     Plan,
@@ -49,8 +50,13 @@ def crooked(e: float) -> Scene:
 @pytest.mark.ranks
 @pytest.mark.parametrize(
     ("rod", "other"),
-    [(loaded(), loaded(mass=1.1)), (loaded(), loaded(tip=0.1)), (crooked(0.05), crooked(0.0))],
-    ids=["mass along it", "mass at its tip", "between the ends"],
+    [
+        (loaded(), loaded(mass=1.1)),
+        (loaded(), loaded(tip=0.1)),
+        (crooked(0.05), crooked(0.0)),
+        (replace(crooked(0.05), inertia=Drag()), replace(crooked(0.05), inertia=Inertia(rho_I=(0.0, 0.0, 0.0)))),
+    ],
+    ids=["mass along it", "mass at its tip", "between the ends", "drag or mass"],
 )
 def test_another_rod_has_another_fingerprint(rod: Scene, other: Scene) -> None:
     """Its inertia, and what differs between the ends of the range alone."""

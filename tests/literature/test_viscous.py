@@ -1,15 +1,17 @@
 """Rods in a viscous fluid, without inertia: rates of decay, and loads at which an oscillation or a motion grows."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.linalg
+from hard.loci import LONG
 
 import rodfem
 from rodfem import Attachment, Discretization, Drag, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free
-from rodfem.errors import InputError, SceneError
+from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 
 FILAMENT = Scene(
@@ -102,6 +104,24 @@ def test_a_load_that_follows_in_part() -> None:
     assert "flutters: an oscillation ceases to decay" in diagram.in_words()
 
 
+def test_locus_of_flutter() -> None:
+    """Where the load follows in part the mean of two conjugate rates vanishes, by collocation."""
+    diagram = rodfem.trace(replace(FILAMENT, span=(35.0, 40.0)), plan=Plan(error_bars=False))
+    found = diagram.locus(diagram.special("flutter")[0], "part", (0.8, 1.0), (20.0, 45.0), steps=LONG)
+    assert found.ended == ("part = 0.8, its bound", "part = 1, its bound") and found.lower == -1
+    assert (found.index == [0, 2]).all() and np.nanmax(found.error[:, 0]) < 1e-8
+    for (load, part), omega2 in zip(found.values[[0, -2]], found.omega2[[0, -2]], strict=True):
+        (mu, _) = rates(load, part)
+        assert abs(mu.real) < 1e-5 and abs(mu.imag) == pytest.approx(omega2**0.5, rel=1e-7)
+
+
+def test_what_a_method_counts(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    plan = Plan((37.0, 38.0), at=(38.0,), method="dense", error_bars=False)
+    rodfem.run(FILAMENT, Discretization(elements=4), plan, tmp_path / "out")
+    said = capsys.readouterr().out
+    assert "unstable, rates of negative real part: 2" in said and "frequencies" not in said
+
+
 def test_drag_along_and_across() -> None:
     """A bar that stretches: rates are those of bending over the drag across, and of its length over that along."""
     bar = replace(
@@ -119,7 +139,4 @@ def test_sentences() -> None:
         replace(FILAMENT, attachments=(Attachment(0.5, mass=1.0),))
     with pytest.raises(SceneError, match="of -1 is negative"):
         replace(FILAMENT, inertia=Drag(along=-1.0))
-    diagram = rodfem.trace(replace(FILAMENT, span=(35.0, 40.0)), plan=Plan(error_bars=False))
-    with pytest.raises(InputError, match="has no locus: that of a rod with drag is not followed"):
-        diagram.locus(diagram.special("flutter")[0], "part", (0.9, 1.0))
     assert FILAMENT.inertia != Inertia()
