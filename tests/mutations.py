@@ -102,12 +102,12 @@ TABLE = {
             "[: len(own) - size]\n    chosen = np.intersect1d(chosen, np.argsort(abs(spectrum.values))[:10])",
             "diagram/test_light_and_slow_rods.py"),
         "locus-of-a-mean-with-the-bar-of-one": ("split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI),
-        "flutter-locus-of-a-mean-with-the-bar-of-one": ("split = SPLIT * here.split", "split = 0.0 * here.split", LOCI),
-        "flutter-locus-of-a-mean": ("if here.split > FEWER", "if False and here", LOCI),
+        "flutter-locus-of-a-mean-with-the-bar-of-one": ("apart = SPLIT * split", "apart = 0.0 * split", LOCI),
+        "flutter-locus-of-a-mean": ("if split > FEWER * large:", "if False:", LOCI),
         "a-locus-drops-symmetries-for-good": (
             "verification.dropped, verification.notices = dropped, notices", "pass", IN_WORDS),
         "locus-through-an-imperfection": ("curve.part > IMPERFECT", "curve.part > 1e9", LOCI),
-        "flutter-locus-by-eigenvalues-alone": ("step = -noise.two_sided / slope", "step = 0.0", LOCI),
+        "flutter-locus-by-eigenvalues-alone": ("step = -here / slope\n                t += step", "step = 0.0", LOCI),
     },
     "rodfem/codim2/follow.py": {
         "loci-follow-polynomials-beyond-bends": ("if failures < 2", "if failures < 200", "codim2/test_locus.py"),
