@@ -97,7 +97,7 @@ class State:
     directors: Floats
     reference: Floats
     setting: Setting
-    caption: str
+    caption: str = ""
 
     def view(self) -> Floats:
         """Axes of the picture, (3, 3)."""
@@ -116,23 +116,26 @@ class State:
         return [between("arrow", at, at + 4.5 * radius * way, 0.12 * radius, color) for at, way, color in ways]
 
 
-def read_state(states: Path, branch: str, row: int, count: int = 800) -> State:
-    """Read a state of a file, interpolated at ``count`` places; raises ValueError where there is none."""
+def read_state(states: Path, branch: str, row: int) -> State:
+    """Read a state of a file; raises ValueError where there is none."""
     unfit = f"cannot read {states} ({{}}): try the states.h5 of a scene"
     with STATES.opened(states, ("branches", "parameter", "scene"), unfit) as file:
         branches = file["branches"]
         if branch not in branches:
             raise InputError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
-        group, first = branches[branch], branches[file.attrs["first"]]
-        if not 0 <= row <= (last := len(group["r"]) - 1):
+        if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
             raise InputError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
-        load = float(group["load"][row])
-        symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
-        left = 0 if first == group else int(np.argmin(abs(first["load"][:] - load)))
-        s, centres, turned = curve_at(group, row, count)
-        reference, setting = curve_at(first, left, count)[1], read_setting(group, row)
-        caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
-        return State(s, centres, directors(turned), reference, setting, caption)
+        symbol, load = file.attrs["parameter"], branches[branch]["load"][row]
+        caption = f"{file.attrs['scene']}, {branch}, {'λ' if symbol == 'lam' else symbol} = {load:.4g}"
+        return replace(state_in(branches, file.attrs["first"], branch, row), caption=caption)
+
+
+def state_in(branches: Any, first: str, branch: str, row: int, count: int = 800) -> State:
+    """State at ``count`` places, by groups of ``branches``; the ``first`` one has the shape that the load has left."""
+    group, origin = branches[branch], branches[first]
+    left = 0 if branch == first else int(np.argmin(abs(origin["load"][:] - group["load"][row])))
+    s, centres, turned = curve_at(group, row, count)
+    return State(s, centres, directors(turned), curve_at(origin, left, count)[1], read_setting(group, row))
 
 
 def _import_pyvista() -> Any:

@@ -19,7 +19,7 @@ from rodfem.output.glyphs import Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
 from rodfem.output.plot_modes import GROWTH, drawn_size
-from rodfem.output.render import axes_of, thickness
+from rodfem.output.render import state_in, thickness
 from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
 from rodfem.output.table import plain, reactions_by_name
@@ -45,18 +45,21 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     states = sum(lengths.values())
     count = stations(max(groups[name]["s"].shape[1] for name in lengths), states)
     shapes = {name: shapes_of(groups[name], count) for name in lengths}
-    stage, shelf, branches = stage_of(data, shapes, groups), dict[tuple[str, str], int](), []
+    name, row, _ = typical_state(data)
+    stage, shelf, branches = state_in(groups, data["branches"][0]["name"], name, row), dict[tuple[str, str], int](), []
+    look = Look(thickness(stage.centres), stage.view())
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
         here, group = shapes[branch["name"]], groups[branch["name"]]
         shown = branch_data(branch, here, colour, data)
         rows = list(map(reactions_by_name, branch["columns"].get("reactions") or []))
         shown["ordinates"] |= {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
-        shown |= _drawn(here, group, stage, shelf) | profiles_data(group, states)
-        shown |= _moving(branch, here, group, folder / "modes.h5", stage)
+        shown |= _drawn(here, group, look, shelf) | profiles_data(group, states)
+        shown |= _moving(branch, here, group, folder / "modes.h5", look)
         traced = is_traced(branch, data["branches"])
         branches.append(shown | {"image": "" if traced else branch.get("image", "")})
     _clear_reactions(branches, data["natural"])
-    return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": list(map(_solid, shelf))}
+    own = {"branches": branches, "solids": list(map(_solid, shelf)), "start": [[*lengths].index(name), row]}
+    return _common(stage.setting, shapes[name], look) | own
 
 
 def _clear_reactions(branches: Sequence[dict[str, Any]], natural: Mapping[str, float]) -> None:
@@ -68,7 +71,7 @@ def _clear_reactions(branches: Sequence[dict[str, Any]], natural: Mapping[str, f
                 del branch["ordinates"][name]
 
 
-def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, stage: Stage) -> dict[str, Any]:
+def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, look: Look) -> dict[str, Any]:
     """Modes of a branch by its rows, those with error bars in the file ``path``, and why others have none."""
     name, modes = branch["name"], {}
     zeros = [0] * len(shapes.r) if "omega2" in branch["columns"] else branch["columns"]["zero"]
@@ -78,7 +81,7 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, s
         few, nodes = getattr(typical.get(row), "found", None), group["s"][row]
         if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
             shown = [mode._replace(rates=bool(branch.get("rates"))) for mode in shown]
-            modes[row] = motions_of(shown, shapes, row, read_setting(group, row), stage.look)
+            modes[row] = motions_of(shown, shapes, row, read_setting(group, row), look)
     return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items()}}
 
 
@@ -101,9 +104,9 @@ def profiles_data(group: Any, states: int) -> dict[str, Any]:
     return {"profile": packed(out[:, kept]), "element": element, "jumps": jumps}
 
 
-def _drawn(shapes: Shapes, group: Any, stage: Stage, shelf: dict[tuple[str, str], int]) -> dict[str, Any]:
+def _drawn(shapes: Shapes, group: Any, look: Look, shelf: dict[tuple[str, str], int]) -> dict[str, Any]:
     """Shapes of all states, and the bodies of their supports and loads: numbers on the ``shelf``, and maps."""
-    found = [glyphs_of(read_setting(group, row), shapes.s, shapes[row], stage.look) for row in range(len(shapes.r))]
+    found = [glyphs_of(read_setting(group, row), shapes.s, shapes[row], look) for row in range(len(shapes.r))]
     return {
         "shape": packed(np.concatenate([shapes.r, shapes.q], axis=2)),
         "bodies": [[shelf.setdefault((x.body, x.color), len(shelf)) for x in glyphs] for glyphs in found],
@@ -111,25 +114,25 @@ def _drawn(shapes: Shapes, group: Any, stage: Stage, shelf: dict[tuple[str, str]
     }
 
 
-def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Cross-sections, size and direction of the pictures, and the state that is shown first."""
+def _common(setting: Setting, shapes: Shapes, look: Look) -> dict[str, Any]:
+    """Cross-sections, size and direction of the pictures, by the state that is shown first."""
+    load = setting.force if setting.down is None else setting.down
     return {
         "s": packed(shapes.s),
-        "outline": packed(_outline(shapes, stage, OUTLINE)),
-        "stripe": packed(1.02 * _outline(shapes, stage, STRIPE)),
-        "radius": stage.look.radius,
+        "outline": packed(_outline(shapes, setting, look, OUTLINE)),
+        "stripe": packed(1.02 * _outline(shapes, setting, look, STRIPE)),
+        "radius": look.radius,
         "size": float(shapes.s[-1] - shapes.s[0]),
-        "axes": stage.look.axes.tolist(),
-        "loadDirection": None if stage.load is None else stage.load.tolist(),
-        "notes": list(stage.setting.notes),
-        "start": [[branch["name"] for branch in data["branches"]].index(stage.branch), stage.row],
+        "axes": look.axes.tolist(),
+        "loadDirection": None if load is None else (load / np.linalg.norm(load)).tolist(),
+        "notes": list(setting.notes),
     }
 
 
-def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
+def _outline(shapes: Shapes, setting: Setting, look: Look, angles: Floats) -> Floats:
     """Outline of the cross-sections (1, k, 2), or (S, k, 2) at the stations where they differ."""
-    whole = stage.look.radius * profile_of(shapes.s, stage.setting.section, angles)
-    return whole[:1] if np.ptp(whole, axis=0).max() < SAME_SPECIAL * stage.look.radius else whole
+    whole = look.radius * profile_of(shapes.s, setting.section, angles)
+    return whole[:1] if np.ptp(whole, axis=0).max() < SAME_SPECIAL * look.radius else whole
 
 
 def _solid(of: tuple[str, str]) -> dict[str, Any]:
@@ -170,30 +173,6 @@ def shapes_of(group: Any, count: int) -> Shapes:
     if SUPPORTS in group and not any(group.get(name) for name in (SUPPORTS, FOUNDATION, CONSTRAINTS)):
         positions = positions - positions.mean(axis=1, keepdims=True)
     return Shapes(at[0], positions, quaternions)
-
-
-@dataclass(frozen=True)
-class Stage:
-    """The picture of the typical state: its place, and the unit vector (3,) along the dead ``load``, or None."""
-
-    branch: str
-    row: int
-    look: Look
-    load: Floats | None
-    setting: Setting
-
-
-def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any) -> Stage:
-    """Stage for a diagram; ``groups`` are those of the branches in ``states.h5``, ``shapes`` their states."""
-    branch, row, _ = typical_state(data)
-    first = data["branches"][0]
-    load = next(b["columns"]["load"][row] for b in data["branches"] if b["name"] == branch)
-    left = 0 if branch == first["name"] else int(np.argmin(abs(np.array(first["columns"]["load"]) - load)))
-    reference, (r, frames) = shapes[first["name"]].r[left], shapes[branch][row]
-    setting = read_setting(groups[branch], row)
-    down = setting.force if setting.down is None else setting.down
-    axes = axes_of(setting, reference, r - reference, frames[0])
-    return Stage(branch, row, Look(thickness(r), axes), None if down is None else down / np.linalg.norm(down), setting)
 
 
 # --- modes
