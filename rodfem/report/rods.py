@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -82,7 +83,8 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, l
         if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
             shown = [mode._replace(rates=bool(branch.get("rates"))) for mode in shown]
             modes[row] = motions_of(shown, shapes, row, read_setting(group, row), look)
-    return {"modes": modes, "missed": {row: each.trouble for row, each in typical.items()}}
+    missed = filter(attrgetter("trouble"), typical.values())
+    return {"modes": modes, "missed": dict(map(attrgetter("row", "trouble"), missed))}
 
 
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
