@@ -404,42 +404,31 @@ class Fields:
     @cached_property
     def derivative(self) -> sp.csr_matrix:
         """Matrix (local size,) * 2 of the derivative in arclength at free nodes, the mean of cells that share one."""
-        size = len(self.number)
-        mean = sp.csr_matrix((size, size))
-        for block in self.blocks:
-            (columns, values), dofs = self._slopes(block), self.dofs[block.name].ravel()
-            rows = np.arange(len(dofs) + 1) * columns.shape[1]
-            slopes = sp.csr_matrix((values.ravel(), columns.ravel(), rows), shape=(len(dofs), size))
-            sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
-            shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
-            mean += sp.diags(1.0 / shared) @ sums @ slopes
-        return sp.diags(np.where(self.number < 0, 0.0, 1.0)) @ mean.tocsr()
+        slopes, dofs = self._slopes(self.blocks)
+        sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(len(self.number), len(dofs)))
+        shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
+        return (sp.diags(np.where(self.number < 0, 0.0, 1.0 / shared)) @ sums @ slopes).tocsr()
 
     @cached_property
     def derivative_jumps(self) -> sp.csr_matrix:
         """Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline."""
-        columns, values = [], []
-        for block in (b for b in self.blocks if b.name in (self.turning.name, "r")):
-            slopes, dofs = self._slopes(block), self.dofs[block.name].ravel()
-            order = np.argsort(dofs, kind="stable")
-            twins = np.flatnonzero(np.diff(dofs[order]) == 0)
-            sides = order[twins + 1], order[twins]
-            columns.append(np.hstack([slopes[0][side] for side in sides]))
-            values.append(np.hstack([sign * slopes[1][side] for sign, side in zip((1, -1), sides, strict=True)]))
-        starts = np.cumsum([0, *(c.shape[1] for c in columns for _ in range(len(c)))])
-        entries = (np.concatenate([x.ravel() for x in parts]) for parts in (values, columns))
-        return sp.csr_matrix((*entries, starts), shape=(len(starts) - 1, len(self.number)))
+        slopes, dofs = self._slopes([b for b in self.blocks if b.name in (self.turning.name, "r")])
+        order = np.argsort(dofs, kind="stable")
+        twins = np.flatnonzero(np.diff(dofs[order]) == 0)
+        return slopes[order[twins + 1]] - slopes[order[twins]]
 
-    def _slopes(self, block: Block) -> tuple[np.ndarray, np.ndarray]:
-        """Columns and values (dofs, nodes) of the rows of the derivative of a field at the nodes of each cell."""
-        dofs, ends = self.dofs[block.name], self.vertices
-        cells, nodes, components = dofs.shape
-        sizes = (ends[:, 1] - ends[:, 0]) / self.scene.units.length
-        weights = _differentiation(block.degree) / sizes[:, None, None]
-        shape = (cells, nodes, components, nodes)
-        columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape)
-        values = np.broadcast_to(weights[:, :, None, :], shape)
-        return columns.reshape(-1, nodes), values.reshape(-1, nodes)
+    def _slopes(self, blocks: list[Block]) -> tuple[sp.csr_matrix, np.ndarray]:
+        """Matrix of the derivative of fields at the nodes of each cell, and the degrees of freedom of its rows."""
+        found, sizes = [], np.diff(self.vertices, axis=1)[:, 0] / self.scene.units.length
+        for block in blocks:
+            cells, nodes, components = (dofs := self.dofs[block.name]).shape
+            weights = _differentiation(block.degree) / sizes[:, None, None]
+            shape = (cells, nodes, components, nodes)
+            columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape).ravel()
+            values = np.broadcast_to(weights[:, :, None, :], shape).ravel()
+            rows = np.arange(dofs.size + 1) * nodes
+            found.append(sp.csr_matrix((values, columns, rows), shape=(dofs.size, len(self.number))))
+        return sp.vstack(found, format="csr"), np.concatenate([self.dofs[b.name].ravel() for b in blocks])
 
 
 @cache
