@@ -161,10 +161,7 @@ class System:
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors of which this rank has these rows each, (count, own rows)."""
         if self._weights is not None:
-            out = np.empty_like(own)
-            for i, row in enumerate(own):
-                out[i] = times(self._weights, row)
-            return out
+            return np.array([times(self._weights, row) for row in own]).reshape(own.shape)
         images = [self.metric * self.generators.vector(row) for row in own]
         return np.array([image.array_r[: own.shape[1]].real for image in images]).reshape(own.shape)
 
@@ -202,11 +199,7 @@ class System:
 
     def changes(self, columns: np.ndarray) -> np.ndarray:
         """Local values of changes of state whose own rows are ``columns`` (own rows, k): (k, local size)."""
-        out = np.zeros((columns.shape[1], len(self.fields.number)))
-        if self.comm.size == 1:
-            out[:, self._numbered] = columns[self._sources[: len(self._numbered)]].T
-            return out
-        vector = self.new_vector()
+        out, vector = np.zeros((columns.shape[1], len(self.fields.number))), self.new_vector()
         for local, column in zip(out, columns.T, strict=True):
             vector.array[:] = column
             local[:] = self.change(vector).local
