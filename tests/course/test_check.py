@@ -74,7 +74,7 @@ def test_mistakes_and_questions(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert capsys.readouterr().out == f"1.1   {answers()['1.1'].question}\n"
     check.main([])
     assert capsys.readouterr().out.count("\n") == len(answers())
-    for words, sentence in ((["11"], "no question '11'"), (["1", str(tmp_path / "none.py")], "is no file")):
+    for words, sentence in ((["12"], "no question '12'"), (["1", str(tmp_path / "none.py")], "is no file")):
         with pytest.raises(SystemExit):
             check.main(words)
         assert sentence in capsys.readouterr().err

@@ -10,7 +10,7 @@ import pytest
 from numpy.polynomial import Legendre, Polynomial
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigvals, expm
-from scipy.optimize import brentq, fsolve
+from scipy.optimize import brentq, fsolve, minimize_scalar
 from scipy.special import ellipk, jv
 
 from lesson.answers import answers
@@ -99,6 +99,17 @@ def stepped() -> float:
     return brentq(lambda P: np.tan(0.3 * sqrt(P / 2)) * np.tan(0.7 * sqrt(P)) - sqrt(2), 2.0, 4.0, xtol=1e-14)
 
 
+def tapered() -> float:
+    """Areas A from 1 + t to 1 - t: theta = A^(-1/2) sin(w ln((1 + t)/A)), P = t^2 (1 + 4 w^2), no moment at the tip."""
+
+    def load(t: float) -> float:
+        length = np.log((1 + t) / (1 - t))
+        ends = (np.pi / 2 + 1e-9) / length, np.pi / length
+        return t**2 * (1 + 4 * brentq(lambda w: np.tan(w * length) + 2 * w, *ends, xtol=1e-14) ** 2)
+
+    return -float(minimize_scalar(lambda t: -load(t), bounds=(0.05, 0.9), method="bounded").fun)
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -118,6 +129,7 @@ def stepped() -> float:
         ("9.3", leipholz),
         ("10", localised),
         ("10.2", stepped),
+        ("11.2", tapered),
     ],
 )
 def test_a_number_is_right(name: str, value: Callable[[], float]) -> None:
