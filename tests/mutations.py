@@ -273,17 +273,17 @@ TABLE = {
     },
     "rodfem/deflation/symmetries.py": {
         "mirrors-asked-of-a-molecule-in-metres": (
-            "amplitude * units.of_field(block)", "amplitude", "deflation/test_deflation.py"),
+            "f.wave(seed) * f.sizes", "f.wave(seed)", "deflation/test_deflation.py"),
         "quaternions-of-one-sign": (
             "for each in (y, *_same_rotations(self.system, y)):", "for each in (y,):", "deflation/test_deflation.py"),
     },
     "rodfem/diagram/collisions.py": {
-        "pairs-that-have-just-met-enter": ("if D > 0 or just_met:", "if D > 0:", "diagram/test_flutter_at_a_row.py"),
         "divergence-by-vectors-of-rigid-motions": ("if not self.zeros:", "if True:", "literature/test_free_rods.py"),
         "pairs-taken-for-one-meet-at-one-load": (
             "noise.of_discriminant + clear.split) /", "noise.of_discriminant) /", HARD),
     },
     "rodfem/diagram/critical_loads.py": {
+        "pairs-that-have-just-met-enter": ("if D > 0 or just_met:", "if D > 0:", "diagram/test_flutter_at_a_row.py"),
         "frequencies-that-meet-and-part-in-a-step": (
             "for meeting in sorted(ahead,", "for meeting in sorted(ahead[:0],", HARD),
         "two-that-cross-may-meet": (

@@ -141,10 +141,8 @@ def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
         first = max(min(degree // 2 - 1, last - 3), 0)
         if last - first < 2:
             continue
-        j, logarithms = np.arange(first, last), np.log(row[first:last])
-        middle = (first + last - 1) / 2
-        slope = (j - middle) @ logarithms / ((j - middle) @ (j - middle))  # of the line of least squares
-        level = logarithms.mean() - slope * middle
+        j = np.arange(first, last)
+        slope, level = np.polyfit(j, np.log(row[first:last]), 1)
         decay[e] = np.clip(np.exp(-slope), LEAST_DECAY, MOST_DECAY)
         above = row[first:last] * decay[e] ** j
         amplitude[e] = max(np.exp(level), above[-1])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from math import inf, isfinite, isnan, log10
 
 import numpy as np
@@ -87,22 +88,10 @@ class Meshes:
     """The solvers of one run, by the number of their mesh, and their richer companions, made when needed."""
 
     def __init__(self, solver: BranchSolver, accuracy: float | None) -> None:
-        self.solvers = [solver]
+        solvers = self.solvers = [solver]
         self.accuracy = None if accuracy is None else internal_accuracy(solver.system.scene, accuracy)
-        self._companions: dict[int, Enriched] = {}
-        self._indicators: dict[int, SmoothnessIndicator] = {}
-
-    def indicator(self, number: int) -> SmoothnessIndicator:
-        """Smoothness indicator of a mesh."""
-        if number not in self._indicators:
-            self._indicators[number] = SmoothnessIndicator(self.solvers[number])
-        return self._indicators[number]
-
-    def richer(self, number: int) -> Enriched:
-        """Companion of a mesh, on halves of its elements one degree richer, made when it is first asked for."""
-        if number not in self._companions:
-            self._companions[number] = Enriched(self.solvers[number])
-        return self._companions[number]
+        self.indicator = cache(lambda mesh: SmoothnessIndicator(solvers[mesh]))
+        self.richer = cache(lambda mesh: Enriched(solvers[mesh]))
 
     def raised(self, trouble: TooCoarse, tries: int) -> BranchSolver:
         """Solver on the cheapest mesh for the state that was too coarse: one that there is, or a new one."""

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import compress, groupby
 from math import inf, isfinite
 
@@ -55,8 +55,7 @@ class SoftStates:
 
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
         self.solver, self.names = solver, names_for(solver.system)
-        self._richer = [richer] if richer is not None else []
-        self._companions: list[Enriched] = []
+        self._richer, self._companions = richer, list[Enriched]()
         self.uncompared = ""
 
     def examine(
@@ -185,7 +184,9 @@ class SoftStates:
     def _companion(self, level: int) -> Enriched:
         """Companion of the mesh, or of the companion before; made when it is first asked for."""
         if level == len(self._companions):
-            self._companions.append(Enriched(self._companions[-1].solver) if level else self._richer[0]())
+            make = partial(Enriched, self._companions[-1].solver) if level else self._richer
+            assert make is not None
+            self._companions.append(make())
         return self._companions[level]
 
 
@@ -236,7 +237,9 @@ class SoftRows:
 
     def __init__(self, meshes: Meshes, *, error_bars: bool) -> None:
         self.meshes, self.error_bars = meshes, error_bars
-        self._states: dict[int, SoftStates] = {}
+        self._of = cache(
+            lambda mesh: SoftStates(meshes.solvers[mesh], partial(meshes.richer, mesh) if error_bars else None)
+        )
         self._uncompared: dict[str, tuple[float, str]] = {}
 
     def examine(self, branch: Branch) -> None:
@@ -247,7 +250,7 @@ class SoftRows:
         compare = self.error_bars and doubtful
         for point in rows:
             if id(point) not in special:
-                self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
+                self._of(point.mesh).examine(point, fixed_load=False, compare=compare, family=family)
         if compare:
             self._leave_out_doubtful(branch, family=family)
         for fold in branch.special:
@@ -259,7 +262,7 @@ class SoftRows:
         given = _given(branch)
         counted = {id(s.point): s.point.negative for s in given}
         for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
-            states = self._of(s.point)
+            states = self._of(s.point.mesh)
             states.examine(s.point, fixed_load=s.kind.given, compare=self.error_bars, family=family)
             if states.uncompared and isfinite(s.error_estimate) and s.resolved:  # else the special point says so
                 self._uncompared.setdefault(branch.name, (s.point.load, states.uncompared))
@@ -273,7 +276,7 @@ class SoftRows:
         rows = [p for p in branch.points if not any(p is s.point for s in branch.special)]
         left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
         for s in compress(branch.special, left_out):
-            self._of(s.point).examine(s.point, fixed_load=False, compare=True, family=family)
+            self._of(s.point.mesh).examine(s.point, fixed_load=False, compare=True, family=family)
         branch.special[:] = [s for s, out in zip(branch.special, left_out, strict=True) if not out]
 
     def _is_family(self, branch: Branch) -> bool:
@@ -306,12 +309,6 @@ class SoftRows:
         load = solver.system.scene.load
         where = f"At {load} = {low}" if len(points) == 1 else f"From {load} = {low} to {high}"
         return f"{where} the index is {words} ({worst}): {remedy}."
-
-    def _of(self, point: Point) -> SoftStates:
-        if point.mesh not in self._states:
-            richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
-            self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
-        return self._states[point.mesh]
 
 
 def _given(branch: Branch) -> list[SpecialPoint]:

@@ -117,18 +117,9 @@ def mirrors(shape: Shape, x: PETSc.Vec, among: Sequence[Mirror] | None = None) -
 
 
 def _generic_state(system: System, like: PETSc.Vec, seed: int) -> PETSc.Vec:
-    """Add to a state ``like`` smooth changes of all fields, at random, that no symmetry leaves alone; clamps stay."""
-    f, named, units = system.fields, system.at(like).named, system.scene.units
-    rng, amplitude = np.random.default_rng(seed), 0.2
-    a, b = system.scene.interval
-    for block in f.blocks:
-        x, size = (f.coordinates(block.degree) - a) / (b - a), amplitude * units.of_field(block)
-        for i in range(block.size):
-            waves = enumerate(rng.uniform(0.3, 1.0, (3, 2)), start=1)
-            named[block.name][:, :, i] += size * sum(c * np.sin(k * np.pi * x + p) for k, (c, p) in waves)
-    for i in f.forces:
-        named[f"n{i + 1}"] += amplitude * units.force * rng.uniform(0.3, 1.0)
-    return system.vector(f.filled(named))
+    """Add to a state ``like`` smooth changes of all fields that no symmetry leaves alone; clamps stay."""
+    f = system.fields
+    return system.vector(system.at(like).local + 0.2 * f.wave(seed) * f.sizes)
 
 
 def _work(system: System, x: PETSc.Vec, y: PETSc.Vec) -> tuple[float, float]:

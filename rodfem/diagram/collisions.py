@@ -1,8 +1,7 @@
-"""Collisions of eigenvalues between two loads of a sweep, and zeros of the mean of a cluster of them.
+"""Loads at which a cluster of eigenvalues of a sweep collides, or its mean vanishes.
 
-A complex pair at one load goes on from that at the other one whose plane has its vectors, and whose value is near.
-Another one comes from two real eigenvalues that meet on the way.  They are followed by their invariant subspace.  The
-mean of eigenvalues that pass through zero together is smooth in the load.
+Eigenvalues are followed by their invariant subspace.  The mean of those that pass through zero together is smooth in
+the load.
 """
 
 from __future__ import annotations
@@ -18,25 +17,20 @@ from rodfem.continuation.eigenvalue_curves import (
     ENOUGH,
     NODES,
     Located,
-    assignment,
     in_doubt,
     interpolant,
     locate_flutter,
     real_root,
     zero_uncertainty,
 )
-from rodfem.continuation.kinds import FLUTTER, Kind
+from rodfem.continuation.kinds import Kind
 from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
-from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricPencil, NonsymmetricSolver, groups
-from rodfem.stability.spectrum import SHIFT, Spectrum, inside
-from rodfem.tolerances import SAME_LOAD, TINY, round_off, unit
+from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.spectrum import SHIFT, Spectrum
+from rodfem.tolerances import TINY, unit
 
-JUST_MET = 1e-4
-"""Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
-MOVED, OUTSIDE = 0.3, 0.2
-"""Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, of another one."""
 AROUND = (1e-4, 1e-5, 1e-6)  # half widths, relative to a divergence load, over which its eigenvalues are sampled
 
 
@@ -67,37 +61,6 @@ class Critical:
     zeros: int = 0
 
 
-def pairs_in_common(mine: Spectrum, others: Spectrum) -> dict[int, int]:
-    """Places of complex eigenvalues of positive imaginary part, and those of the other state that they go on from."""
-    here, there = mine.upper, others.upper
-    if not len(here) or not len(there):
-        return {}
-    a, b = mine.values[here][:, None], others.values[there][None, :]
-    distance, outside = abs(a - b) / abs(a), 1.0 - _shares(mine, others)
-    rows, columns = assignment(distance + outside)
-    near = (distance < MOVED) & (outside < OUTSIDE)
-    return {int(here[i]): int(there[j]) for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if near[i, j]}
-
-
-def _shares(mine: Spectrum, others: Spectrum) -> np.ndarray:
-    """Shares (k, m) of vectors of complex pairs in the planes of another state's; of equal ones in all of them."""
-    there, vectors = others.upper, others.coordinates(mine)[:, mine.upper]
-    shares = np.zeros((len(mine.upper), len(there)))
-    for group in groups(others.values[there], np.inf, ALIKE):
-        w = others.pairs.right[:, there[group]]
-        shares[:, group] = inside(np.concatenate([w.real, w.imag], axis=1), vectors)[:, None]
-    return shares
-
-
-def same_negative(a: Spectrum, b: Spectrum) -> bool:
-    """Whether the negative eigenvalues of two states, as many, are the same ones, by values or by vectors."""
-    before, after = (np.sort(found.values[found.negative].real) for found in (a, b))
-    if np.allclose(after, before, rtol=1e-3, atol=0.0):  # near rigid motions vectors are round-off
-        return True
-    basis = b.pairs.right[:, b.negative].real
-    return bool(inside(basis, b.coordinates(a)[:, a.negative].real).min() >= 1.0 - OUTSIDE)
-
-
 def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:
     """Cluster of some eigenvalues of a state's ``spectrum``, and the conjugates of complex ones."""
     found = pencil.of(spectrum, np.array(places))
@@ -124,92 +87,6 @@ class Measuring:
     def pencil(self, load: float) -> NonsymmetricPencil:
         """Pencil at a load."""
         return self.eigensolver.at(at_load(self.solver, self.guess, load))
-
-
-class Collisions:
-    """Finds the eigenvalues of a sweep that collide in a step."""
-
-    def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver) -> None:
-        self.solver, self.eigensolver = solver, eigensolver
-        self.units, self._load = solver.system.scene.units, solver.system.scene.load
-
-    def between(self, a: Side, b: Side) -> list[Critical]:
-        """Collisions between two loads, those at one load together; raises :class:`ConvergenceError`."""
-        events, common = list[Critical](), pairs_in_common(b.spectrum, a.spectrum)
-        born = [i for i in b.spectrum.upper.tolist() if i not in common]
-        gone = [i for i in a.spectrum.upper.tolist() if i not in common.values()]
-        for sign, here, there, chosen in ((1, b, a, born), (-1, a, b, gone)):
-            for group in groups(here.spectrum.values[chosen], np.inf, MULTIPLE):
-                event = self._end(here, there, [chosen[i] for i in group])
-                event.change *= sign
-                self._add(events, event)
-        return events
-
-    def _add(self, events: list[Critical], event: Critical) -> None:
-        """Take a collision together with others at its load; none is to be found twice."""
-        near = SAME_LOAD * unit(event.load, one=self.units.load)
-        known = next((e for e in events if e.cluster and event.cluster and abs(e.load - event.load) < near), None)
-        if known is None:
-            events.append(event)
-            return
-        if known.change * event.change > 0 and not event.note:
-            raise ConvergenceError(
-                f"Two pairs end in one collision at {self._load} = {event.load:.8g}: use a smaller range."
-            )
-        known.change += event.change
-        known.uncertainty = max(known.uncertainty, event.uncertainty + abs(known.load - event.load))
-        if abs(event.omega2) < abs(known.omega2):
-            known.omega2, known.cluster = event.omega2, event.cluster
-
-    def _end(self, here: Side, there: Side, upper: list[int]) -> Critical:
-        """Collision, on the way ``there``, of pairs complex ``here``."""
-        cluster = cluster_at(self.eigensolver.at(here.x), here.spectrum, upper)
-        other = measure(self.eigensolver.at(there.x), cluster)
-        D, scale, mean = other.discriminant, abs(other.values).max(), other.cluster.mean
-        just_met = abs(D) < (JUST_MET * scale) ** 2
-        if abs(D) < (MULTIPLE * scale) ** 2:
-            return self._at_once(here, there, other)
-        if D > 0 or just_met:
-            try:
-                return self._located(here, there, cluster, just_met=just_met)
-            except ConvergenceError:
-                if 0 < D < (ALIKE * scale) ** 2:
-                    return self._at_once(here, there, other)
-                if D > 0:
-                    raise
-        elif -D > 4.0 * there.spectrum.noise[abs(there.spectrum.values - mean).argmin()] ** 2:
-            raise ConvergenceError(
-                f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was not "
-                "followed to where it becomes complex: use a smaller range."
-            )
-        return Critical(FLUTTER, there.load, cluster.size, np.inf, mean)
-
-    def _at_once(self, here: Side, there: Side, measured: Measured) -> Critical:
-        """Frequencies that are double ``there``, and complex next to it, on the way from ``here``."""
-        side = ">" if here.load > there.load else "<"
-        note = (
-            f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
-            f"flutter at every {self._load} {side} {there.load:.6g} next to it"
-        )
-        floor, cluster = round_off(there.load, self.units.load), measured.cluster
-        return Critical(FLUTTER, there.load, cluster.size, floor, cluster.mean, cluster, note)
-
-    def _located(self, here: Side, there: Side, cluster: Cluster, *, just_met: bool) -> Critical:
-        """Collision of a cluster between two loads, which may have ``just_met``; raises :class:`ConvergenceError`."""
-        measured, width = Measuring(self.solver, self.eigensolver, here.x), abs(here.load - there.load)
-        located = located_flutter(measured, cluster, (there.load + here.load) / 2, width)
-        load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
-        outside = (load - there.load) * (here.load - there.load) < 0
-        if apart <= uncertainty or (outside and just_met and apart < JUST_MET * width):
-            load, uncertainty = there.load, uncertainty + apart  # at that row, at which they count as real
-        low, high = sorted((here.load, there.load))
-        inside = low - uncertainty <= load <= high + uncertainty and located.uncertainty <= width
-        if not inside or located.slope * (here.load - there.load) > 0:
-            raise ConvergenceError(
-                f"Frequencies that are complex at {self._load} = {here.load:.6g} meet at {load:.6g}, which is none of "
-                "this step: use a smaller range."
-            )
-        return Critical(FLUTTER, load, cluster.size, uncertainty, located.cluster.mean, located.cluster)
 
 
 def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:

@@ -3,9 +3,10 @@ r"""Loads of flutter and of divergence between two loads of a sweep, from all ei
 Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 - mu2)/2)^2``
 passes through zero.  Unlike the eigenvalues, which have a square root there, ``D`` is a smooth function of the load:
 the discriminant of the pencil projected on the two of them.  Its zero is found by Chebyshev interpolation, at spectral
-accuracy and without ever solving at the double eigenvalue.  Where a single real one passes through zero the rod
-diverges: the eigenvalue itself is smooth there.  A step in which what is found does not explain the numbers at both
-ends is parted.
+accuracy and without ever solving at the double eigenvalue.  A complex pair at one load goes on from that at the other
+one whose plane has its vectors, and whose value is near; another one comes from two real ones that meet on the way.
+Where a single real one passes through zero the rod diverges: the eigenvalue itself is smooth there.  A step in which
+what is found does not explain the numbers at both ends is parted.
 
 Frequencies that meet and part again, or pass through zero and back, between two rows show in neither.  In ``nu``
 (:mod:`rodfem.stability.spectrum`) ``D`` of two real ones vanishes where they meet, ``-D`` of a complex pair, and
@@ -33,23 +34,14 @@ import numpy as np
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import SHARP, assignment
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
-from rodfem.diagram.collisions import (
-    Collisions,
-    Critical,
-    Mean,
-    Measuring,
-    Side,
-    cluster_at,
-    interpolated_zero,
-    pairs_in_common,
-    same_negative,
-)
+from rodfem.diagram.collisions import Critical, Mean, Measuring, Side, cluster_at, interpolated_zero, located_flutter
 from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
+from rodfem.stability.cluster import Cluster, Measured, measure
 from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricSolver, groups
-from rodfem.stability.spectrum import Spectrum, times
-from rodfem.tolerances import ROUND_OFF, SAME_SPECIAL, unit
+from rodfem.stability.spectrum import Spectrum, inside, times
+from rodfem.tolerances import ROUND_OFF, SAME_LOAD, SAME_SPECIAL, round_off, unit
 
 PARTS, PART = 100, 0.47
 """Times that steps of a sweep are parted, at most, and where: not in the middle, which is likely to be special."""
@@ -57,6 +49,10 @@ NEARER, CLOSEST = 10, 1e-6  # loads at which a meeting is looked for, at most, a
 SMALL, CLEAR, ONE = 0.3, 100.0, 0.9
 """Relative distance of two eigenvalues that do not meet in a step; products of changes, over their noise, that are none
 of round-off; square of the cosine of two vectors that are nearly one."""
+JUST_MET = 1e-4
+"""Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
+MOVED, OUTSIDE = 0.3, 0.2
+"""Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, of another one."""
 
 
 class CriticalLoads:
@@ -66,7 +62,7 @@ class CriticalLoads:
         """Take equilibria and their eigenvalues from the solvers; ``warn`` gets sentences on what is not clear."""
         self.solver, self.eigensolver, self.warn = solver, eigensolver, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
-        self.collisions, self._zeros, self._parted = Collisions(solver, eigensolver), 0, 0
+        self._zeros = self._parted = 0
         self._ahead = list[Meeting]()
         self.poles = list[int]()  # in the last step: changes of the number of negative eigenvalues through infinity
 
@@ -121,7 +117,7 @@ class CriticalLoads:
 
     def _whole(self, a: Side, b: Side) -> list[Critical]:
         """What happens in a step that is not parted; raises :class:`ConvergenceError` where that is not clear."""
-        events = self.collisions.between(a, b)
+        events = self._collisions(a, b)
         negative = [event for event in events if event.omega2 < 0]
         first, last = len(a.spectrum.negative), len(b.spectrum.negative)
         passed = last - first + sum(event.change for event in negative)
@@ -223,6 +219,115 @@ class CriticalLoads:
         inside = min(max(load, bounds[0]), bounds[1])
         uncertainty += abs(load - inside)
         return Critical(DIVERGENCE, inside, sign * number, uncertainty, 0.0, cluster, zeros=self._zeros)
+
+    def _collisions(self, a: Side, b: Side) -> list[Critical]:
+        """Collisions between two loads, those at one load together; raises :class:`ConvergenceError`."""
+        events, common = list[Critical](), pairs_in_common(b.spectrum, a.spectrum)
+        born = [i for i in b.spectrum.upper.tolist() if i not in common]
+        gone = [i for i in a.spectrum.upper.tolist() if i not in common.values()]
+        for sign, here, there, chosen in ((1, b, a, born), (-1, a, b, gone)):
+            for group in groups(here.spectrum.values[chosen], np.inf, MULTIPLE):
+                event = self._end(here, there, [chosen[i] for i in group])
+                event.change *= sign
+                self._add(events, event)
+        return events
+
+    def _add(self, events: list[Critical], event: Critical) -> None:
+        """Take a collision together with others at its load; none is to be found twice."""
+        near = SAME_LOAD * unit(event.load, one=self.units.load)
+        known = next((e for e in events if e.cluster and event.cluster and abs(e.load - event.load) < near), None)
+        if known is None:
+            events.append(event)
+            return
+        if known.change * event.change > 0 and not event.note:
+            raise ConvergenceError(
+                f"Two pairs end in one collision at {self._load} = {event.load:.8g}: use a smaller range."
+            )
+        known.change += event.change
+        known.uncertainty = max(known.uncertainty, event.uncertainty + abs(known.load - event.load))
+        if abs(event.omega2) < abs(known.omega2):
+            known.omega2, known.cluster = event.omega2, event.cluster
+
+    def _end(self, here: Side, there: Side, upper: list[int]) -> Critical:
+        """Collision, on the way ``there``, of pairs complex ``here``."""
+        cluster = cluster_at(self.eigensolver.at(here.x), here.spectrum, upper)
+        other = measure(self.eigensolver.at(there.x), cluster)
+        D, scale, mean = other.discriminant, abs(other.values).max(), other.cluster.mean
+        just_met = abs(D) < (JUST_MET * scale) ** 2
+        if abs(D) < (MULTIPLE * scale) ** 2:
+            return self._at_once(here, there, other)
+        if D > 0 or just_met:
+            try:
+                return self._located(here, there, cluster, just_met=just_met)
+            except ConvergenceError:
+                if 0 < D < (ALIKE * scale) ** 2:
+                    return self._at_once(here, there, other)
+                if D > 0:
+                    raise
+        elif -D > 4.0 * there.spectrum.noise[abs(there.spectrum.values - mean).argmin()] ** 2:
+            raise ConvergenceError(
+                f"The eigenvalue {here.spectrum.values[upper[0]]:.6g} at {self._load} = {here.load:.6g} was not "
+                "followed to where it becomes complex: use a smaller range."
+            )
+        return Critical(FLUTTER, there.load, cluster.size, np.inf, mean)
+
+    def _at_once(self, here: Side, there: Side, measured: Measured) -> Critical:
+        """Frequencies that are double ``there``, and complex next to it, on the way from ``here``."""
+        side = ">" if here.load > there.load else "<"
+        note = (
+            f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
+            f"flutter at every {self._load} {side} {there.load:.6g} next to it"
+        )
+        floor, cluster = round_off(there.load, self.units.load), measured.cluster
+        return Critical(FLUTTER, there.load, cluster.size, floor, cluster.mean, cluster, note)
+
+    def _located(self, here: Side, there: Side, cluster: Cluster, *, just_met: bool) -> Critical:
+        """Collision of a cluster between two loads, which may have ``just_met``; raises :class:`ConvergenceError`."""
+        measured, width = Measuring(self.solver, self.eigensolver, here.x), abs(here.load - there.load)
+        located = located_flutter(measured, cluster, (there.load + here.load) / 2, width)
+        load, uncertainty, apart = located.load, located.uncertainty, abs(located.load - there.load)
+        outside = (load - there.load) * (here.load - there.load) < 0
+        if apart <= uncertainty or (outside and just_met and apart < JUST_MET * width):
+            load, uncertainty = there.load, uncertainty + apart  # at that row, at which they count as real
+        low, high = sorted((here.load, there.load))
+        inside = low - uncertainty <= load <= high + uncertainty and located.uncertainty <= width
+        if not inside or located.slope * (here.load - there.load) > 0:
+            raise ConvergenceError(
+                f"Frequencies that are complex at {self._load} = {here.load:.6g} meet at {load:.6g}, which is none of "
+                "this step: use a smaller range."
+            )
+        return Critical(FLUTTER, load, cluster.size, uncertainty, located.cluster.mean, located.cluster)
+
+
+def pairs_in_common(mine: Spectrum, others: Spectrum) -> dict[int, int]:
+    """Places of complex eigenvalues of positive imaginary part, and those of the other state that they go on from."""
+    here, there = mine.upper, others.upper
+    if not len(here) or not len(there):
+        return {}
+    a, b = mine.values[here][:, None], others.values[there][None, :]
+    distance, outside = abs(a - b) / abs(a), 1.0 - _shares(mine, others)
+    rows, columns = assignment(distance + outside)
+    near = (distance < MOVED) & (outside < OUTSIDE)
+    return {int(here[i]): int(there[j]) for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if near[i, j]}
+
+
+def _shares(mine: Spectrum, others: Spectrum) -> np.ndarray:
+    """Shares (k, m) of vectors of complex pairs in the planes of another state's; of equal ones in all of them."""
+    there, vectors = others.upper, others.coordinates(mine)[:, mine.upper]
+    shares = np.zeros((len(mine.upper), len(there)))
+    for group in groups(others.values[there], np.inf, ALIKE):
+        w = others.pairs.right[:, there[group]]
+        shares[:, group] = inside(np.concatenate([w.real, w.imag], axis=1), vectors)[:, None]
+    return shares
+
+
+def same_negative(a: Spectrum, b: Spectrum) -> bool:
+    """Whether the negative eigenvalues of two states, as many, are the same ones, by values or by vectors."""
+    before, after = (np.sort(found.values[found.negative].real) for found in (a, b))
+    if np.allclose(after, before, rtol=1e-3, atol=0.0):  # near rigid motions vectors are round-off
+        return True
+    basis = b.pairs.right[:, b.negative].real
+    return bool(inside(basis, b.coordinates(a)[:, a.negative].real).min() >= 1.0 - OUTSIDE)
 
 
 class Meeting(NamedTuple):

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -340,17 +340,15 @@ def _of_branch(branch: Branch, solvers: Sequence[BranchSolver]) -> list[Typical]
     """Modes at the typical states of a branch, each on the mesh of its point; none of a rod without inertia."""
     if solvers[0].system.equations.massless:
         return []
-    finders: dict[int, ModeFinder] = {}
+    finder_on = cache(lambda mesh: ModeFinder(solvers[mesh]))
     rates = solvers[0].system.scene.inertia.order == 1
     double = {special.row: special.omega2 for special in branch.special if not rates}
     out = []
     for row, number in _typical_rows(branch).items():
         point = branch.points[row]
-        if point.mesh not in finders:
-            finders[point.mesh] = ModeFinder(solvers[point.mesh])
         try:
             with as_failure(solvers[point.mesh].system.comm):
-                found = finders[point.mesh].few(point.x, number, double.get(row, np.nan))
+                found = finder_on(point.mesh).few(point.x, number, double.get(row, np.nan))
             out.append(Typical(row, found))
         except (ConvergenceError, InputError) as trouble:
             out.append(Typical(row, None, str(trouble)))
