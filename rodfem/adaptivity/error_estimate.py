@@ -127,14 +127,9 @@ class OrdinateBound:
 
 
 @dataclass(frozen=True)
-class Again:
+class Again(Origin):
     """A point computed again on a richer mesh, and what is left open; ``rho`` is the part of the errors left there."""
 
-    x: PETSc.Vec
-    load: float
-    ordinate: float
-    load_left: float
-    ordinate_left: float
     ordinate_error: float
     rho: float
     changed: float
@@ -164,7 +159,7 @@ class Enriched:
         self.coarse, self.system = solver, richer_system(solver.system)
         self.solver = BranchSolver(self.system)
         self.transfer = partial(transferred, solver.shape, self.system)
-        self.origins: list[tuple[SpecialPoint, Origin, float]] = []
+        self.origins: list[tuple[SpecialPoint, Again]] = []
         self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
         self.of_ordinate = OrdinateBound(solver.shape, self.solver.shape)
         self._coarse, self.indicator = SmoothnessIndicator(solver), SmoothnessIndicator(self.solver)
@@ -201,13 +196,12 @@ class Enriched:
 
     def again(self, point: Point, *, fixed_load: bool) -> Again:
         """Solve for a point on the richer mesh, at its load, once, or across its tangent; or ConvergenceError."""
+        if not fixed_load:
+            return self._again(point, fixed_load=False)
         key = id(point), self.system.damping
-        if fixed_load and key in self._at_loads:
-            return self._at_loads[key][1]
-        found = self._again(point, fixed_load=fixed_load)
-        if fixed_load:
-            self._at_loads[key] = point, found
-        return found
+        if key not in self._at_loads:
+            self._at_loads[key] = point, self._again(point, fixed_load=True)
+        return self._at_loads[key][1]
 
     def _again(self, point: Point, *, fixed_load: bool) -> Again:
         system, x = self.system, self.transfer(point.x, state=True)
@@ -234,9 +228,9 @@ class Enriched:
         """Set the uncertainty of a law of the first mesh: that of the rod's law, infinite without another."""
         self.system.damping = self.coarse.system.damping
         way, again, rho = self.transfer(direction, state=False), None, 0.0
-        for known, origin, left in self.origins:
+        for known, origin in self.origins:
             if known is special:
-                again, rho = normal_form_of(self.solver, origin, way), left
+                again, rho = normal_form_of(self.solver, origin, way), origin.rho
         law.uncertainty = float("inf")
         if again is not None and alike(again, law):
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
@@ -275,9 +269,10 @@ class Enriched:
         sharp = combine(relaxed, np.array([(metric * v).dot(modes[0]) for v in relaxed]))
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(modes[0], sharp, state=False))
-        self.origins.append((special, Origin(found.x, found.load, ordinate, load_left, left), rho))
         ordinate_error = self.of_ordinate(point.x, found.x, left, rho)
-        return Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed, found.last)
+        again = Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed, found.last)
+        self.origins.append((special, again))
+        return again
 
 
 def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:

@@ -101,8 +101,8 @@ class LocusPoint:
     windows: tuple[float, ...] = ()
 
     def reversed(self) -> LocusPoint:
-        """The same point with the opposite tangent."""
-        return replace(self, dp=-self.dp, dx=-self.dx, orientation=-self.orientation)
+        """The same point of the curve that is followed the other way."""
+        return replace(self, dp=-self.dp, dx=-self.dx, s=-self.s, orientation=-self.orientation)
 
 
 class Plane:

@@ -311,7 +311,7 @@ class Curve:
         if onwards.ended != "closed curve":
             ended = back.run(steps).ended
         self.start = len(back.nodes) - 1
-        self.nodes, self.ended = back.nodes[:0:-1] + onwards.nodes, (ended, onwards.ended)
+        self.nodes, self.ended = [n.reversed() for n in back.nodes[:0:-1]] + onwards.nodes, (ended, onwards.ended)
         self.marks = {self.start - i: kind for i, kind in back.marks.items()}
         self.marks |= {self.start + i: kind for i, kind in onwards.marks.items()}
 
@@ -363,15 +363,14 @@ class Curve:
         ]
 
     def _crossings(self, which: int, value: float) -> list[LocusPoint]:
-        """Points at which parameter ``which`` has a ``value``, on either side of the start."""
-        found, back = list[LocusPoint](), self.nodes[: self.start][::-1]
-        for side in (self.nodes[self.start :], [self.nodes[self.start].reversed(), *back]):
-            for a, b in pairwise([side[0], *side]):
-                if b.p[which] == value:
-                    found.append(b)
-                elif (a.p[which] - value) * (b.p[which] - value) < 0 and a.s < b.s:
-                    found += self._crossed(a, b, which, value)
-        return found
+        """Points at which parameter ``which`` has a ``value``, those nearest to the start first."""
+        found = list[LocusPoint]()
+        for a, b in pairwise([self.nodes[0], *self.nodes]):
+            if b.p[which] == value:
+                found.append(b)
+            elif (a.p[which] - value) * (b.p[which] - value) < 0 and a.s < b.s:
+                found += self._crossed(a, b, which, value)
+        return sorted(found, key=lambda n: abs(n.s))
 
     def _crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
         """Point between neighbours ``a``, ``b`` where parameter ``which`` has a ``value``; none if not located."""
@@ -379,9 +378,10 @@ class Curve:
         if node is None:
             return []
         try:
-            return [self.criterion.correct((np.where(axis, value, node.p), node.x, axis, None), node, REACH)]
+            there = self.criterion.correct((np.where(axis, value, node.p), node.x, axis, None), node, REACH)
         except ConvergenceError:
             return [node]
+        return [replace(there, s=node.s)]
 
     def locus(self, error: np.ndarray, unresolved: list[int]) -> Locus:
         """The rows of the curve, with their errors."""

@@ -263,15 +263,14 @@ class Coexisting(NamedTuple):
 
 def with_copies(solver: BranchSolver, point: Point) -> Coexisting:
     """An equilibrium with the number of its copies."""
-    system, known, phase = solver.system, Orbits(solver.system), solver.system.phase
+    known, count = Orbits(solver.system), 1
     known.add(point.x)
-    images = [mirror(solver.shape, point.x) for mirror in mirrors(solver.shape, point.x)]
-    system.phase, count = phase, 1
-    for x in images:
-        if known.distance(x) >= APART:
-            known.add(x)
+    for mirror in mirrors(solver.shape, point.x):
+        image = mirror(solver.shape, point.x)
+        if known.distance(image) >= APART:
+            known.add(image)
             count += 1
-    return Coexisting(point, count, system.active_drifts(point.x))
+    return Coexisting(point, count, solver.system.active_drifts(point.x))
 
 
 def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float) -> list[Point]:

@@ -108,11 +108,13 @@ def mirrors(shape: Shape, x: PETSc.Vec, among: Sequence[Mirror] | None = None) -
     among = candidates(system) if among is None else among
     if not among:
         return []
+    phase = system.phase
     system.set_phase(None)
     base = _generic_state(system, x, 1)
     other = _generic_state(system, base, 2)
     reference, scale = _work(system, base, other)
-    works = ((mirror, _work(system, mirror(shape, base), mirror(shape, other))[0]) for mirror in among)
+    works = [(mirror, _work(system, mirror(shape, base), mirror(shape, other))[0]) for mirror in among]
+    system.phase = phase
     return [mirror for mirror, work in works if abs(work - reference) < NEGLIGIBLE * scale]
 
 

@@ -388,18 +388,9 @@ def trace(
     """Trace the equilibria of a scene and decide the stability of each; collective over the ranks of ``comm``.
 
     Conservative scenes are followed by continuation, from branch to branch; of loads without a potential the range is
-    swept, and frequencies are computed.
-
-    Parameters
-    ----------
-    discretization
-        Elements and degree, by default 8 elements of degree 6; where the plan has an accuracy few elements to start
-        with.
-    plan
-        What is explored, by default the scene's range to a depth of 2; its fields may be given instead, as
-        ``of_plan``: ``trace(scene, depth=1, at=(0.5,))``.
-    observer
-        What hears of the progress; by default nothing does.
+    swept, and frequencies are computed.  The ``discretization`` is by default 8 elements of degree 6, or few elements
+    to start with where the plan has an accuracy; the ``plan`` is the scene's range to a depth of 2; its fields may
+    be given instead, as ``of_plan``: ``trace(scene, depth=1, at=(0.5,))``.  An ``observer`` hears of the progress.
 
     Raises :class:`~rodfem.errors.InputError` for bad input, before any computation, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.  An error after the first

@@ -100,12 +100,11 @@ def image_of(branch: Branch, solver: BranchSolver) -> str:
     shape, (chosen, size) = solver.shape, _sampled(branch, solver)
     if not chosen or any(abs(point.ordinate) <= OTHER * size for point in chosen):
         return ""
-    found, phase = candidates(shape.system), shape.system.phase
+    found = candidates(shape.system)
     for point in chosen:  # the ordinate, which few of them take to its opposite, costs less than the equations
         there = [shape.ordinate(mirror(shape, point.x)) + point.ordinate for mirror in found]
         opposite = [mirror for mirror, left in zip(found, there, strict=True) if abs(left) <= NEGLIGIBLE * size]
         found = mirrors(shape, point.x, opposite)
-    shape.system.phase = phase
     found.sort(key=lambda mirror: (mirror.reversal, -sum(mirror.signs), mirror.signs))
     return found[0].in_words() if found else ""
 
@@ -113,10 +112,9 @@ def image_of(branch: Branch, solver: BranchSolver) -> str:
 def other_ordinates(branch: Branch, first: Point, image: Point, solver: BranchSolver) -> str:
     """Words for the symmetry that carries a ``branch`` to one of other ordinates; empty if it keeps their size."""
     shape, system, (chosen, size) = solver.shape, solver.system, _sampled(branch, solver)
-    near, phase = CARRIED * system.norm(first.x - image.x), system.phase
+    near = CARRIED * system.norm(first.x - image.x)
     found = [m for m in candidates(system) if system.norm(m(shape, first.x) - image.x) <= near]
     found = mirrors(shape, first.x, found)  # a small imperfection carries the one near the other, too
-    system.phase = phase
     for mirror in found:
         changes = [abs(shape.ordinate(mirror(shape, p.x))) - abs(p.ordinate) for p in chosen]
         if all(abs(change) <= OTHER * size for change in changes):
