@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, pairwise
-from typing import Any
 
 import numpy as np
 
@@ -122,8 +121,8 @@ class _Search:
         self.names = [*chain(*own)]
         self.numbers = np.array([scene.parameters[n].value for n in self.names])
         self.limits = np.repeat([field.bounds for field in fields.values()], [*map(len, own)], axis=0)
-        ends = np.cumsum([0, *map(len, own)]).tolist()
-        self.own = [slice(*pair) for pair in pairwise(ends)]
+        self.own = [slice(*pair) for pair in pairwise(np.cumsum([0, *map(len, own)]).tolist())]
+        self.means = [(f, own) for f, own in zip(fields.values(), self.own, strict=True) if f.mean is not None]
 
     @property
     def rod(self) -> Scene:
@@ -161,13 +160,17 @@ class _Search:
         size, extra = float(abs(begin).max()), int(self.bound)
         room = share * np.maximum(abs(self.numbers), abs(self.numbers).mean())
         low, high = (np.clip(self.numbers + side * room, *self.limits.T) for side in (-1, 1))
+        held, k = partial(self._held, near, size), len(begin) * extra
         answer = minimize(
             partial(self._least, near, size),
             np.append(self.numbers, [begin.min() / size] * extra),
             jac=True,
             method="SLSQP",
             bounds=[*zip(low, high, strict=True), *[(None, None)] * extra],
-            constraints=[*self._means(), *([self._bounded(near, size)] if extra else [])],
+            constraints=[
+                {"type": kind, "fun": lambda z, of=of: held(z)[0][of], "jac": lambda z, of=of: held(z)[1][of]}
+                for kind, of in (("ineq", slice(k)), ("eq", slice(k, None)))
+            ],
             options={"maxiter": 200, "ftol": SAME**1.5},
         )
         self.numbers, self.reached, self.message = answer.x[:n], bool(answer.success), str(answer.message)
@@ -192,26 +195,15 @@ class _Search:
         parts = [(self.aim(loads + step) - self.aim(loads - step)) / (2 * step.max()) for step in steps]
         return -self.aim(loads), -np.array(parts) @ slopes
 
-    def _bounded(self, near: Neighbours, size: float) -> dict[str, Any]:
-        """Each load is ``t`` at least."""
-        n = len(self.names)
-
-        def slopes(z: np.ndarray) -> np.ndarray:
-            found = self._loads(near, z[:n])[1] / size
-            return np.column_stack([found, -np.ones(len(found))])
-
-        return {"type": "ineq", "fun": lambda z: self._loads(near, z[:n])[0] / size - z[n], "jac": slopes}
-
-    def _means(self) -> list[dict[str, Any]]:
-        """Means of the fields that are given."""
-
-        def value(field: Field, own: slice, z: np.ndarray) -> float:
-            return field.volume(z[own])[0] - (field.mean or 0.0)
-
-        def slopes(field: Field, own: slice, z: np.ndarray) -> np.ndarray:
-            row = np.zeros(len(z))
-            row[own] = field.volume(z[own])[1]
-            return row
-
-        given = [pair for pair in zip(self.fields.values(), self.own, strict=True) if pair[0].mean is not None]
-        return [{"type": "eq", "fun": partial(value, *pair), "jac": partial(slopes, *pair)} for pair in given]
+    def _held(self, near: Neighbours, size: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What is not negative, loads over ``t``, and then what is zero, means of fields; and their derivatives."""
+        n, values, slopes = len(self.names), list[float](), list[np.ndarray]()
+        if self.bound:
+            loads, rows = self._loads(near, z[:n])
+            values, slopes = (loads / size - z[n]).tolist(), [np.append(row / size, -1.0) for row in rows]
+        for field, own in self.means:
+            mean, row = field.volume(z[own])
+            values.append(mean - float(field.mean or 0.0))
+            slopes.append(np.zeros(len(z)))
+            slopes[-1][own] = row
+        return np.array(values), np.reshape(slopes, (-1, len(z)))

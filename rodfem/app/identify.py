@@ -8,8 +8,9 @@ the deviations are not known (m data, n unknowns).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from rodfem.fem.state import line
 from rodfem.output.words import number
 from rodfem.problem.arguments import checked
 from rodfem.problem.field import Field, names, with_fields
+from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
 
 CRITICAL, ORDINATE, SHAPE = "critical loads", "ordinate", "shape"
@@ -78,22 +80,12 @@ def identify(
     to their largest datum.  Raises :class:`~rodfem.errors.InputError` for data and names that make no sense, and
     :class:`~rodfem.errors.ConvergenceError` for what the data do not determine.
     """
-    tables = _tables(data, deviations)
-    model = _Model(*_unknowns(scene, unknown), tables, discretization or Discretization())
+    tables, fields = _tables(data, deviations), dict(unknown) if isinstance(unknown, Mapping) else {}
+    rod, chosen = with_fields(scene, fields), [n for name, field in fields.items() for n in names(name, field)]
+    model = _Model(rod, chosen or list(unknown), tables, discretization or Discretization())
     sizes = {kind: float(abs(table[:, -1]).max()) if len(tables) > 1 else 1.0 for kind, table in tables.items()}
     weights = np.repeat([(deviations or sizes)[kind] for kind in tables], [*map(model.count, tables)])
     return _fitted(model, weights, known=bool(deviations))
-
-
-def _unknowns(scene: Scene, unknown: Sequence[str] | Mapping[str, Field]) -> tuple[Scene, list[str]]:
-    """The scene with fields, if there are any, and names of its unknown constants; raises :class:`InputError`."""
-    fields = dict(unknown) if isinstance(unknown, Mapping) else {}
-    rod, chosen = with_fields(scene, fields), [n for name, field in fields.items() for n in names(name, field)]
-    chosen = chosen or list(unknown)
-    for name in chosen:
-        if name not in rod.parameters or name == rod.load:
-            raise InputError(f"{name!r} is no constant of the scene apart from its load: choose another unknown.")
-    return rod, chosen
 
 
 def _fitted(model: _Model, weights: np.ndarray, *, known: bool) -> Identified:
@@ -151,11 +143,13 @@ class _Model:
     """Residuals of the data of a scene, and their derivatives in the ``chosen`` constants."""
 
     def __init__(self, scene: Scene, chosen: list[str], tables: dict[str, np.ndarray], mesh: Discretization) -> None:
-        self.scene, self.tables, self.chosen, self.mesh = scene, tables, chosen, mesh
+        for name in chosen:
+            scene.check_constant(name)
+        self.scene, self.tables, self.chosen = scene, tables, chosen
         self.solver, self._values = Solver(scene, mesh), {name: p.value for name, p in scene.parameters.items()}
         loads = sorted({float(row[0]) for kind in (ORDINATE, SHAPE) for row in tables.get(kind, ())})
         ascending = scene.span[0] <= scene.span[1]
-        self._states, self._last = dict[float, PETSc.Vec](), dict[bytes, Rows]()
+        self._states = dict[float, PETSc.Vec]()
         point = None
         for load in loads if ascending else loads[::-1]:
             point = self.solver.equilibrium(load, point)
@@ -174,20 +168,18 @@ class _Model:
     def at(self, p: np.ndarray) -> Rows:
         """Residuals (m,) and their derivatives (m, n); not finite where the rod is lost."""
         key = np.asarray(p).tobytes()
-        if key not in self._last:
-            try:
-                self._last[key] = self._rows(dict(zip(self.chosen, p.tolist(), strict=True)))
-            except ConvergenceError:
-                m = sum(map(self.count, self.tables))
-                self._last[key] = np.full(m, np.inf), np.zeros((m, len(p)))
-        return self._last[key]
+        try:
+            return derived(self, key, lambda: self._rows(dict(zip(self.chosen, p.tolist(), strict=True))))
+        except ConvergenceError:
+            m = sum(map(self.count, self.tables))
+            return np.full(m, np.inf), np.zeros((m, len(p)))
 
     def _rows(self, values: Values) -> Rows:
         own, equilibria = {**self._values, **values}, self.solver.equilibria
         with kept(equilibria.system):
             self._states = in_parts(self._moved, self._states, (self._values, own))
             self._values = own
-            parts = [getattr(self, OF[kind])(table) for kind, table in self.tables.items()]
+            parts = [self._of(kind, table) for kind, table in self.tables.items()]
         return np.concatenate([f for f, _ in parts]), np.concatenate([J for _, J in parts])
 
     def _moved(self, states: Mapping[float, PETSc.Vec], values: Values) -> dict[float, PETSc.Vec]:
@@ -200,42 +192,29 @@ class _Model:
                 raise ConvergenceError(f"No equilibrium was found at {self.scene.load} = {load:g}.")
         return out
 
-    def _loads(self, table: np.ndarray) -> Rows:
-        assert self._critical is not None
-        found = sorted(self._critical.at({n: self._values[n] for n in self.chosen}), key=lambda each: each.load)
-        return np.array([x.load for x in found]) - table[:, 0], np.array([gradient(x, self.chosen) for x in found])
-
-    def _ordinates(self, table: np.ndarray) -> Rows:
-        shape = self.solver.equilibria.shape
-        rows = [self._of(load, lambda x: np.array([shape.ordinate(x)])) for load in table[:, 0].tolist()]
-        return np.concatenate([f for f, _ in rows]) - table[:, 1], np.concatenate([J for _, J in rows])
-
-    def _shapes(self, table: np.ndarray) -> Rows:
-        shape, system = self.solver.equilibria.shape, self.solver.equilibria.system
-        f, J = np.empty((len(table), 3)), np.empty((len(table), 3, len(self.chosen)))
-        for load in self._states:
+    def _of(self, kind: str, table: np.ndarray) -> Rows:
+        """Residuals of a table, and their derivatives."""
+        if self._critical is not None and kind == CRITICAL:
+            found = sorted(self._critical.at({n: self._values[n] for n in self.chosen}), key=lambda each: each.load)
+            return np.array([x.load for x in found]) - table[:, 0], np.array([gradient(x, self.chosen) for x in found])
+        data, solver = table[:, 1 if kind == ORDINATE else 2 :], self.solver.equilibria
+        f, J = np.empty(data.shape), np.empty((*data.shape, len(self.chosen)))
+        for load, x in self._states.items():
             here = np.flatnonzero(table[:, 0] == load)
-            weights = [(s, shape.weights(s)) for s in table[here, 1].tolist()]
-
-            def places(x: PETSc.Vec, weights: list[Any] = weights) -> np.ndarray:
-                return np.array([shape.place(system.at(x), *each)[0] for each in weights]).ravel()
-
-            if len(here):
-                of, slopes = self._of(load, places)
-                f[here], J[here] = of.reshape(-1, 3) - table[here, 2:], slopes.reshape(len(here), 3, -1)
+            of = partial(self._measured, kind, table[here, 1])
+            f[here] = of(x) - data[here]
+            for i, name in enumerate(self.chosen if len(here) else ()):
+                J[here, :, i] = state_derivative(solver, x, name, of)
         return f.ravel(), J.reshape(f.size, -1)
 
-    def _of(self, load: float, of: Callable[[PETSc.Vec], np.ndarray]) -> Rows:
-        """Numbers of a state, and their derivatives."""
-        x = self._states[load]
-        slopes = [state_derivative(self.solver.equilibria, x, name, of) for name in self.chosen]
-        return of(x), np.transpose(slopes)
+    def _measured(self, kind: str, s: np.ndarray, x: PETSc.Vec) -> np.ndarray:
+        """What is measured of a state: its ordinate, or places at arclengths ``s`` (m,), as rows."""
+        shape, system = self.solver.equilibria.shape, self.solver.equilibria.system
+        if kind == ORDINATE:
+            return np.full((len(s), 1), shape.ordinate(x))
+        return np.array([shape.place(system.at(x), each, shape.weights(each))[0] for each in s.tolist()]).reshape(-1, 3)
 
     def points(self, found: Values) -> list[Point]:
         """Equilibria of the rod that was found, with their index."""
         solver = self.solver.rebind(**found)
         return [solver.equilibrium(load, x) for load, x in self._states.items()]
-
-
-OF = {CRITICAL: "_loads", ORDINATE: "_ordinates", SHAPE: "_shapes"}
-"""Methods that compare a model with each kind of data."""

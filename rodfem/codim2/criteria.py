@@ -110,12 +110,7 @@ class Plane:
 
     def __init__(self, system: System, parameter: str, intervals: tuple[Interval, Interval]) -> None:
         scene = system.scene
-        if parameter not in scene.parameters:
-            raise SceneError(
-                f"{parameter!r} is no parameter of the scene: choose one of {', '.join(scene.parameters)}."
-            )
-        if parameter == scene.load:
-            raise SceneError(f"{parameter!r} is the load itself: choose a second parameter to vary.")
+        scene.check_constant(parameter)
         self.system, self.names, self.intervals = system, (scene.load, parameter), intervals
         for name, (low, high) in zip(self.names, intervals, strict=True):
             if not low < high:

@@ -25,7 +25,6 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.shape import halved
 from rodfem.output.words import number
 from rodfem.problem.functions import derived
-from rodfem.problem.scene import Scene
 from rodfem.tolerances import TINY, unit
 
 PIECES = 4
@@ -75,7 +74,7 @@ def derivative(special: SpecialPoint, parameter: str, *, along_the_rod: bool = F
     destroys the point, which then has no derivative.
     """
     solver = special.point.own_solver
-    check_parameter(solver.system.scene, parameter)
+    solver.system.scene.check_constant(parameter)
     if along_the_rod and not special.kind.singular:
         raise InputError(f"A density along the rod is known at folds and branch points, not at {special.kind.words}.")
     check_special(solver, special)
@@ -121,13 +120,6 @@ def tolerance(special: SpecialPoint, deviations: Mapping[str, float]) -> Toleran
     slopes = {name: abs(derivative(special, name).value) for name in deviations}
     parts = {known[name].words or name: deviations[name] * slope for name, slope in slopes.items()}
     return Tolerance(special.point.load, parts, special.error_estimate)
-
-
-def check_parameter(scene: Scene, parameter: str) -> None:
-    """Raise :class:`InputError` for what is no constant of a scene apart from its load."""
-    if parameter not in scene.parameters or parameter == scene.load:
-        others = ", ".join(name for name in scene.parameters if name != scene.load)
-        raise InputError(f"{parameter!r} is no parameter of the scene apart from its load: choose one of {others}.")
 
 
 def adjoint_of(special: SpecialPoint) -> Adjoint:
@@ -216,7 +208,7 @@ def ordinate_derivative(point: Point, parameter: str) -> Derivative:
     Raises :class:`InputError` for what is no constant, and :class:`ConvergenceError` where the state is singular.
     """
     solver = point.own_solver
-    check_parameter(solver.system.scene, parameter)
+    solver.system.scene.check_constant(parameter)
     value = _of_ordinate(solver, point.x, parameter)
 
     def bounds() -> tuple[float, float]:

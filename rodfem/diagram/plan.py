@@ -150,10 +150,7 @@ class Plan:
 
     @staticmethod
     def _check_locus(scene: Scene, name: str, low: float, high: float) -> None:
-        if name == scene.load or name not in scene.parameters:
-            others = ", ".join(sorted(scene.parameters.keys() - {scene.load}))
-            choose = f"choose one of {others}" if others else "the scene has none apart from its load, so add one"
-            raise InputError(f"{name!r} is no second parameter: {choose}.")
+        scene.check_constant(name)
         if name not in asked_for(scene):
             raise InputError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
         value = scene.parameters[name].value

@@ -73,7 +73,8 @@ class Field:
             return (max if known else ufl.max_value)(0.0, 1.0 - abs((n - 1) * t - i))
         if known:
             return float(min(int(n * t), n - 1) == i)
-        return ufl.conditional(ufl.lt(abs(n * t - i - 0.5), 0.5), 1.0, 0.0)
+        begun = [ufl.conditional(ufl.ge(n * t, j), 1.0, 0.0) if 0 < j < n else float(j == 0) for j in (i, i + 1)]
+        return begun[0] - begun[1]
 
     def table(self, t: np.ndarray) -> np.ndarray:
         """The same at parts ``t`` (m,) of the rod, (m, numbers): times the numbers it is the field."""
@@ -110,9 +111,7 @@ def with_fields(scene: Scene, fields: Mapping[str, Field]) -> Scene:
     """The scene with ``fields`` in the place of constants, which begin uniform; points keep the constant."""
     parameters, breaks = dict(scene.parameters), {*scene.breaks}
     for name, field in fields.items():
-        if name not in scene.parameters or name == scene.load:
-            known = ", ".join(other for other in scene.parameters if other != scene.load)
-            raise InputError(f"{name!r} is no constant that could vary along the rod: choose one of {known}.")
+        scene.check_constant(name)
         parameters |= field.parameters(name, parameters[name])
         breaks |= {scene.interval[0] + i / field.pieces * scene.length for i in range(1, field.pieces)}
 

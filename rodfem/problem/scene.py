@@ -386,6 +386,13 @@ class Scene(Contribution, metaclass=Stated):
         parameters = {n: replace(p, value=values.get(n, p.value)) for n, p in self.parameters.items()}
         return replace(self, load=load or self.load, span=span or self.span, parameters=parameters)
 
+    def check_constant(self, name: str) -> None:
+        """Raise :class:`SceneError` for what is no parameter, or the load."""
+        if name not in self.parameters or name == self.load:
+            others = ", ".join(sorted(self.parameters.keys() - {self.load}))
+            choose = f"choose one of {others}" if others else "there is none, so add one"
+            raise SceneError(f"{name!r} is no constant of the scene apart from its load: {choose}.")
+
     def in_space(self) -> Scene:
         """Return the same rod, free to leave its plane."""
         return replace(self, planar=None)

@@ -36,8 +36,8 @@ LINES = {
     "--search -3 --at 0.1": "is not a number of tries",
     "--locus A 0": "expected 3 arguments",
     "--locus A x y": "is no interval",
-    "--locus Q 0 1": "is no second parameter",
-    "--locus lam 0 1": "is no second parameter",
+    "--locus Q 0 1": "is no constant of the scene",
+    "--locus lam 0 1": "is no constant of the scene",
     "--locus A -3 -3": "does not hold its value",
     "--locus A -3 1e308": "cannot reach A = 1e.308",
     # constants

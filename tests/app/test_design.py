@@ -60,7 +60,8 @@ def test_fields_and_their_means() -> None:
         assert (field.volume(numbers + 1e-6 * slopes)[0] - mean) / 1e-6 == pytest.approx(slopes @ slopes, rel=1e-5)
         varying = with_fields(column("pinned"), {"A": field})
         rod = varying.varying(**dict(zip(names("A", field), numbers.tolist(), strict=True)))
-        assert rod.stiffness(0.33)[0, 0] == pytest.approx((field.table(np.array([0.33])) @ numbers)[0] ** 2)
+        for place in (0.0, 0.2, 0.33, 1.0):
+            assert rod.stiffness(place)[0, 0] == pytest.approx((field.table(np.array([place])) @ numbers)[0] ** 2)
     with pytest.raises(InputError, match="choose one of linear, constant, sines"):
         Field(5, kind="cubic")
     with pytest.raises(InputError, match="choose one of A"):

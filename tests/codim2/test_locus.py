@@ -252,8 +252,8 @@ def test_saved_and_drawn(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("parameter", "bounds", "message"),
     [
-        ("D", PLANE, "'D' is no parameter of the scene"),
-        ("lam", PLANE, "is the load itself"),
+        ("D", PLANE, "'D' is no constant of the scene"),
+        ("lam", PLANE, "'lam' is no constant of the scene"),
         ("A", ((0.01, 0.9), (1.0, -1.0)), "bounds 1, -1 of A are empty"),
         ("A", ((0.01, 2.0), (-3.1, 1.0)), "outside its admissible range"),
         ("A", ((0.01, 0.9), (-4.0, 1.0)), "not convex"),
