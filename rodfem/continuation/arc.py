@@ -261,6 +261,11 @@ class Piece(Chord):
         knot = Knot(x, tangent * (1.0 / speed), speed, reduced)
         return Node(self.place(x), Q.T @ reduced.H @ Q, Q.T @ reduced.rate @ Q / speed, reduced.far, knot)
 
+    def whole(self, node: Node) -> Node:
+        """The same with all amplitudes."""
+        found = node.kept.reduced
+        return replace(node, H=found.H, slope=found.rate / node.kept.speed)
+
     def turn(self, p: Node, q: Node) -> float | None:
         """Where the load turns back between two nodes; None where it does not."""
         load = self.solver.system.scalar

@@ -107,29 +107,44 @@ def places(a: Node, b: Node, order: int) -> list[float]:
     return sorted(float(t.real) for t in found if abs(t.imag) < REAL and 0.0 <= t.real <= 1.0)
 
 
-def fourth(a: Node, b: Node, c: Node) -> np.ndarray:
-    """Size ``|H''''|/4!`` of the fourth derivative (k, k), by what node ``c`` is off the cubic, and its slope."""
-    h, left, right = b.s - a.s, c.s - a.s, c.s - b.s
+def fourth(a: Node, b: Node, c: Node | None) -> np.ndarray:
+    """Size ``|H''''|/4!`` of the fourth derivative (k, k), by what node ``c`` is off the cubic, and its slope.
+
+    Without another node it is that of the second and third term: in a short first step they are larger.
+    """
+    h = b.s - a.s
+    if c is None:
+        return _size(np.stack(coefficients(a, b)[2:]), np.full(2, h**4))
+    left, right = c.s - a.s, c.s - b.s
     steep = 2 * abs(left * right) * max(abs(left + right), h / 2)  # in the middle slopes do not tell
-    out = np.zeros_like(c.H)
-    for off, scale in ((c.H - at(a, b, left / h), (left * right) ** 2), (c.slope - at(a, b, left / h, 1) / h, steep)):
-        values, vectors = np.linalg.eigh(off)
-        out += vectors * abs(values) @ vectors.T / scale  # (off^2)^(1/2)
-    return out
+    off = np.stack([c.H - at(a, b, left / h), c.slope - at(a, b, left / h, 1) / h])
+    return _size(off, np.array([(left * right) ** 2, steep]))
 
 
-def clear(a: Node, b: Node, off: np.ndarray | None) -> bool:
-    """Whether ``H``, from which the cubic is ``off`` at most, is regular between two nodes, by a cheap test."""
-    if off is None or a.far != b.far:
+def _size(matrices: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    """Sum of the absolute values ``(X^2)^(1/2)`` of symmetric ``matrices`` (m, k, k) over ``scales`` (m,)."""
+    values, vectors = np.linalg.eigh(matrices)
+    return np.asarray((vectors * (abs(values) / scales[:, None])[:, None, :] @ vectors.swapaxes(1, 2)).sum(axis=0))
+
+
+def clear(a: Node, b: Node, off: np.ndarray) -> bool:
+    """Whether ``H``, from which the cubic is ``16 t^2 (1 - t)^2 off`` at most, is regular between two nodes.
+
+    That is a multiple of the middle one of Bernstein's quartics, in which the cubic has these control matrices.
+    """
+    if a.far != b.far:
         return False
     h = (b.s - a.s) / 3
-    control = np.stack([a.H, a.H + h * a.slope, b.H - h * b.slope, b.H])
+    left, right = a.H + h * a.slope, b.H - h * b.slope
+    control = np.stack([a.H, (a.H + 3 * left) / 4, (left + right) / 2, (3 * right + b.H) / 4, b.H])
     values, vectors = np.linalg.eigh(a.H + b.H)
-    n = int((values < 0).sum())
-    turned, margin = vectors.T @ control @ vectors, vectors.T @ off @ vectors
+    n, turned = int((values < 0).sum()), vectors.T @ control @ vectors
+    margin = np.zeros_like(turned)
+    margin[2] = 16 / 6 * vectors.T @ off @ vectors
+    low, high = (turned + margin)[:, :n, :n], (turned - margin)[:, n:, n:]
     return bool(
-        (n == 0 or np.linalg.eigvalsh(turned[:, :n, :n] + margin[:n, :n])[:, -1].max() < 0)
-        and (n == len(values) or np.linalg.eigvalsh(turned[:, n:, n:] - margin[n:, n:])[:, 0].min() > 0)
+        (n == 0 or np.linalg.eigvalsh(low)[:, -1].max() < 0)
+        and (n == len(values) or np.linalg.eigvalsh(high)[:, 0].min() > 0)
     )
 
 
@@ -141,9 +156,9 @@ class Zeros:
     tolerance: float  # of eigenvalues of several modes that pass zero at one place
     misses: list[Node] = field(default_factory=list)  # where an eigenvalue is nearly zero, and does not pass it
 
-    def between(self, a: Node, b: Node, size: np.ndarray | None = None, depth: int = 0) -> list[Crossing]:
+    def between(self, a: Node, b: Node, size: np.ndarray, depth: int = 0) -> list[Crossing]:
         """All crossings in a piece divided ``depth`` times, by the ``size`` of its :func:`fourth` derivative."""
-        off = None if size is None else SAFE * (b.s - a.s) ** 4 / 16 * size
+        off = SAFE * (b.s - a.s) ** 4 / 16 * size
         if clear(a, b, off):
             return []
         found = roots(a, b)
@@ -173,7 +188,7 @@ def _passed(a: Node, b: Node, groups: list[list[float]]) -> list[Crossing]:
 
 
 def _division(
-    a: Node, b: Node, found: np.ndarray, groups: list[list[float]], off: np.ndarray | None
+    a: Node, b: Node, found: np.ndarray, groups: list[list[float]], off: np.ndarray
 ) -> tuple[float | None, bool]:
     """Where a piece is to be divided, None if it need not, and whether that is at a near miss of zero."""
     if a.far == b.far and len(groups) > 1:
@@ -182,7 +197,7 @@ def _division(
     near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0) & (found.real < 1)]
     if a.far == b.far and len(near):
         return float(np.clip(near[abs(near.imag).argmin()].real, 0.02, 0.98)), True
-    if a.far != b.far or off is None or not groups:
+    if a.far != b.far or not groups:
         return 0.47, False
     place = float(np.mean(groups[0]))
     return None if _alone(a, b, groups[0], off) else (place + float(place < 0.5)) / 2, False

@@ -56,7 +56,7 @@ from rodfem.fem.state import Line
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.inertia import Factored
-from rodfem.stability.reduced_stiffness import DIFFERENCE, Bordered
+from rodfem.stability.reduced_stiffness import DIFFERENCE, Bordered, bordered_of
 from rodfem.tolerances import TINY
 
 FREE = 1e-8
@@ -175,12 +175,12 @@ class SingularSystem:
 
     def relaxed(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
         """Modes of the border and left ones, relaxed at a state: a step of inverse iteration."""
-        sides, *_ = self._modes(self.inertia.at(x).matrix)
+        _, sides, *_ = self._modes(self.inertia.at(x).matrix)
         return sides[0], sides[-1]
 
     def adjoint(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]]]:
         """Null vectors at a solution, and ``y`` (k, k), ``S y_ij = -D(S v_i) v_j`` across them; no ``y`` at folds."""
-        (V, *_), G, _ = self._modes(self._at(x, 0.0).matrix)
+        _, (V, *_), G, _ = self._modes(self._at(x, 0.0).matrix)
         (Z, N), bordered = self._split(G), self._bordered[0]
         null = [combine(V, z) for z in Z.T]
         if self.fold:
@@ -191,14 +191,14 @@ class SingularSystem:
                 matrix = self._at(x + v * (step * DIFFERENCE), 0.0, moved=True).matrix
                 for image, other in zip(row, null, strict=True):
                     image.axpy(weight / (2 * DIFFERENCE), self._image(matrix, other))
-        return null, [[self._across(bordered.solve(-y, np.zeros(len(V))), V, (N, G)) for y in row] for row in images]
+        return null, [[self._across(bordered.solve([-y]), V, (N, G)) for y in row] for row in images]
 
     def _across(
-        self, solved: tuple[PETSc.Vec, np.ndarray], V: Vectors, near: tuple[np.ndarray, np.ndarray]
+        self, solved: tuple[list[PETSc.Vec], np.ndarray], V: Vectors, near: tuple[np.ndarray, np.ndarray]
     ) -> PETSc.Vec:
-        """Solution of bordered equations, with what modes near by have of it."""
-        y, forces = solved
-        return combine([y, *V], np.array([1.0, *(near[0] @ self._rest(*near, -forces))]))
+        """First solution of bordered equations, with what modes near by have of it."""
+        (y, *_), forces = solved
+        return combine([y, *V], np.array([1.0, *(near[0] @ self._rest(*near, -forces[:, 0]))]))
 
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
@@ -249,38 +249,44 @@ class SingularSystem:
         self.system.line = self._section.second(self.system.scalar(x))
         return self.inertia.at(there).border.copy()
 
-    def _modes(self, matrix: PETSc.Mat) -> tuple[list[list[PETSc.Vec]], np.ndarray, int]:
-        """V, and its left counterpart if S is not symmetric, G, and the other negative eigenvalues, by new factors."""
-        sides = [(matrix, self.psi, self.phi)]
+    def _modes(
+        self, matrix: PETSc.Mat, columns: Vectors = ()
+    ) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]], np.ndarray, int]:
+        """Solutions for ``columns`` by new factors; V, with its left counterpart if S is not symmetric.
+
+        Then the multipliers (m, columns + m) of both, and the number of other negative eigenvalues.
+        """
+        count, sides = len(columns), [(matrix, self.psi, self.phi)]
         if self.psi is not self.phi:
             sides.append((matrix.transpose(self._transposed), self.phi, self.psi))
-        if not self._bordered:
-            constraints = self.inertia.constraints if len(sides) == 1 else None
-            self._bordered = [Bordered(self.system, side, len(self.psi), constraints) for side, *_ in sides]
+            self._bordered = self._bordered or [Bordered(self.system, side, len(self.psi), None) for side, *_ in sides]
+        else:
+            self._bordered = [bordered_of(self.inertia, len(self.psi))]
         counts = [bordered.factor(*side) for bordered, side in zip(self._bordered, sides, strict=True)]
-        solved = [bordered.modes() for bordered in self._bordered]
-        return [V for V, _ in solved], solved[0][1], counts[0]
+        solved, border = self._bordered[0].solve(columns)
+        left = [bordered.solve()[0] for bordered in self._bordered[1:]]
+        return solved[:count], [solved[count:], *left], border, counts[0]
 
     def _linear(self, x: PETSc.Vec, t: float, old: _Linear | None = None, *, sharp: bool = False) -> _Linear:
         """Factor the bordered matrix, and solve with it; derivatives of an ``old`` linearisation serve again."""
-        system, none = self.system, np.zeros(len(self.psi))
+        system = self.system
         columns = [] if self._section is None or old else [self._second(x, t)]
         found = self._at(x, t)
-        sides, G, _ = self._modes(found.matrix)
         columns.insert(0, found.border.copy())
-        residual, V = system.new_vector(), sides[0]
+        residual = system.new_vector()
         system.at(x).residual(residual)
-        s, c = self._bordered[0].solve(-residual, none)
+        forces = [residual, *([] if old else columns)]
+        (s, *responses), sides, border, _ = self._modes(found.matrix, [-force for force in forces])
+        V = sides[0]
         if old is not None:
-            at = replace(old, vectors=[s, *old.vectors[1 : -len(V)], *V], border=np.column_stack([c, old.b, G]))
+            border = np.column_stack([border[:, 0], old.b, border[:, 1:]])
+            at = replace(old, vectors=[s, *old.vectors[1 : -len(V)], *V], border=border)
         else:
-            responses = [self._bordered[0].solve(-column, none) for column in columns]
-            system.set_load(responses[0][0], 1.0)
-            Z, N = self._split(G)
+            system.set_load(responses[0], 1.0)
+            Z, N = self._split(border[:, -len(V) :])
             null, left = ([combine(side, z) for z in Z.T] for side in (V, sides[-1]))
-            border = np.column_stack([c, *(b for _, b in responses), G])
             y, f = self._along_null(x, t, (null, left), sharp=sharp)
-            at = _Linear([s, *(w for w, _ in responses), *V], border, columns, Z, N, left, y, f, border)
+            at = _Linear([s, *responses, *V], border, columns, Z, N, left, y, f, border)
         return replace(at, rows=self._equations(x, at))
 
     def _split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -382,7 +388,7 @@ class SingularSystem:
         if self._section is not None:  # the derivatives so far are those of an iterate
             at, changes = self._linear(x, t, sharp=True), [1.0, *np.zeros(len(share))]
         matrix = self._at(x, t).matrix
-        (modes, *_), *_ = self._modes(matrix)  # of this very state
+        _, (modes, *_), *_ = self._modes(matrix)  # of this very state
         null = [combine(modes, z) for z in at.Z.T]
         # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times
         noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale  # or all vanish
@@ -452,7 +458,7 @@ class SingularSystem:
     def _negative(self, N: np.ndarray) -> int:
         """Eigenvalues clearly below zero, but for those that vanish, at the state that the matrix holds."""
         self.inertia.move(-self.inertia.tolerance)
-        _, G, far = self._modes(self.inertia.matrix)
+        _, _, G, far = self._modes(self.inertia.matrix)
         G = N.T @ G @ N
         return far + int((np.linalg.eigvalsh(G + G.T) > 0).sum())
 

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from rodfem.continuation.arc import STRAYED, Piece
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.crossings import Crossing, Node
+from rodfem.continuation.crossings import Crossing, Node, at
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
 from rodfem.errors import SMALLER_STEPS
@@ -23,7 +23,7 @@ from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import across, combine, orthonormalize
 from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import Index
-from rodfem.stability.reduced_stiffness import SOFT, ReducedStiffness
+from rodfem.stability.reduced_stiffness import SOFT
 from rodfem.tolerances import SAME_LOAD, round_off
 
 COUPLED = 1e-5
@@ -85,12 +85,12 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     """Candidate of a crossing."""
     p, q = crossing.piece
     x, slope = piece.curve(p, q, crossing.s)
-    reduced = _reduced(piece, x, slope, piece.phi)
-    values, own = np.linalg.eigh(reduced.H)
+    t, (a, b) = (crossing.s - p.s) / (q.s - p.s), (node.kept.reduced for node in crossing.piece)
+    values, own = np.linalg.eigh(at(piece.whole(p), piece.whole(q), t))
     order = np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0))
     before, after, count = crossing.before, crossing.after, crossing.vectors.shape[1]
     near = [i for i in order[count:] if abs(values[i]) < 0.01 * piece.solver.inertia.scale]
-    modes = _modes(piece, reduced, own[:, [*order[:count], *near]])
+    modes = _modes(piece, (1 - t) * a.W + t * b.W, own[:, [*order[:count], *near]])
     return Candidate(
         x, slope, modes, count, before, after, crossing.rest, q.s - p.s, width=crossing.width, uneven=crossing.uneven
     )
@@ -99,11 +99,12 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     """Candidate at the place ``s`` where the load turns back: the state may have more symmetry than others."""
     x, slope = piece.curve(p, q, s)
-    reduced = _reduced(piece, x, slope, piece.condensation.border(x))
+    tangent = slope * (1.0 / piece.solver.system.norm(slope))
+    reduced = piece.condensation.at(x, tangent, piece.condensation.border(x))
     values, own = np.linalg.eigh(reduced.H)
     zero = abs(values) < SOFT * piece.solver.inertia.scale
     zero[abs(values).argmin()] = True
-    negative, modes = reduced.far + int((values[~zero] < 0).sum()), _modes(piece, reduced, own[:, zero])
+    negative, modes = reduced.far + int((values[~zero] < 0).sum()), _modes(piece, reduced.W, own[:, zero])
     return Candidate(x, slope, modes, len(modes), p.index, p.index, negative, q.s - p.s, crossing=False)
 
 
@@ -111,18 +112,14 @@ def of_miss(piece: Piece, node: Node) -> Candidate:
     """Candidate near a state at which an eigenvalue is least, and not zero."""
     knot, index = node.kept, node.index
     values, own = np.linalg.eigh(knot.reduced.H)
-    modes = _modes(piece, knot.reduced, own[:, [abs(values).argmin()]])
+    modes = _modes(piece, knot.reduced.W, own[:, [abs(values).argmin()]])
     return Candidate(knot.x, knot.slope, modes, 1, index, index, index, piece.length, crossing=False)
 
 
-def _reduced(piece: Piece, x: PETSc.Vec, slope: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
-    return piece.condensation.at(x, slope * (1.0 / piece.solver.system.norm(slope)), phi)
-
-
-def _modes(piece: Piece, reduced: ReducedStiffness, vectors: np.ndarray) -> list[PETSc.Vec]:
-    """Modes of vectors of H, orthonormal in the metric."""
+def _modes(piece: Piece, W: np.ndarray, vectors: np.ndarray) -> list[PETSc.Vec]:
+    """Modes ``W v`` of vectors of H, orthonormal in the metric."""
     inertia = piece.solver.inertia
-    modes = [inertia.vector(reduced.W @ v) for v in vectors.T]
+    modes = [inertia.vector(W @ v) for v in vectors.T]
     orthonormalize(modes, inertia.metric)
     return modes
 

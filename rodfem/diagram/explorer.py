@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 
-import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.mesh_sequence import TRIES
@@ -26,7 +25,7 @@ from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import link
-from rodfem.stability.reduced_stiffness import Bordered
+from rodfem.stability.reduced_stiffness import bordered_of
 from rodfem.tolerances import APART, SAME_SPECIAL, SAME_STATE
 
 TAIL, REACH = 8, 4.0
@@ -181,9 +180,9 @@ class Explorer(Tracer):
                 "scene a start that is in equilibrium under the load, too."
             )
         found = solver.inertia.at(point.x)
-        bordered = Bordered(system, found.matrix, freedoms, solver.inertia.constraints)
+        bordered = bordered_of(solver.inertia, freedoms)
         bordered.factor(found.matrix, [solver.inertia.metric * v for v in vectors])
-        tangent, _ = bordered.solve(-found.border, np.zeros(freedoms))
+        (tangent, *_), _ = bordered.solve([-found.border])
         system.set_load(tangent, 1.0)
         tangent.scale((1.0 if increasing else -1.0) / system.norm(tangent))
         point.tangent, point.slope = tangent, system.scalar(tangent)

@@ -41,6 +41,7 @@ from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
 DIP = 0.1  # eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most
+RISE = 1e-3  # part of an eigenvalue by which rows on both sides exceed a least one
 HALVINGS = 0, 6, 36
 """Bisections after which a mode that passes zero is among those nearest zero: none in most steps, many next to dozens
 of softer ones."""
@@ -252,7 +253,8 @@ class SpecialSearch:
     def _dip(self, piece: Piece, p: Node, q: Node, *, found: bool) -> None:
         """Look for a branch point taken apart where the eigenvalue nearest zero is least at a row."""
         nearest, ahead = (float(abs(np.linalg.eigvalsh(node.H)).min()) for node in (p, q))
-        if not found and self._nearest > nearest < ahead and nearest < DIP * piece.solver.inertia.scale:
+        least = (1 - RISE) * min(self._nearest, ahead)
+        if not found and nearest < least and nearest < DIP * piece.solver.inertia.scale:
             self._missed(piece, of_miss(piece, p))
         self._nearest = -inf if found else nearest
 
@@ -269,13 +271,13 @@ class SpecialSearch:
         right = piece.solve(p, q, s + min(margin, (q.s - s) / 2)) if s < q.s else None
         return [touch], [(x, y) for x, y in ((p, left), (right, q)) if x is not None and y is not None]
 
-    def _fourth(self, piece: Piece, p: Node, q: Node) -> np.ndarray | None:
-        """Size of the fourth derivative in a piece, by the row before it; None at the begin of a branch."""
+    def _fourth(self, piece: Piece, p: Node, q: Node) -> np.ndarray:
+        """Size of the fourth derivative in a piece, by the row before it."""
         row = self._before
         if row is None or row.mesh != self._made[0] or row.tangent is None:
-            return None
+            return fourth(p, q, None)
         before = piece.node(row.x, row.tangent, self._reduced(row))
-        return fourth(before, p, q) if before.s < p.s else None
+        return fourth(p, q, before if before.s < p.s else None)
 
     def _touching(self, piece: Piece, ends: tuple[Node, Node], s: float, *, ended: bool) -> SpecialPoint | None:
         """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""

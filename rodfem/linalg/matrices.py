@@ -36,7 +36,9 @@ def times(matrix: sp.csr_matrix, vectors: np.ndarray) -> np.ndarray:
 
 
 def local_rows(matrix: PETSc.Mat) -> sp.csr_matrix:
-    """Rows of this rank, with the columns of all ranks."""
+    """Rows of this rank, with the columns of all ranks; those of a shared matrix are its own, not a copy."""
+    if (known := shared(matrix)) is not None:
+        return known.matrix
     starts, columns, values = matrix.getValuesCSR()
     return sp.csr_matrix((values, columns, starts), shape=(len(starts) - 1, matrix.getSize()[1]))
 
@@ -48,8 +50,7 @@ def rounding(matrix: PETSc.Mat, v: PETSc.Vec, x: PETSc.Vec) -> float:
 
 def rounding_of(matrix: PETSc.Mat, v: np.ndarray, x: np.ndarray) -> float:
     """The same for ``v`` and ``x`` (n,), real or complex, by the n values of each on this rank."""
-    comm, known = matrix.comm.tompi4py(), shared(matrix)
-    rows = local_rows(matrix) if known is None else known.matrix
+    comm, rows = matrix.comm.tompi4py(), local_rows(matrix)
     entries = sp.csr_matrix((abs(rows.data) ** 2, rows.indices, rows.indptr), shape=rows.shape)
     squares = np.concatenate(comm.allgather(abs(x) ** 2))
     return float(EPS * np.sqrt(comm.allreduce(float(abs(v) ** 2 @ times(entries, squares)))))

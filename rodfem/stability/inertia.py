@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -85,6 +86,7 @@ class Inertia:
         self.tolerance, self.resolution = ZERO_BAND * self.scale, 0.0
         self.vectors: list[PETSc.Vec] = []
         self.shift, self.filled, self.factored = 0.0, 0, 0
+        self.bordered: dict[int, Any] = {}  # see rodfem.stability.reduced_stiffness
         self._held: tuple[State, Phase, int] | None = None
         self.compiled = compiled_newton(system, self.matrix, self.factors)
 
@@ -188,8 +190,7 @@ class Inertia:
 
     def times(self, own: np.ndarray) -> np.ndarray:
         """The matrix times vectors, the columns of ``own`` (own rows, count)."""
-        rows = local_rows(self.matrix).real if self._shared is None else self._shared.matrix
-        return times(rows, self._whole(own))
+        return times(local_rows(self.matrix).real, self._whole(own))
 
     def _whole(self, own: np.ndarray) -> np.ndarray:
         """Rows of all ranks."""

@@ -21,6 +21,7 @@ and H is smooth whatever the eigenvalues near zero do, avoided crossings and dou
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +32,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.chain import factors_of
-from rodfem.linalg.matrices import local_rows
+from rodfem.linalg.matrices import local_rows, shared_matrix, times
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.near_zero import quotient_error
 
@@ -53,18 +54,21 @@ class Bordered:
         self.system, self.k, self.constraints = system, borders, constraints
         self.comm, self.n, fields = system.comm, system.fields.unknowns, system.fields
         self.extra = borders if system.has_scalars else 0  # rows of the borders on this rank, the last one
-        inner, along = local_rows(matrix), self.n + borders
+        inner, along = local_rows(matrix).copy(), self.n + borders
         inner.data[:] = 1.0
         above = sp.hstack([inner, np.ones((inner.shape[0], borders))], format="csr")
         pattern = sp.vstack([above, np.ones((self.extra, along))], format="csr")
-        self.start, self.columns = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
-        self.values, self.own, self._border = np.zeros(pattern.nnz), above.nnz, above.indices >= self.n
-        self.matrix = PETSc.Mat().createAIJ(((pattern.shape[0], along),) * 2, comm=self.comm)
-        self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
+        pattern.indptr, pattern.indices = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
+        self.own, self._border, self._rows = above.nnz, above.indices >= self.n, pattern
+        if fields.compiled:
+            self.matrix = shared_matrix(self.comm, pattern)
+            self._rows = local_rows(self.matrix)
+        else:
+            self.matrix = PETSc.Mat().createAIJ(((pattern.shape[0], along),) * 2, comm=self.comm)
+            self.matrix.setPreallocationCSR((pattern.indptr, pattern.indices, pattern.data))
         kind, natural = "lu" if constraints is None else "cholesky", system.natural_sizes and self._sizes
         chain = along if fields.along else 0
         self.factors = factors_of(kind, self.comm, chain, fields.dense_rows + borders, natural)
-        self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
 
     def _sizes(self) -> PETSc.Vec:
         """Natural sizes of the unknowns; the multipliers of the borders have those of drifts."""
@@ -79,16 +83,19 @@ class Bordered:
         The ``rows`` of the borders are the ``columns`` unless given.  Raises :class:`ConvergenceError` if it is
         singular.
         """
-        self.values[: self.own][~self._border] = matrix.getValuesCSR()[2].real
+        values = self._rows.data
+        values[: self.own][~self._border] = local_rows(matrix).data.real
         local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]
-        self.values[: self.own][self._border] = local[0].ravel()
+        values[: self.own][self._border] = local[0].ravel()
         parts = self.comm.gather(local[1], root=self.comm.size - 1)
         if parts is not None:
             below = np.zeros((self.k, self.n + self.k))
             below[:, : self.n] = np.concatenate(parts).T
-            self.values[self.own :] = below.ravel()
-        self.matrix.setValuesCSR(self.start, self.columns, self.values)
-        self.matrix.assemble()
+            values[self.own :] = below.ravel()
+        if not self.system.fields.compiled:
+            self.matrix.setValuesCSR(self._rows.indptr, self._rows.indices, values)
+            self.matrix.assemble()
+        self.matrix.stateIncrease()
         with self.system.clock("stability"):
             self.factors(self.matrix)
             if self.constraints is None:
@@ -101,29 +108,32 @@ class Bordered:
             raise ConvergenceError("another eigenvalue vanishes")
         return int(rest)
 
-    def solve(self, f: PETSc.Vec | None, g: np.ndarray) -> tuple[PETSc.Vec, np.ndarray]:
-        """Solve for the right-hand side ``(f, g)``, with one step of iterative refinement."""
-        with self.system.clock("solve"):
-            out, right = self.out, self.right
-            right.set(0.0)
-            rows = right.getLocalSize() - self.extra
-            if f is not None:
-                right.array[:rows] = f.array_r
-            if self.extra:
-                right.array[rows:] = g
-            self.factors.solve(right, out)
-            self.matrix.mult(out, self.residual)
-            self.residual.aypx(-1.0, right)
-            self.factors.solve(self.residual, right)
-            out.axpy(1.0, right)
-            x = self.system.new_vector()
-            x.array[:] = out.array_r[:rows]
-            return x, np.array(self.comm.bcast(out.array_r[rows:].copy(), root=self.comm.size - 1))
+    def solve(self, columns: Sequence[PETSc.Vec] = ()) -> tuple[list[PETSc.Vec], np.ndarray]:
+        """Solutions for ``(column, 0)``, then for a unit on each border: vectors, and multipliers (k, number of these).
 
-    def modes(self) -> tuple[list[PETSc.Vec], np.ndarray]:
-        """Solutions for a unit on each border: their vectors, and rows (k, k) of multipliers."""
-        solved = [self.solve(None, e) for e in np.eye(self.k)]
-        return [v for v, _ in solved], np.array([row for _, row in solved])
+        They have one step of iterative refinement.
+        """
+        right = np.zeros((self._rows.shape[0], len(columns) + self.k))
+        inner = len(right) - self.extra
+        for i, column in enumerate(columns):
+            right[:inner, i] = column.array_r.real
+        right[inner:, len(columns) :] = np.eye(self.extra, self.k)
+        with self.system.clock("solve"):
+            out = self.factors.solve_all(right)
+            whole = out if self.comm.size == 1 else np.concatenate(self.comm.allgather(out))
+            out = out + self.factors.solve_all(right - times(self._rows, whole))
+        vectors = [self.system.new_vector() for _ in range(out.shape[1])]
+        for vector, solution in zip(vectors, out[:inner].T, strict=True):
+            vector.array[:] = solution
+        return vectors, self.comm.bcast(out[inner:], root=self.comm.size - 1)
+
+
+def bordered_of(inertia: Inertia, borders: int) -> Bordered:
+    """The second variation of an ``inertia`` with so many borders; what it factors last is what it solves with."""
+    if borders not in inertia.bordered:
+        inertia.bordered[borders] = Bordered(inertia.system, inertia.matrix, borders, inertia.constraints)
+    made: Bordered = inertia.bordered[borders]
+    return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +163,6 @@ class Condensation:
 
     def __init__(self, inertia: Inertia) -> None:
         self.system, self.inertia = inertia.system, inertia
-        self._bordered: Bordered | None = None
 
     def border(self, x: PETSc.Vec) -> np.ndarray:
         """The six modes nearest zero at a state ``x``, (own rows, 6), fewer if there are no more; any basis near."""
@@ -191,11 +200,9 @@ class Condensation:
 
     def _by_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
         """``far``, H and W where S is nearly singular, or is."""
-        k, matrix = B.shape[1], self.inertia.at(x).matrix
-        if self._bordered is None or self._bordered.k != k:
-            self._bordered = Bordered(self.system, matrix, k, self.inertia.constraints)
-        far = self._bordered.factor(matrix, [self.inertia.vector(column) for column in B.T])
-        modes, G = self._bordered.modes()
+        matrix, bordered = self.inertia.at(x).matrix, bordered_of(self.inertia, B.shape[1])
+        far = bordered.factor(matrix, [self.inertia.vector(column) for column in B.T])
+        modes, G = bordered.solve()
         return far, _symmetric(-G), np.stack([w.array_r for w in modes], axis=1)
 
     def _rate(self, x: PETSc.Vec, tangent: PETSc.Vec, H: np.ndarray, W: np.ndarray) -> np.ndarray:

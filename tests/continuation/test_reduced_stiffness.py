@@ -134,6 +134,6 @@ def test_a_pair_that_the_cubic_does_not_have(known: bool, other: float) -> None:
         return Node(s, np.diag(value), np.diag(slope), 0)
 
     before, a, b = (solve(None, None, s) for s in (-1.0, 0.0, 1.0))
-    found = Zeros(solve, 1e-12).between(a, b, fourth(before, a, b) if known else None)
+    found = Zeros(solve, 1e-12).between(a, b, fourth(a, b, before if known else None))
     assert [c.s for c in found] == pytest.approx(expected, abs=1e-3)
     assert abs(found[-1].after - found[0].before) == (other < 0)
