@@ -124,6 +124,7 @@ def lagrange_basis(degree: int, x: np.ndarray) -> np.ndarray:
     return np.asarray(values)[0].reshape(len(x), degree + 1)
 
 
+@cache
 def basis_on_pieces(degree: int, pieces: int) -> np.ndarray:
     """Values of the same basis at the nodes of equal pieces of an element, (pieces, nodes, nodes)."""
     places = (np.arange(pieces)[:, None] + nodes(degree)) / pieces

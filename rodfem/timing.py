@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
@@ -13,17 +14,16 @@ class Clock:
     """Accumulates wall time by name; nested measurements are charged to the innermost name."""
 
     def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
+        self.seconds = defaultdict[str, float](float)
         self.started = perf_counter()
         self._running: list[str] = []
         self._scope = self._next = ""
         self._mark = self.started
 
     def _charge(self) -> None:
-        now = perf_counter()
-        if self._running:
-            name = self._running[-1]
-            self.seconds[name] = self.seconds.get(name, 0.0) + now - self._mark
+        now, running = perf_counter(), self._running
+        if running:
+            self.seconds[running[-1]] += now - self._mark
         self._mark = now
 
     def __call__(self, name: str) -> Clock:

@@ -326,13 +326,15 @@ def _is_doubtful(branch: Branch, given: Sequence[SpecialPoint]) -> bool:
 def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
     """Whether a ``special`` point is the mesh's, by the ``rows``: on one side the next two are undecided.
 
-    One is enough if the richer mesh has no such point.  Not if the decided indices on both sides differ by its own
-    change, and as much is undecided: that is another mode.
+    One is enough if the richer mesh has no such point, and none if the index is the same on both sides, as where two of
+    them are in one step.  Not if the decided indices on both sides differ by its own change, and as much is undecided:
+    that is another mode.
     """
     first = sum(p.arclength < special.point.arclength for p in rows)
     before, after, number = rows[:first][::-1], rows[first:], 2 if isfinite(special.error_estimate) else 1
     doubtful = any(sum(p.undecided > 0 for p in side[:number]) == number for side in (before, after))
     change = [(q.negative - p.negative, q.undecided - p.undecided) for p, q in zip(before[:1], after[:1], strict=False)]
+    doubtful = doubtful or (number == 1 and change == [(0, 0)])
     return special.kind.singular and doubtful and change != [(special.negative_after - special.negative_before, 0)]
 
 

@@ -143,11 +143,14 @@ def lost_between(
     """
     if not convexity.alters:
         return None
-    scales = convexity.scales(state(0.0), state(1.0))
-    margin = cache(lambda t: convexity.margin(state(t), scales))
+    ends = 0.0, DIFFERENCE, 1.0 - DIFFERENCE, 1.0
+    states = [state(t) for t in ends]
+    scales = convexity.scales(states[0], states[-1])
+    known = dict(zip(ends, convexity.margins(states, scales), strict=True))
+    margin = cache(lambda t: known[t] if t in known else convexity.margin(state(t), scales))
 
     def node(t: float, other: float) -> Node:
-        return _number(t, margin(t), (margin(other) - margin(t)) / (other - t))
+        return _number(t, known[t], (known[other] - known[t]) / (other - t))
 
     last = 0.0
     for t in [*places(node(0.0, DIFFERENCE), node(1.0, 1.0 - DIFFERENCE), 1), 1.0]:

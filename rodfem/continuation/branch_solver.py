@@ -32,13 +32,14 @@ from rodfem.fem.checks import Convexity
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
 from rodfem.fem.resultants import NAMES, Reactions, Resultants, reactions
 from rodfem.fem.shape import Shape
-from rodfem.fem.state import LOAD, Energies, NodalValues
+from rodfem.fem.state import LOAD, Energies, NodalValues, State
+from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.units import Units
 from rodfem.stability.in_space import InSpace
-from rodfem.stability.inertia import FRESH, Factored, Index, Inertia
+from rodfem.stability.inertia import DOUBTFUL, FRESH, Factored, Index, Inertia
 from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.symmetric import SymmetricSolver
@@ -52,9 +53,6 @@ ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
-DOUBTFUL = 1e-3
-"""Estimate of the nearest eigenvalue, over the lowest bending one, that one more step of inverse iteration sharpens:
-the generic part of the block finds a new mode as far as that."""
 
 
 class Knot(Protocol):
@@ -158,7 +156,7 @@ class RegularPoint:
 
     def along(self, row: PETSc.Vec) -> PETSc.Vec:
         """Unit tangent on the side to which ``row`` points."""
-        return self.tangent * -1.0 if row.dot(self.tangent) < 0 else self.tangent
+        return self.tangent * (-1.0 if row.dot(self.tangent) < 0 else 1.0)
 
 
 class RegularPoints:
@@ -168,6 +166,8 @@ class RegularPoints:
         self.inertia, self.system = inertia, inertia.system
         self._fresh = np.stack([inertia.seed(i).array_r.real for i in range(BLOCK)], axis=1)
         self._fresh_images = inertia.weighed(self._fresh)
+        self._state: tuple[State | None, Phase | None, float] = None, None, 0.0
+        self._found: RegularPoint | None = None
         self.restart()
 
     def restart(self) -> None:
@@ -176,10 +176,16 @@ class RegularPoints:
 
     def at(self, x: PETSc.Vec) -> RegularPoint | None:
         """The regular point ``x``; None where an eigenvalue is too near zero, or a load has no potential."""
-        inertia = self.inertia
         if not self.system.scene.conservative:  # S is not symmetric
             return None
-        found = inertia.at(x)
+        self.system.set_phase(x)
+        state = self.system.at(x), self.system.phase, self.inertia.tolerance
+        if not all(old is new for old, new in zip(self._state, state, strict=True)):  # else asked for once more
+            self._state, self._found = state, self._found_at(x)
+        return self._found
+
+    def _found_at(self, x: PETSc.Vec) -> RegularPoint | None:
+        inertia, found = self.inertia, self.inertia.at(x)
         try:
             below = found.below(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
@@ -393,7 +399,8 @@ class BranchSolver:
         """Evaluate all records of the equilibrium ``x``; its index unless that is given."""
         system = self.system
         if index is None:
-            index = decide(self.inertia.at(x)).index
+            regular = self.regular.at(x)
+            index = regular.index if regular else decide(self.inertia.at(x)).index
         return Point(
             x=x,
             tangent=tangent,

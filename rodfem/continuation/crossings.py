@@ -82,8 +82,11 @@ def coefficients(a: Node, b: Node) -> list[np.ndarray]:
 
 def at(a: Node, b: Node, t: float, order: int = 0) -> np.ndarray:
     """The cubic at t, or its derivative."""
-    A = coefficients(a, b)
-    return np.asarray(A[1] + t * (2 * A[2] + 3 * t * A[3]) if order else A[0] + t * (A[1] + t * (A[2] + t * A[3])))
+    h, u = b.s - a.s, 1 - t
+    if order:
+        return np.asarray(6 * t * u * (b.H - a.H) + h * u * (1 - 3 * t) * a.slope + h * t * (3 * t - 2) * b.slope)
+    ends = (1 + 2 * t) * u * u * a.H + t * t * (3 - 2 * t) * b.H
+    return np.asarray(ends + h * t * u * (u * a.slope - t * b.slope))
 
 
 def roots(a: Node, b: Node) -> np.ndarray:
@@ -102,6 +105,10 @@ def roots(a: Node, b: Node) -> np.ndarray:
 
 def places(a: Node, b: Node, order: int) -> list[float]:
     """Where a cubic of one row vanishes, or its derivative of an ``order``: all t from 0 to 1, rising."""
+    h, first, last = (b.s - a.s) / 3, a.H.item(), b.H.item()
+    control = np.diff(np.array([first, first + h * a.slope.item(), last - h * b.slope.item(), last]), order)
+    if control.min() > 0 or control.max() < 0:
+        return []
     cubic = Polynomial([A.item() for A in coefficients(a, b)])
     found = cubic.deriv(order).roots()
     return sorted(float(t.real) for t in found if abs(t.imag) < REAL and 0.0 <= t.real <= 1.0)
@@ -191,27 +198,34 @@ def _division(
     a: Node, b: Node, found: np.ndarray, groups: list[list[float]], off: np.ndarray
 ) -> tuple[float | None, bool]:
     """Where a piece is to be divided, None if it need not, and whether that is at a near miss of zero."""
-    if a.far == b.far and len(groups) > 1:
+    group = groups[0] if groups else []
+    if a.far != b.far:
+        return 0.47, False
+    if len(groups) > 1:
         _, last, first = max((q[0] - p[-1], p[-1], q[0]) for p, q in pairwise(groups))
         return float(np.clip((last + first) / 2, 0.01, 0.99)), False
     near = found[(abs(found.imag) >= REAL) & (abs(found.imag) < AXIS) & (found.real > 0) & (found.real < 1)]
-    if a.far == b.far and len(near):
+    if len(near):
         return float(np.clip(near[abs(near.imag).argmin()].real, 0.02, 0.98)), True
-    if a.far != b.far or not groups:
-        return 0.47, False
-    place = float(np.mean(groups[0]))
-    return None if _alone(a, b, groups[0], off) else (place + float(place < 0.5)) / 2, False
+    if _alone(a, b, group, off):
+        return None, False
+    place = float(np.mean(group or [0.94]))
+    return (place + float(place < 0.5)) / 2, False
 
 
 def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
     """Whether no other eigenvalue passes zero than those of a ``group``, which are fast enough to pass it once."""
-    own, _, rates = _passing(a, b, group)
-    if abs(rates).min() <= SAFE * np.linalg.norm(own.T @ off @ own, 2):
-        return False
-    values, vectors = np.linalg.eigh([at(a, b, t) for t in PLACES])
-    doubt = np.einsum("t,tki,kl,tli->ti", 16 * PLACES**2 * (1 - PLACES) ** 2, vectors, off, vectors)
-    allowed = np.where(abs(PLACES - np.mean(group)) < 0.1, len(group), 0)  # next to the group its own are near zero
-    return bool(((abs(values) <= doubt).sum(axis=1) <= allowed).all())
+    near = np.zeros(len(PLACES), dtype=bool)
+    if group:
+        own, _, rates = _passing(a, b, group)
+        if abs(rates).min() <= SAFE * np.linalg.norm(own.T @ off @ own, 2):
+            return False
+        near = abs(PLACES - np.mean(group)) < 0.1  # next to the group its own are near zero
+    t = PLACES[:, None, None]
+    A = coefficients(a, b)
+    values, vectors = np.linalg.eigh(A[0] + t * (A[1] + t * (A[2] + t * A[3])))
+    doubt = np.einsum("t,tki,kl,tli->ti", 16 * PLACES**2 * (1 - PLACES) ** 2, vectors, off, vectors, optimize=True)
+    return bool(((abs(values) <= doubt).sum(axis=1) <= near * len(group)).all())
 
 
 def _passing(a: Node, b: Node, group: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

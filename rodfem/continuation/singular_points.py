@@ -85,12 +85,11 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     """Candidate of a crossing."""
     p, q = crossing.piece
     x, slope = piece.curve(p, q, crossing.s)
-    t, (a, b) = (crossing.s - p.s) / (q.s - p.s), (node.kept.reduced for node in crossing.piece)
-    values, own = np.linalg.eigh(at(piece.whole(p), piece.whole(q), t))
+    values, own, W = _interpolated(piece, p, q, crossing.s)
     order = np.argsort(-np.linalg.norm((piece.moving @ crossing.vectors).T @ own, axis=0))
     before, after, count = crossing.before, crossing.after, crossing.vectors.shape[1]
     near = [i for i in order[count:] if abs(values[i]) < 0.01 * piece.solver.inertia.scale]
-    modes = _modes(piece, (1 - t) * a.W + t * b.W, own[:, [*order[:count], *near]])
+    modes = _modes(piece, W, own[:, [*order[:count], *near]])
     return Candidate(
         x, slope, modes, count, before, after, crossing.rest, q.s - p.s, width=crossing.width, uneven=crossing.uneven
     )
@@ -99,13 +98,24 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     """Candidate at the place ``s`` where the load turns back: the state may have more symmetry than others."""
     x, slope = piece.curve(p, q, s)
-    tangent = slope * (1.0 / piece.solver.system.norm(slope))
-    reduced = piece.condensation.at(x, tangent, piece.condensation.border(x))
-    values, own = np.linalg.eigh(reduced.H)
-    zero = abs(values) < SOFT * piece.solver.inertia.scale
+    solver = piece.solver
+    if solver.system.active_drifts(x) == solver.system.active_drifts(p.kept.x):
+        far, (values, own, W) = p.far, _interpolated(piece, p, q, s)
+    else:
+        tangent = slope * (1.0 / solver.system.norm(slope))
+        reduced = piece.condensation.at(x, tangent, piece.condensation.border(x))
+        far, W, (values, own) = reduced.far, reduced.W, np.linalg.eigh(reduced.H)
+    zero = abs(values) < SOFT * solver.inertia.scale
     zero[abs(values).argmin()] = True
-    negative, modes = reduced.far + int((values[~zero] < 0).sum()), _modes(piece, reduced.W, own[:, zero])
+    negative, modes = far + int((values[~zero] < 0).sum()), _modes(piece, W, own[:, zero])
     return Candidate(x, slope, modes, len(modes), p.index, p.index, negative, q.s - p.s, crossing=False)
+
+
+def _interpolated(piece: Piece, p: Node, q: Node, s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eigenvalues and vectors of H, and W, between two nodes: modes near those of the state there."""
+    t, (a, b) = (s - p.s) / (q.s - p.s), (node.kept.reduced for node in (p, q))
+    values, own = np.linalg.eigh(at(piece.whole(p), piece.whole(q), t))
+    return values, own, (1 - t) * a.W + t * b.W
 
 
 def of_miss(piece: Piece, node: Node) -> Candidate:

@@ -166,7 +166,7 @@ class SpecialSearch:
         """
         piece, p, q = self._ends(a, b, self._prepare(a))
         worst = max((p.kept.reduced, q.kept.reduced), key=lambda found: found.rotated)
-        if p.far == q.far and worst.rotated >= ROTATED:
+        if p.far != q.far or worst.rotated >= ROTATED:
             piece, p, q = self._ends(a, b, self._border(self._condensation(b.mesh).improved(worst)))
         for halvings in HALVINGS:
             if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
@@ -205,7 +205,8 @@ class SpecialSearch:
     def _ends(self, a: Point, b: Point, phi: np.ndarray) -> tuple[Piece, Node, Node]:
         piece = Piece(self.meshes.solvers[b.mesh], self._condensation(b.mesh), a, b, phi)
         assert a.tangent is not None and b.tangent is not None
-        return piece, piece.node(a.x, a.tangent, self._reduced(a)), piece.node(b.x, b.tangent, self._reduced(b))
+        ahead = self._reduced(b)  # first, as the matrix may hold that state
+        return piece, piece.node(a.x, a.tangent, self._reduced(a)), piece.node(b.x, b.tangent, ahead)
 
     def _changing(self, piece: Piece, p: Node, q: Node, halvings: int) -> PETSc.Vec:
         """A state near which the index changes between two nodes."""
@@ -263,13 +264,17 @@ class SpecialSearch:
     ) -> tuple[list[SpecialPoint], list[tuple[Node, Node]]]:
         """The branch point at which the load turns back, if there is one, and the pieces on both sides of it."""
         turn = piece.turn(p, q)
-        touch = None if turn is None else self._touching(piece, (p, q), turn, ended=ended)
-        if touch is None:
+        found = None if turn is None else self._touching(piece, (p, q), turn, ended=ended)
+        if found is None:
             return [], [(p, q)]
-        s, margin = piece.place(touch.point.x), ASIDE * (q.s - p.s)
-        left = piece.solve(p, q, s - min(margin, (s - p.s) / 2)) if s > p.s else None
-        right = piece.solve(p, q, s + min(margin, (q.s - s) / 2)) if s < q.s else None
-        return [touch], [(x, y) for x, y in ((p, left), (right, q)) if x is not None and y is not None]
+        (touch, *made), pieces = found, list[tuple[Node, Node]]()
+        s = piece.place(touch.point.x)
+        for end, node in zip((p, q), made, strict=True):
+            low, high = sorted((s, end.s))
+            inside = node if low < node.s < high else piece.solve(p, q, (low + high) / 2) if low < high else None
+            if inside is not None:
+                pieces.append((end, inside) if end is p else (inside, end))
+        return [touch], pieces
 
     def _fourth(self, piece: Piece, p: Node, q: Node) -> np.ndarray:
         """Size of the fourth derivative in a piece, by the row before it."""
@@ -279,8 +284,13 @@ class SpecialSearch:
         before = piece.node(row.x, row.tangent, self._reduced(row))
         return fourth(p, q, before if before.s < p.s else None)
 
-    def _touching(self, piece: Piece, ends: tuple[Node, Node], s: float, *, ended: bool) -> SpecialPoint | None:
-        """Branch point at which the load turns back, and an eigenvalue touches zero: a side branch ends there."""
+    def _touching(
+        self, piece: Piece, ends: tuple[Node, Node], s: float, *, ended: bool
+    ) -> tuple[SpecialPoint, Node, Node] | None:
+        """Branch point at which the load turns back, where a side branch ends, and states next to it.
+
+        An eigenvalue touches zero there.
+        """
         (p, q), solver = ends, piece.solver
         margin = ASIDE * (q.s - p.s)
         left, right = (
@@ -301,7 +311,7 @@ class SpecialSearch:
         if found.size > found.noise:
             self._open_gap(piece, at, found, ended=ended)
             return None
-        return replace(special_point(piece, at, found, fold=False), test_function="slope")
+        return replace(special_point(piece, at, found, fold=False), test_function="slope"), left, right
 
     def _located(self, piece: Piece, at: Candidate, *, turns: bool, ended: bool) -> SpecialPoint | None:
         """The fold or branch point of a crossing; None where there is no singular state."""

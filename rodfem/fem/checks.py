@@ -22,7 +22,7 @@ motion has, and is compared in the same way; so is the inertia in a translation 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -107,8 +107,14 @@ class Convexity:
 
     def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
         """Least eigenvalue over the whole rod at ``x``, in units of the ``scales`` of states nearby: smooth."""
-        least = np.linalg.eigvalsh(self._by_element(x) / scales[..., None] / scales[..., None, :])[..., 0]
-        return float(self.system.comm.allreduce(float(least.min(initial=1.0)), op=MPI.MIN))
+        return self.margins([x], scales)[0]
+
+    def margins(self, states: Sequence[PETSc.Vec], scales: np.ndarray) -> list[float]:
+        """The same at several states."""
+        units, comm = scales[..., None] * scales[..., None, :], self.system.comm
+        least = np.linalg.eigvalsh(np.stack([self._by_element(x) for x in states]) / units)[..., 0]
+        mine: list[float] = least.min(axis=(1, 2), initial=1.0).tolist()
+        return mine if comm.size == 1 else np.min(comm.allgather(mine), axis=0).tolist()
 
     def _by_element(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives by element of this rank and place on it, (cells, places, size, size)."""
@@ -117,7 +123,8 @@ class Convexity:
     def _matrices(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives at all places of this rank, symmetric, (places, size, size)."""
         assert self.evaluate is not None
-        matrices = self.system.at(x).evaluate(self.evaluate).reshape(-1, self.size, self.size)
+        state, evaluate = self.system.at(x), self.evaluate
+        matrices = derived(state, evaluate, lambda: state.evaluate(evaluate).reshape(-1, self.size, self.size).copy())
         return np.asarray((matrices + matrices.transpose(0, 2, 1)) / 2)
 
 
@@ -159,13 +166,20 @@ class Pieces:
     def _assembled(self, form: Assembler, values: np.ndarray, pieces: int, places: Places) -> np.ndarray:
         mine, local = self._form(form, pieces), np.tile(values, (pieces, 1, 1))
         for rows, basis in self._bases(pieces):
-            local[..., rows] = basis @ values[:, rows]
+            local[..., rows] = self._by_nodes(basis, values[None, :, rows])
         out = np.zeros_like(local)
         mine.constants = form.constants
         mine.add(local.ravel(), places, out.ravel())
         for rows, basis in self._bases(pieces):
-            out[..., rows] = basis.swapaxes(2, 3) @ out[..., rows]
+            out[..., rows] = self._by_nodes(basis.swapaxes(1, 2), out[..., rows])
         return out
+
+    @staticmethod
+    def _by_nodes(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Sums (pieces, cells, nodes, size) over the nodes of ``values``, all cells of a piece at once."""
+        _, cells, nodes, size = values.shape
+        sums = basis @ values.swapaxes(1, 2).reshape(len(values), nodes, cells * size)
+        return sums.reshape(len(basis), nodes, cells, size).swapaxes(1, 2)
 
     def _cut(self, pieces: int) -> Cells:
         ends = (np.arange(pieces)[:, None] + np.array([0.0, 1.0])) / pieces
@@ -175,10 +189,8 @@ class Pieces:
         return Cells(np.ascontiguousarray(x.reshape(-1, 2, 3)), dofs)
 
     def _tabulated(self, pieces: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each field the rows (nodes, size), and its basis at the nodes of pieces, (pieces, 1, nodes, nodes)."""
-        degrees = {block.name: block.degree for block in self.fields.blocks}
-        cut = cache(lambda degree: compat.basis_on_pieces(degree, pieces)[:, None])
-        return [(self.rows[name], cut(degree)) for name, degree in degrees.items()]
+        """Of each field the rows (nodes, size), and its basis at the nodes of pieces, (pieces, nodes, nodes)."""
+        return [(self.rows[x.name], compat.basis_on_pieces(x.degree, pieces)) for x in self.fields.blocks]
 
 
 class QuadratureCheck:

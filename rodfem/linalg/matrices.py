@@ -21,13 +21,14 @@ def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shap
     return sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=shape)
 
 
-def times(matrix: sp.csr_matrix, vectors: np.ndarray) -> np.ndarray:
+def times(matrix: sp.csr_matrix, vectors: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
     """Product (m,) or (m, k) of real numbers, ``matrix`` (m, n) and ``vectors`` (n,) or (n, k).
 
-    It is what ``@`` does, without the inspection of both that takes several times as long for a hundred unknowns.
+    It is what ``@`` does, without the inspection of both that takes several times as long for a hundred unknowns.  The
+    entries may have other ``values``.
     """
-    rows, columns = matrix.shape
-    out, stored = np.zeros((rows, *vectors.shape[1:])), (matrix.indptr, matrix.indices, matrix.data)
+    (rows, columns), data = matrix.shape, matrix.data if values is None else values
+    out, stored = np.zeros((rows, *vectors.shape[1:])), (matrix.indptr, matrix.indices, data)
     if vectors.ndim == 1:
         _sparsetools.csr_matvec(rows, columns, *stored, vectors, out)
     else:
@@ -51,9 +52,8 @@ def rounding(matrix: PETSc.Mat, v: PETSc.Vec, x: PETSc.Vec) -> float:
 def rounding_of(matrix: PETSc.Mat, v: np.ndarray, x: np.ndarray) -> float:
     """The same for ``v`` and ``x`` (n,), real or complex, by the n values of each on this rank."""
     comm, rows = matrix.comm.tompi4py(), local_rows(matrix)
-    entries = sp.csr_matrix((abs(rows.data) ** 2, rows.indices, rows.indptr), shape=rows.shape)
     squares = np.concatenate(comm.allgather(abs(x) ** 2))
-    return float(EPS * np.sqrt(comm.allreduce(float(abs(v) ** 2 @ times(entries, squares)))))
+    return float(EPS * np.sqrt(comm.allreduce(float(abs(v) ** 2 @ times(rows, squares, abs(rows.data) ** 2)))))
 
 
 def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:

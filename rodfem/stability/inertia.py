@@ -45,6 +45,8 @@ FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
 REGULAR = 1e-5
 """Distance of the nearest eigenvalue from zero, over the lowest bending one, from which on one factorisation serves."""
+DOUBTFUL = 1e-3
+"""The same below which what factors tell is sharpened once: solutions, and an estimate of that distance."""
 FAR = 0.1
 """Shift of the factors, over the lowest bending eigenvalue, above which they lead to others than those near zero."""
 
@@ -190,7 +192,8 @@ class Inertia:
 
     def times(self, own: np.ndarray) -> np.ndarray:
         """The matrix times vectors, the columns of ``own`` (own rows, count)."""
-        return times(local_rows(self.matrix).real, self._whole(own))
+        rows = local_rows(self.matrix).real if self._shared is None else self._shared.matrix
+        return times(rows, self._whole(own))
 
     def _whole(self, own: np.ndarray) -> np.ndarray:
         """Rows of all ranks."""

@@ -33,7 +33,7 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.chain import factors_of
 from rodfem.linalg.matrices import local_rows, shared_matrix, times
-from rodfem.stability.inertia import Inertia
+from rodfem.stability.inertia import DOUBTFUL, Inertia
 from rodfem.stability.near_zero import quotient_error
 
 SOFT = 1e-6
@@ -145,12 +145,7 @@ class ReducedStiffness:
     far: int  # the index across the border
     W: np.ndarray  # (n, k)
     rotated: float  # how far the amplitudes are from those of the border's modes
-    doubt: float  # size of an eigenvalue that is zero to working accuracy
-
-    @property
-    def zero(self) -> int:
-        """Number of eigenvalues that are zero to working accuracy."""
-        return int((abs(np.linalg.eigvalsh(self.H)) <= self.doubt).sum())
+    zero: int  # number of eigenvalues that are zero to working accuracy
 
 
 def negative(H: np.ndarray) -> int:
@@ -163,11 +158,12 @@ class Condensation:
 
     def __init__(self, inertia: Inertia) -> None:
         self.system, self.inertia = inertia.system, inertia
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def border(self, x: PETSc.Vec) -> np.ndarray:
         """The six modes nearest zero at a state ``x``, (own rows, 6), fewer if there are no more; any basis near."""
         found = self.inertia.at(x)
-        found.count()
+        found.below(self.inertia.tolerance)
         with self.inertia.afresh():
             return np.stack([v.array_r.real for v in found.nearest(6, 0.1)[1]], axis=1)
 
@@ -178,12 +174,13 @@ class Condensation:
 
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
         """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
-        inertia, found, B = self.inertia, self.inertia.at(x), self.inertia.weighed(phi)
+        inertia, found, B = self.inertia, self.inertia.at(x), self._weighed(phi)
         try:
-            below = found.below(0.0)
-            Z = found.factors.solve_all(B)
-            H = _symmetric(np.linalg.inv(_symmetric(inertia.sum(B.T @ Z))))
-            values, vectors = np.linalg.eigh(H)
+            below, Z = found.below(0.0), found.factors.solve_all(B)
+            H, (values, vectors) = self._condensed(B, Z)
+            if abs(values).min() < DOUBTFUL * inertia.scale:  # it may touch zero
+                Z = Z + found.factors.solve_all(B - inertia.times(Z))
+                H, (values, vectors) = self._condensed(B, Z)
             near = not abs(values).min() > inertia.regular  # S is too nearly singular to be solved with
         except (ConvergenceError, np.linalg.LinAlgError):
             near = True
@@ -193,10 +190,22 @@ class Condensation:
         else:
             far, W = below - int((values < 0).sum()), Z @ H
         soft, doubt = int(abs(values).argmin()), TOLERANCE * inertia.scale
-        if abs(values[soft]) < SOFT * inertia.scale:
+        if small := bool(abs(values[soft]) < SOFT * inertia.scale):
             doubt = max(doubt, quotient_error(inertia.at(x).matrix, inertia.vector(W @ vectors[:, soft])))
         rotated = float(abs(np.linalg.eigvalsh(inertia.sum(W.T @ inertia.weighed(W))) - 1.0).max())
-        return ReducedStiffness(H, self._rate(x, tangent, H, W), far, W, rotated, doubt)
+        zero = int((abs(values) <= doubt).sum())
+        return ReducedStiffness(H, self._rate(x, tangent, (H, W), central=small), far, W, rotated, zero)
+
+    def _weighed(self, phi: np.ndarray) -> np.ndarray:
+        """Metric times a border, which serves for many states."""
+        if self._last is None or self._last[0] is not phi:
+            self._last = phi, self.inertia.weighed(phi)
+        return self._last[1]
+
+    def _condensed(self, B: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """H with its eigenvalues and vectors."""
+        H = _symmetric(np.linalg.inv(_symmetric(self.inertia.sum(B.T @ Z))))
+        return H, np.linalg.eigh(H)
 
     def _by_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
         """``far``, H and W where S is nearly singular, or is."""
@@ -205,15 +214,17 @@ class Condensation:
         modes, G = bordered.solve()
         return far, _symmetric(-G), np.stack([w.array_r for w in modes], axis=1)
 
-    def _rate(self, x: PETSc.Vec, tangent: PETSc.Vec, H: np.ndarray, W: np.ndarray) -> np.ndarray:
+    def _rate(
+        self, x: PETSc.Vec, tangent: PETSc.Vec, pair: tuple[np.ndarray, np.ndarray], *, central: bool
+    ) -> np.ndarray:
         """``W^t S' W`` along a tangent by a difference from ``W^t S W = H``, with the phase conditions of ``x``.
 
-        A soft eigenvalue may change less than round-off of that: its difference is wider, and central.
+        A soft eigenvalue may change less than round-off of that: its difference is wider, and ``central``.
         """
-        system, inertia = self.system, self.inertia
+        system, inertia, (H, W) = self.system, self.inertia, pair
         system.set_phase(x)
         behind, length = x, AHEAD
-        if abs(np.linalg.eigvalsh(H)).min() < SOFT * inertia.scale:
+        if central:
             behind, length = x - tangent * DIFFERENCE, 2 * DIFFERENCE
             inertia.moved(behind)
             H = inertia.sum(W.T @ inertia.times(W))
