@@ -76,16 +76,7 @@ def test_every_package_that_computes_loads_the_libraries_first() -> None:
 def test_without_a_compiler(given: str, folder: Path) -> None:
     """One sentence, before anything is compiled; what the cache has is not compiled."""
     code = "import sys; from rodfem.app.console import main; main(sys.argv[1:])"
-    words = [
-        "run",
-        str(HOME / "demos" / "ruler.py"),
-        "--elements",
-        "2",
-        "--degree",
-        "2",
-        "--output",
-        str(folder / "no"),
-    ]
+    words = ["run", str(HOME / "demos" / "ruler.py"), *"--elements 2 --degree 2 --output".split(), str(folder / "no")]
     env = os.environ | {"PATH": str(folder), "PYTHONPATH": str(HOME), "XDG_CACHE_HOME": str(folder / "cache")}
     env |= {"CC": given} if given else {}
     hidden = "import sys; sys.modules['ziglang'] = None; "

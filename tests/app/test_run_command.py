@@ -13,10 +13,9 @@ from slepc4py import SLEPc
 
 import rodfem
 from rodfem.app import console
-from rodfem.app.main import Statement, own_of, rod_of
+from rodfem.app.main import Statement
 from rodfem.app.persons_file import load
 from rodfem.compat import slepc_errors
-from rodfem.errors import InputError
 from rodfem.ranks import in_words
 
 SCENE = """
@@ -131,15 +130,6 @@ def test_the_options_of_a_file_are_those_of_its_own_plan(end: str, tmp_path: Pat
     data = rodfem.load_json(tmp_path / "made" / "diagram.json")
     assert data["range"] == [0.0, 3.0] and data["asked"]["plan"]["depth"] == 0 and len(data["branches"]) == 1
     assert data["asked"]["plan"]["at"] == [1.5] and data["discretization"]["elements"] == (3 if end else 8)
-
-
-def test_a_named_scene(tmp_path: Path) -> None:
-    file = tmp_path / "mine.py"
-    file.write_text(SCENE + "other = column")
-    module = load(file)
-    assert rod_of(module, "other") is module.other and own_of(module, "Discretization") is None
-    with pytest.raises(InputError, match="choose one of column, other"):
-        rod_of(module, "third")
 
 
 def test_what_stands_beside_a_file_hides_no_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,19 +15,7 @@ from scipy.spatial.transform import Rotation
 pytestmark = pytest.mark.short
 
 ELEMENTS, DEGREE, HALF = 8, 6, DEFAULT[3]
-ARGUMENTS = (
-    "--elements",
-    str(ELEMENTS),
-    "--degree",
-    str(DEGREE),
-    "--range",
-    "0",
-    "0.4",
-    "--at",
-    "0.2",
-    "0.35",
-    "--no-figures",
-)
+ARGUMENTS = f"--elements {ELEMENTS} --degree {DEGREE} --range 0 0.4 --at 0.2 0.35 --no-figures".split()
 SPECTRUM = {"reduced": ("--spectrum", "3"), "pointwise": ()}
 FORMULATIONS = pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 
