@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from rodfem.codim2.adjoint import state_derivative
 from rodfem.codim2.criteria import kept
@@ -31,6 +30,9 @@ from rodfem.problem.arguments import checked
 from rodfem.problem.field import Field, names, with_fields
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
+
+if TYPE_CHECKING:
+    from petsc4py import PETSc
 
 CRITICAL, ORDINATE, SHAPE = "critical loads", "ordinate", "shape"
 """What may be measured: see :func:`identify`."""
@@ -149,7 +151,7 @@ class _Model:
         self.solver, self._values = Solver(scene, mesh), {name: p.value for name, p in scene.parameters.items()}
         loads = sorted({float(row[0]) for kind in (ORDINATE, SHAPE) for row in tables.get(kind, ())})
         ascending = scene.span[0] <= scene.span[1]
-        self._states = dict[float, PETSc.Vec]()
+        self._states = dict[float, "PETSc.Vec"]()
         point = None
         for load in loads if ascending else loads[::-1]:
             point = self.solver.equilibrium(load, point)
