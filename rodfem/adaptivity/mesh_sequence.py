@@ -56,16 +56,12 @@ def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) 
 
 @dataclass(eq=False)
 class TooCoarse(Exception):
-    """The mesh does not resolve a ``point`` to the accuracy: its ``error`` is too large, infinite if it is not known.
-
-    ``directions`` are null vectors to be resolved, too; the error falls as the indicator to the power ``order``;
-    ``why`` is a sentence.
-    """
+    """The mesh does not resolve a ``point`` to the accuracy: its ``error`` is too large, infinite if unknown."""
 
     point: Point
     error: float
-    directions: Sequence[PETSc.Vec] = ()
-    order: float = 1.0
+    directions: Sequence[PETSc.Vec] = ()  # null vectors to be resolved, too
+    order: float = 1.0  # power of the indicator as which the error falls
     why: str = ""
 
     def __str__(self) -> str:

@@ -69,36 +69,26 @@ class Sought:
 
 @dataclass
 class LocusPoint:
-    """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
+    """A point of a locus."""
 
-    ``located_to`` (2,) are the uncertainties of the parameters.  ``rest`` counts the negative (without a potential:
-    unstable) eigenvalues but for those that vanish or collide here, -1: not counted.  ``omega2`` is a double
-    eigenvalue.  At folds ``coupling`` (2,) is the derivative of the equations in the two parameters along the null
-    vector, in units of the bounds, and ``curvature`` the second one along it.  ``modes`` are the null vectors, as many
-    as the ``multiplicity``, and modes near by, or a basis of the double eigenvalue's invariant subspace; ``left`` are
-    the left null vectors where they are others.  ``orientation`` is the side of the tangent, -1 or 1, on which the
-    defining function grows: it changes only where two curves cross.  ``ended`` says why the curve ends here.  A turning
-    point or an end is ``sought`` along the curve, and was found in ``windows`` of these half widths.
-    """
-
-    p: np.ndarray
+    p: np.ndarray  # parameters (2,)
     x: PETSc.Vec
-    dp: np.ndarray
+    dp: np.ndarray  # with the next one the unit tangent
     dx: PETSc.Vec
-    located_to: np.ndarray
-    s: float = 0.0
+    located_to: np.ndarray  # uncertainties of the parameters (2,)
+    s: float = 0.0  # arclength
     ordinate: float = float("nan")
-    rest: int = -1
-    omega2: float = float("nan")
-    curvature: float = 0.0
-    coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    modes: list[PETSc.Vec] = field(default_factory=list)
-    left: list[PETSc.Vec] = field(default_factory=list)
-    multiplicity: int = 0
-    orientation: int = 0
-    ended: str = ""
-    sought: Sought | None = None
-    windows: tuple[float, ...] = ()
+    rest: int = -1  # negative (without a potential: unstable) eigenvalues but for its own, -1: not counted
+    omega2: float = float("nan")  # a double eigenvalue
+    curvature: float = 0.0  # of folds: second derivative of the equations along the null vector
+    coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))  # that in the parameters, in units of the bounds
+    modes: list[PETSc.Vec] = field(default_factory=list)  # null vectors and modes near by, or a cluster's basis
+    left: list[PETSc.Vec] = field(default_factory=list)  # left null vectors, where they are others
+    multiplicity: int = 0  # number of null vectors
+    orientation: int = 0  # side of the tangent on which the defining function grows: another where two curves cross
+    ended: str = ""  # why the curve ends here
+    sought: Sought | None = None  # what is sought along the curve, at a turning point or an end
+    windows: tuple[float, ...] = ()  # half widths of those in which that was found
 
     def reversed(self) -> LocusPoint:
         """The same point of the curve that is followed the other way."""

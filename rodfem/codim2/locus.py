@@ -39,52 +39,42 @@ class Mark:
 
 @dataclass(frozen=True)
 class Row:
-    """A point of a locus: its ``load``, second ``parameter`` and ``ordinate``.
-
-    ``omega2`` is the double eigenvalue of flutter, nan for others, and ``index`` that on the two sides of the curve;
-    both parameters are uncertain by ``located_to`` on its mesh.
-    """
+    """A point of a locus."""
 
     load: float
-    parameter: float
+    parameter: float  #: the second one
     ordinate: float
-    omega2: float
-    index: tuple[int, int]
-    located_to: tuple[float, float]
+    omega2: float  #: the double eigenvalue of flutter, nan for others
+    index: tuple[int, int]  #: on the two sides of the curve
+    located_to: tuple[float, float]  #: uncertainties of both parameters on the mesh
 
 
 @dataclass(repr=False)
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
-    ``names``, ``bounds`` and ``values`` are the two parameters, the scene's load first, their intervals, and both at
-    each row, (n, 2).  ``index`` (n, 2) is that of the equilibria on the two sides of the curve: the eigenvalues that
-    vanish on it positive, and negative; under loads without a potential the number of unstable ones.  ``lower`` is the
-    side of the load on which it is the lower one at the start: -1 below, 1 above, 0 not known.
-
-    ``located_to`` (n, 2) are the uncertainties of the parameters on the mesh: of turning points, cusps and ends also
-    along the curve.  ``error`` (n, 2) says how far, across the curve, that of a richer mesh is away in either
-    parameter; of turning points, cusps and ends how far those of that curve are.  It is nan where it was not asked for,
-    inf where the richer mesh does not find the point; rows that are ``unresolved`` may exceed it.
-
-    ``marks`` are rows at which the curve turns in a parameter, cusps, and rows (away from the ``start``) before which
-    another eigenvalue has passed through zero, not located; ``ended`` says why it ends, at its first and last row.
+    The ``index`` is that of the equilibria on its two sides: the eigenvalues that vanish on it positive, and negative;
+    under loads without a potential the number of unstable ones.  The ``error`` says how far, across the curve, that of
+    a richer mesh is away in either parameter; of turning points, cusps and ends how far those of that curve are.  It is
+    nan where it was not asked for, inf where the richer mesh does not find the point; ``unresolved`` rows may exceed
+    it.  ``marks`` are rows at which the curve turns in a parameter, cusps, and rows (away from the ``start``) before
+    which another eigenvalue has passed through zero, not located.
     """
 
     system: System
     kind: str
-    names: tuple[str, str]
-    bounds: tuple[Interval, Interval]
-    values: np.ndarray
+    names: tuple[str, str]  #: the two parameters, the scene's load first
+    bounds: tuple[Interval, Interval]  #: their intervals
+    values: np.ndarray  #: both at each row, (n, 2)
     ordinate: np.ndarray
-    index: np.ndarray
-    lower: int
-    omega2: np.ndarray  # the double eigenvalue of flutter, nan for others
-    located_to: np.ndarray
-    error: np.ndarray
+    index: np.ndarray  #: on the two sides, (n, 2)
+    lower: int  #: side of the load on which the index is the lower one at the start: -1 below, 1 above, 0 not known
+    omega2: np.ndarray  #: the double eigenvalue of flutter, nan for others
+    located_to: np.ndarray  #: uncertainties on the mesh, (n, 2): of turning points, cusps and ends also along the curve
+    error: np.ndarray  #: that of the mesh, (n, 2)
     marks: list[Mark]
     start: int
-    ended: tuple[str, str]
+    ended: tuple[str, str]  #: why it ends, at its first and last row
     solve: Callable[[int, float], list[Row]]  # rows where a parameter, 0 or 1, has a value
     states: list[PETSc.Vec] = field(default_factory=list)  # not saved
     crossings: list[tuple[float, float]] = field(default_factory=list)  # load, ordinate at the start's parameter

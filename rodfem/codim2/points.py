@@ -45,7 +45,7 @@ CERTAIN = 10.0
 NONE = 1e-10
 """Part of a unit tangent along one parameter, or of a coupling over that with the other one, that is round-off: it has
 no sign."""
-PARTS = 12  # of a step that shows a turning point or a cusp
+PARTS = 13  # of a step that shows a turning point or a cusp: an odd number, as its middle is likely to be one
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
 """The end of a curve of flutter: its double eigenvalue vanishes."""
 ENDS = "the fold ends on a branch point"
@@ -58,18 +58,14 @@ Test = Callable[[LocusPoint], float]  # what vanishes at a point of codimension 
 
 @dataclass(frozen=True)
 class Place:
-    """Arclength ``s`` from the middle of a window of this ``half`` width, and its uncertainty ``ds``.
-
-    ``through`` are the polynomials of both parameters in the arclength; by ``apart`` (2,) those of another window
-    differ.
-    """
+    """Arclength ``s`` from the middle of a window of this ``half`` width, and its uncertainty ``ds``."""
 
     s: float
     ds: float
-    through: list[Chebyshev]
+    through: list[Chebyshev]  # both parameters in the arclength
     nodes: list[LocusPoint]
     half: float
-    apart: np.ndarray
+    apart: np.ndarray  # difference (2,) of the parameters by another window
     windows: tuple[float, ...] = ()
 
     @property

@@ -45,20 +45,16 @@ class Side:
 
 @dataclass
 class Critical:
-    """A critical load, before its state is evaluated, at which a cluster of eigenvalues collides or passes zero.
-
-    ``change`` is that of the number of unstable eigenvalues; ``zeros`` of the cluster, those of rigid motions, are
-    zero at all loads.  Without a cluster round-off hides the collision: the pair is complex at both ends of the step.
-    """
+    """A critical load, before its state is evaluated, at which a cluster of eigenvalues collides or passes zero."""
 
     kind: Kind
     load: float
-    change: int
+    change: int  # of the number of unstable eigenvalues
     uncertainty: float
     omega2: float
-    cluster: Cluster | None = None
+    cluster: Cluster | None = None  # None where round-off hides a collision: the pair is complex at both ends
     note: str = ""
-    zeros: int = 0
+    zeros: int = 0  # eigenvalues of the cluster that are zero at all loads, those of rigid motions
 
 
 def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:

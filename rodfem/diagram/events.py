@@ -29,18 +29,14 @@ if TYPE_CHECKING:
 
 
 class Step(NamedTuple):
-    """From a point ``a`` of a branch to the next, ``b``, both on the mesh of a ``solver``.
-
-    ``singular`` has the folds and branch points between them; the branch ``begins`` at ``a``, or has come there; it is
-    ``closed`` at ``b``, a state that has been examined as its beginning.
-    """
+    """From a point ``a`` of a branch to the next, ``b``, both on the mesh of a ``solver``."""
 
     solver: BranchSolver
     a: Point
     b: Point
-    singular: Sequence[SpecialPoint] = ()
-    begins: bool = False
-    closed: bool = False
+    singular: Sequence[SpecialPoint] = ()  # folds and branch points between them
+    begins: bool = False  # whether the branch begins at a: else it has come there
+    closed: bool = False  # whether b is the state at which the branch began, which has been examined
 
     def pieces(self) -> Iterator[Arc]:
         """Arcs between ``a``, the folds and branch points, and ``b``: the load is monotone along each."""

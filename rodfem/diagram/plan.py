@@ -43,39 +43,22 @@ def _locus(name: str, value: Any) -> tuple[str, float, float]:
 class Plan:
     """Range of the load, loads to stop at, depth of switches, steps, and further results that are wanted.
 
-    Parameters
-    ----------
-    span
-        Range of the load, start first; by default that of the scene.
-    at
-        Loads to stop at, each once.
-    depth
-        Branches are followed from branch points of branches of a depth less than this; the first branch has depth 0.
-    steps
-        Control of the lengths of steps.
-    error_bars
-        Whether a second computation bounds the errors.
-    spectrum
-        Number of left-most eigenvalues of every state, in addition to its index.
-    tries
-        Number of deflated iterations at each load of ``at``, which look for equilibria that no branch has reached.
-    locus
-        ``(parameter, low, high)``: every special point is followed in the plane of the load and that parameter.
-    sensitivity
-        Whether the derivatives of the loads of special points in all constants are computed.
-    method
-        Name of the method by which states at the loads ``at`` are assessed; empty for none.
-    modes
-        Number of left-most modes of these states.
-    accuracy
-        Meshes are chosen and raised on the way such that load and ordinate of every row and special point are in error
-        by less than this (relative to values greater than one), those of a row across the branch.  Of a discretisation
-        that is given the formulation, the factors and the vertices are taken, which are the first mesh; elements and
-        degree alone are not.
-    events
-        Numbers of the state whose zeros are special points, too, and levels of eigenvalues (conservative scenes).
-    most_branches
-        Nothing more is followed from branch points once there are so many branches; 0 for no limit.
+    ``span`` is the range of the load, start first, by default that of the scene; ``at`` are loads to stop at, each
+    once.  Branches are followed from branch points of branches of a ``depth`` less than this, that of the first one
+    being 0, and no more once there are ``most_branches``, 0 for no limit; ``steps`` control the lengths of steps.
+    ``error_bars`` are those of a second computation; ``spectrum`` is the number of left-most eigenvalues of every state
+    that are wanted in addition to its index.
+
+    At each load of ``at`` that many ``tries``, deflated iterations, look for equilibria that no branch has reached, and
+    states are assessed by a ``method``, empty for none, with a number of left-most ``modes``.  With a ``locus``,
+    ``(parameter, low, high)``, every special point is followed in the plane of the load and that parameter; with
+    ``sensitivity`` the derivatives of their loads in all constants are computed.  Zeros of ``events``, numbers of the
+    state, and levels of eigenvalues are special points, too (conservative scenes).
+
+    With an ``accuracy`` meshes are chosen and raised on the way such that load and ordinate of every row and special
+    point are in error by less than this (relative to values greater than one), those of a row across the branch.  Of a
+    discretisation that is given the formulation, the factors and the vertices are taken, which are the first mesh;
+    elements and degree alone are not.
     """
 
     span: tuple[float, float] | None = None

@@ -59,14 +59,11 @@ class Unresolved(Exception):
 
 
 class Gap(NamedTuple):
-    """A gap: the ``point`` at which its branches would cross, and the ``unfolded`` state there.
-
-    ``apart`` is how far, in the metric, the state of the branch from which the gap was seen is.
-    """
+    """A gap: the ``point`` at which its branches would cross, and the ``unfolded`` state there."""
 
     point: Point
     unfolded: SingularState
-    apart: float
+    apart: float  # distance, in the metric, of the state from which the gap was seen
 
 
 class SpecialSearch:
