@@ -56,3 +56,25 @@ def of_polygon(points: Floats) -> float:
     angles = [np.arcsin(np.clip(np.sum(units[k] * units[(k + 1) % 4], axis=1), -1.0, 1.0)) for k in range(4)]
     side = np.sign(np.sum(np.cross(d - c, b - a) * (c - a), axis=1))
     return float(np.sum(np.sum(angles, axis=0) * side) / (2 * np.pi))
+
+
+def lies_on_itself(curve: Callable[[Floats], Floats], ends: tuple[float, float]) -> bool:
+    """Whether a closed ``curve``, as for :func:`writhe`, meets itself: its writhe is that of either side then."""
+    from scipy.optimize import minimize  # slow to load
+
+    places, number = np.linspace(*ends, MOST // 4, endpoint=False), MOST // 4
+    points, step = curve(places), (ends[1] - ends[0]) / number
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    i, j = np.indices(apart.shape)
+    between = abs(i - j)
+    apart[np.minimum(between, number - between) < FEW] = np.inf  # neighbours
+    nearest = np.unravel_index(apart.argmin(), apart.shape)
+    start = places[list(nearest)] / step
+
+    def squared(pair: Floats) -> float:
+        a, b = curve(pair * step) / step
+        return float((a - b) @ (a - b))
+
+    found = minimize(squared, start, tol=1e-12)
+    along = abs(found.x[0] - found.x[1]) % number
+    return bool(found.fun < 1e-8 and min(along, number - along) > FEW / 2)

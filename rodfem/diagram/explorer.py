@@ -133,7 +133,8 @@ class Explorer(Tracer):
         if self.scene.closed:
             number, *turns = link(self.solver.shape.sample(point.x))
             Tw, Wr = (round(x, 4) + 0.0 for x in turns)  # no negative zero
-            self.observer.note(f"  closed rod: linking number {number:g}, twist {Tw:.4f}, writhe {Wr:.4f}")
+            known = f"linking number {number:g}" if isfinite(number) else "no linking number, as it lies on itself"
+            self.observer.note(f"  closed rod: {known}, twist {Tw:.4f}, writhe {Wr:.4f}")
         assert point.tangent is not None
         ahead = point.x + 0.1 * point.tangent  # rotations that give d3 one direction are a linear space
         return Branch(name_of_first(self.solver.shape, [point.x, ahead]), None, 0, [point])

@@ -20,7 +20,7 @@ from rodfem.fem.system import System
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import CONJUGATE, directors, product
-from rodfem.writhe import writhe
+from rodfem.writhe import lies_on_itself, writhe
 
 
 def minimum(powers: list[float], t: float, spacing: float) -> float:
@@ -266,14 +266,18 @@ def link(sample: dict[str, Any]) -> tuple[float, float, float]:
 
     The linking number of the edge traced by a director with the centreline is ``Lk = Tw + Wr`` (Calugareanu 1959, White
     1969), with the twist ``Tw = 1/(2 pi) int k3 ds`` and the writhe ``Wr`` of the centreline.  It is an integer
-    and a ring's turn, and does not change unless the rod passes through itself: it belongs to the scene's start.
+    and a ring's turn, and does not change unless the rod passes through itself: it belongs to the scene's start.  Of a
+    rod that lies on itself it is nan.
     """
     from scipy.interpolate import CubicSpline
 
     s, closed = np.asarray(sample["s"]), np.array(sample["r"])
     closed[-1] = closed[0]
-    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=1e-5)  # the change that is accepted
+    centreline = CubicSpline(s, closed, bc_type="periodic")
+    Wr = writhe(centreline, (s[0], s[-1]), to=1e-5)  # the change that is accepted
     Tw = twist(s, np.asarray(sample["q"]))
+    if lies_on_itself(centreline, (s[0], s[-1])):
+        return np.nan, Tw, Wr
     a, b = np.asarray(sample["q"])[[0, -1]]
     turn = np.arctan2(a[0] * b[3] - a[3] * b[0] + a[2] * b[1] - a[1] * b[2], a @ b) / np.pi  # of conj(a) b about d3
     Lk = round(round(Tw + Wr - turn) + turn, 9) + 0.0  # no negative zero

@@ -35,6 +35,7 @@ from rodfem.fem.shape import link
 from rodfem.fem.system import FEW, System
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.functions import Constants
+from rodfem.writhe import lies_on_itself
 
 MIDDLE = Ordinate("displacement of the middle", s=0.5, of=lambda r, q: hypot(r[0], r[1]))
 
@@ -146,6 +147,21 @@ def test_link_of_a_twisted_circle(turns: int) -> None:
     number, Tw, Wr = link({"s": s, "q": q, "r": r})
     assert number == turns
     assert (Tw, Wr) == pytest.approx((turns, 0.0), abs=1e-4)
+
+
+@pytest.mark.parametrize("thick", [0.0, 1e-4])
+def test_a_circle_covered_twice_has_no_linking_number(thick: float) -> None:
+    """A trefoil on a thin torus has a writhe of three turns; on the circle it lies on itself."""
+
+    def trefoil(t: np.ndarray) -> np.ndarray:
+        out = 2 + thick * np.cos(3 * t)
+        return np.stack([out * np.cos(2 * t), out * np.sin(2 * t), thick * np.sin(3 * t)], axis=-1)
+
+    assert lies_on_itself(trefoil, (0.0, 2 * pi)) == (thick == 0)
+    s = np.linspace(0, 4 * pi, 193)
+    q = np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
+    r = np.stack([1 - np.cos(s), 0 * s, np.sin(s)], axis=1)
+    assert np.isnan(link({"s": s, "q": q, "r": r})[0])
 
 
 @pytest.mark.ranks
