@@ -25,8 +25,8 @@ from rodfem import compat
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver, Step, lagrange, predict
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.newton import VIOLATED, violation
 from rodfem.fem.system import System
-from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.arguments import finite, real, whole
 from rodfem.tolerances import NEGLIGIBLE, SAME_LOAD
@@ -39,8 +39,6 @@ UNEXPLAINED = 0.25
 """Defect of a step, relative to the correction that is aimed at, from which on it has ended on another branch."""
 END_OF_RANGE, MOST_REACHED = "end of range", "points reached"
 """Why a branch ends at a bound of the range, and with as many points as its steps may have."""
-VIOLATED = 1e-8
-"""Residual of an equilibrium, in units of the rod's own energy, and difference of a squared norm from one."""
 
 
 @dataclass(frozen=True)
@@ -281,19 +279,7 @@ def require_equilibrium(solver: BranchSolver, point: Point) -> None:
             "smaller steps."
         )
     system.set_phase(x)
-    equations = system.new_vector()
-    system.at(x).residual(equations)
-    worst = system.in_units(equations, 1).norm(PETSc.NormType.INFINITY)
-    if not worst <= VIOLATED and not worst <= _round_off(system, x):
+    if worst := violation(system, x):
         raise ConvergenceError(
             f"{where} the state is no equilibrium: its equations are violated by {worst:.1e}; use smaller steps."
         )
-
-
-def _round_off(system: System, x: PETSc.Vec) -> float:
-    """Round-off of the product of the second variation with the state, in natural units."""
-    matrix = system.state_matrix()
-    system.at(x).assemble_into(matrix, system.equations.jacobian)
-    matrix.assemble()
-    sizes = system.matrix_in_units(matrix), system.in_units(x, -1)
-    return 1e3 * EPS * float(np.prod([size.norm(PETSc.NormType.INFINITY) for size in sizes]))

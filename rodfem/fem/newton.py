@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from rodfem.linalg.chain import Chain, Elimination
 from rodfem.linalg.compiled import Memory, buffer, module
-from rodfem.linalg.matrices import shared
+from rodfem.linalg.matrices import EPS, shared
 
 if TYPE_CHECKING:
     from rodfem.fem.system import System
@@ -28,6 +28,8 @@ TOLERANCE = 1e-10
 natural sizes: reactions that vanish relative to the stiffness of the rod are round-off of that."""
 STALLED = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
+VIOLATED = 1e-8
+"""Residual of an equilibrium, in natural units, if round-off is not larger, and that of a squared norm from one."""
 ITERATIONS, STEPS = 12, 8
 """Iterations, at most, and in a step along a branch: a shorter step is cheaper than more of them."""
 FAR = 1e3
@@ -56,7 +58,7 @@ class Limits:
     """At most ``most`` iterations, over a distance of ``reach`` in the metric.
 
     A correction below ``small`` is small enough; one that no longer shrinks is round-off below ``still``, and where the
-    unknowns are ``lost`` in the round-off of the equations.
+    unknowns are ``lost`` in the round-off of the equations, if these ``hold``: next to a barrier corrections grow.
     """
 
     most: int = ITERATIONS
@@ -64,10 +66,11 @@ class Limits:
     small: float = TOLERANCE
     still: float = STALLED
     lost: Callable[[], bool] = lambda: False
+    hold: Callable[[], bool] = lambda: True
 
     def stalled(self, size: float, previous: float) -> bool:
         """Whether a correction by fresh factors is round-off, as it no longer shrinks."""
-        return size > 0.5 * previous and (size < self.still or self.lost())
+        return size > 0.5 * previous and (size < self.still or self.lost()) and self.hold()
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,25 @@ def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, mo
     """
     system.set_phase(x)
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
-    return newton(OnPlane(system, x, row), Limits(most, reach, still=still))
+    hold = (lambda: True) if system.damping else lambda: not violation(system, x)
+    return newton(OnPlane(system, x, row), Limits(most, reach, still=still, hold=hold))
+
+
+def violation(system: System, x: PETSc.Vec) -> float:
+    """Largest entry of the equations at a state, in natural units; zero if that of an equilibrium.  Collective."""
+    equations = system.new_vector()
+    system.at(x).residual(equations)
+    worst = system.in_units(equations, 1).norm(PETSc.NormType.INFINITY)
+    return 0.0 if worst <= VIOLATED or worst <= _round_off(system, x) else worst
+
+
+def _round_off(system: System, x: PETSc.Vec) -> float:
+    """Round-off of the product of the second variation with the state, in natural units."""
+    matrix = system.state_matrix()
+    system.at(x).assemble_into(matrix, system.equations.jacobian)
+    matrix.assemble()
+    sizes = system.matrix_in_units(matrix), system.in_units(x, -1)
+    return 1e3 * EPS * float(np.prod([size.norm(PETSc.NormType.INFINITY) for size in sizes]))
 
 
 class OnPlane:
