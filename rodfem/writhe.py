@@ -20,6 +20,7 @@ from rodfem.tolerances import SAME_PLACE, TINY
 
 Floats = NDArray[np.float64]
 FEW, MOST = 16, 1024  # edges of the first polygon, and of the last one, where curves touch
+TOUCHING = 1e-8  # squared distance, over that of a 256th of the curve, at which two of its parts are at one place
 
 
 def writhe(curve: Callable[[Floats], Floats], ends: tuple[float, float], to: float = 1e-3) -> float:
@@ -75,6 +76,6 @@ def lies_on_itself(curve: Callable[[Floats], Floats], ends: tuple[float, float])
         a, b = curve(pair * step) / step
         return float((a - b) @ (a - b))
 
-    found = minimize(squared, start, tol=1e-12)
+    found = minimize(squared, start, tol=TOUCHING**2)
     along = abs(found.x[0] - found.x[1]) % number
-    return bool(found.fun < 1e-8 and min(along, number - along) > FEW / 2)
+    return bool(found.fun < TOUCHING and min(along, number - along) > FEW / 2)
