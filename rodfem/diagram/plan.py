@@ -117,7 +117,8 @@ class Plan:
                 "leave events out."
             )
         for event in self.events:
-            event.check(scene.length)
+            if isinstance(event, Event):
+                event.check(scene.length)
         if self.accuracy is not None:
             self._check_accuracy(self.accuracy, scene)
         low, high = sorted(span)

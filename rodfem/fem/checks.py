@@ -93,7 +93,7 @@ class Convexity:
         if self.evaluate is None:
             return 1.0
         values = np.linalg.eigvalsh(self._matrices(x))
-        mine = (values[:, 0] / abs(values).max(axis=1)).min() if len(values) else 1.0
+        mine = (values[..., 0] / abs(values).max(axis=-1)).min(initial=1.0)
         return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
 
     def scales(self, *states: PETSc.Vec) -> np.ndarray:
@@ -102,7 +102,7 @@ class Convexity:
         Of one state alone they are too small where a strain has hardly any stiffness left: in units of these the other
         strains are the least eigenvalue almost everywhere, and hide it.
         """
-        diagonals = [abs(np.einsum("cpii->cpi", self._by_element(x))) for x in states]
+        diagonals = [abs(np.einsum("cpii->cpi", self._matrices(x))) for x in states]
         return np.asarray(np.sqrt(np.max(diagonals, axis=0).max(axis=1, keepdims=True)))
 
     def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
@@ -112,20 +112,17 @@ class Convexity:
     def margins(self, states: Sequence[PETSc.Vec], scales: np.ndarray) -> list[float]:
         """The same at several states."""
         units, comm = scales[..., None] * scales[..., None, :], self.system.comm
-        least = np.linalg.eigvalsh(np.stack([self._by_element(x) for x in states]) / units)[..., 0]
+        least = np.linalg.eigvalsh(np.stack([self._matrices(x) for x in states]) / units)[..., 0]
         mine: list[float] = least.min(axis=(1, 2), initial=1.0).tolist()
         return mine if comm.size == 1 else np.min(comm.allgather(mine), axis=0).tolist()
 
-    def _by_element(self, x: PETSc.Vec) -> np.ndarray:
-        """Second derivatives by element of this rank and place on it, (cells, places, size, size)."""
-        return self._matrices(x).reshape(self.system.fields.owned_cells, self.places, self.size, self.size)
-
     def _matrices(self, x: PETSc.Vec) -> np.ndarray:
-        """Second derivatives at all places of this rank, symmetric, (places, size, size)."""
+        """Second derivatives by element of this rank and place on it, symmetric, (cells, places, size, size)."""
         assert self.evaluate is not None
         state, evaluate = self.system.at(x), self.evaluate
-        matrices = derived(state, evaluate, lambda: state.evaluate(evaluate).reshape(-1, self.size, self.size).copy())
-        return np.asarray((matrices + matrices.transpose(0, 2, 1)) / 2)
+        shape = self.system.fields.owned_cells, self.places, self.size, self.size
+        matrices = derived(state, evaluate, lambda: state.evaluate(evaluate).reshape(shape).copy())
+        return np.asarray((matrices + np.swapaxes(matrices, -1, -2)) / 2)
 
 
 class Pieces:

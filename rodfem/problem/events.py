@@ -83,6 +83,3 @@ class Level:
     def name(self) -> str:
         """Name of its special points."""
         return f"eigenvalue {self.value:g}"
-
-    def check(self, length: float) -> None:
-        """Nothing can fail: there is no function of the user's."""

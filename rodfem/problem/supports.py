@@ -58,7 +58,7 @@ def _support(scene: Scene, s: float, end: End, sample: Sample, springs: Floats |
         springs = np.zeros((2, 3, 3))
         if end.energy is not None:
             there = _point(scene, s, _state(sample, s)[0], frame)
-            springs = _springs(second_derivative_of(end.energy, c, there))
+            springs = _springs(derivative_of(end.energy, c, there, 2))
     if end.energy is not None:
         loads = _load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
         loads[1] *= end.turning != HELD
@@ -96,28 +96,22 @@ def _point(scene: Scene, s: float, r: Floats, q: Floats) -> Place:
     return place(turned, rotation(turned), s, ufl.as_vector(r.tolist()), length=scene.length)
 
 
-def _near(function: OfPlace, c: Constants, x: Place) -> tuple[Any, Any]:
-    """A change of position and rotation vector, (6,) along e1 to e3, and ``function(x, c)`` there, to second order."""
-    change = ufl.variable(ufl.as_vector([0.0] * 6))
+def derivative_of(function: OfPlace, c: Constants, x: Place, order: int = 1) -> Floats:
+    """Derivatives of ``function(x, c)`` in position and rotation vector, in the frame of space: (2, 3), or (2, 3, 3).
+
+    Those of ``order`` 2 are in the position twice, and in the rotation vector twice.
+    """
+    change = ufl.variable(ufl.as_vector([0.0] * 6))  # of position and rotation vector, along e1 to e3
     spin = ufl.as_vector([change[3], change[4], change[5]])
     q = product(ufl.as_vector([1.0 - ufl.dot(spin, spin) / 8, spin[0] / 2, spin[1] / 2, spin[2] / 2]), x.q)
     r = ufl.as_vector([x.r[0] + change[0], x.r[1] + change[1], x.r[2] + change[2]])
-    return change, ufl.as_ufl(function(place(q, rotation(q), x.s, r, length=x.length), c))
-
-
-def derivative_of(function: OfPlace, c: Constants, x: Place) -> Floats:
-    """Derivative (2, 3) of ``function(x, c)`` in the position and in the rotation vector, in the frame of space."""
-    change, value = _near(function, c, x)
-    slope = differentiated(ufl.diff(value, change))
-    return np.array([float(evaluated(slope, (i,))) for i in range(6)]).reshape(2, 3)
-
-
-def second_derivative_of(function: OfPlace, c: Constants, x: Place) -> Floats:
-    """Second derivatives (2, 3, 3) of ``function(x, c)`` in the position and in the rotation vector."""
-    change, value = _near(function, c, x)
-    bend = differentiated(ufl.diff(ufl.diff(value, change), change))
-    entries = [(first + i, first + j) for first in (0, 3) for i in range(3) for j in range(3)]
-    return np.array([float(evaluated(bend, entry)) for entry in entries]).reshape(2, 3, 3)
+    value = ufl.diff(ufl.as_ufl(function(place(q, rotation(q), x.s, r, length=x.length), c)), change)
+    entries: list[tuple[int, ...]] = [(i,) for i in range(6)]
+    if order == 2:
+        value = ufl.diff(value, change)
+        entries = [(first + i, first + j) for first in (0, 3) for i in range(3) for j in range(3)]
+    value = differentiated(value)
+    return np.array([float(evaluated(value, entry)) for entry in entries]).reshape(2, *(3,) * order)
 
 
 def _springs(second: Floats) -> Floats:
@@ -152,7 +146,7 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
     s, load = _stations(scene), float(sample["load"])
     places = [_point(scene, at, *_state(sample, at)) for at in s.tolist()]
     try:
-        second = [second_derivative_of(scene.potential, scene.constants(load, x.s), x)[0] for x in places]
+        second = [derivative_of(scene.potential, scene.constants(load, x.s), x, 2)[0] for x in places]
     except SceneError:  # it asks for strains, which a point does not have
         return None
     found = _springs(np.array(second))
