@@ -159,7 +159,7 @@ TABLE = {
             "if margin(t) <= 0.0 and not holds(t):", "if margin(t) <= 0.0 and t == 1.0 and not holds(t):",
             "continuation/test_convexity.py"),
         "convexity-in-units-of-one-end": (
-            "convexity.scales(state(0.0), state(1.0))", "convexity.scales(state(0.0))",
+            "convexity.scales(states[0], states[-1])", "convexity.scales(states[0])",
             "continuation/test_convexity.py"),
     },
     "rodfem/continuation/branch.py": {
@@ -180,7 +180,7 @@ TABLE = {
         "no-pair-is-near-the-axis": (
             "AXIS, REAL = 0.4,", "AXIS, REAL = 0.0,", "continuation/test_reduced_stiffness.py"),
         "the-cubic-is-the-branch": (
-            "off = None if size is None else SAFE * (b.s - a.s) ** 4 / 16 * size", "off = 0 * np.eye(len(a.H))",
+            "off = SAFE * (b.s - a.s) ** 4 / 16 * size", "off = 0 * np.eye(len(a.H))",
             "continuation/test_reduced_stiffness.py"),
     },
     "rodfem/continuation/eigenvalue_curves.py": {
