@@ -107,8 +107,10 @@ class Adjoint:
             each.pointwiseMult(column, v)
             work, size = abs(each.sum()), self.system.norm(v)
             if work > noise * size and work > IMPERFECT * each.norm(PETSc.NormType.NORM_1):
+                at = f"{self.system.scene.load} = {self.load:.8g}, {parameter} = {self.values[parameter]:.8g}"
                 raise ConvergenceError(
-                    f"{parameter} is an imperfection that destroys the branch point, or is one on this mesh alone"
+                    f"The branch point at {at} has no derivative: {parameter} is an imperfection that destroys it, or "
+                    "is one on this mesh alone."
                 )
 
     def density(self, parameter: str, pieces: int) -> tuple[np.ndarray, np.ndarray]:

@@ -82,10 +82,10 @@ def derivative(special: SpecialPoint, parameter: str, *, along_the_rod: bool = F
         return _on_locus(solver, special, parameter)
     with solver.system.clock.scope("locus"), kept(solver.system):
         adjoint = adjoint_of(special)
-        splitting = _splitting(adjoint, parameter, special)
+        splitting = adjoint.splitting(parameter)
         along = adjoint.density(parameter, PIECES) if along_the_rod else ()
-        found = Derivative(float(np.trace(splitting)) / len(splitting), splitting=splitting)
-    return Derivative(found.value, partial(_bounds, special, parameter, found.value, along), splitting, *along)
+    value = float(np.trace(splitting)) / len(splitting)
+    return Derivative(value, partial(_bounds, special, parameter, value, along), splitting, *along)
 
 
 @dataclass(frozen=True, repr=False)
@@ -131,16 +131,6 @@ def adjoint_of(special: SpecialPoint) -> Adjoint:
 def _states(solver: BranchSolver, special: SpecialPoint, modes: Sequence[PETSc.Vec]) -> SingularSystem:
     """Equations of a special point on a mesh, with ``modes`` near its own there."""
     return SingularSystem(solver, modes, special.multiplicity, fold=special.kind == FOLD)
-
-
-def _splitting(adjoint: Adjoint, parameter: str, special: SpecialPoint) -> np.ndarray:
-    """The same of an adjoint; raises :class:`ConvergenceError` with the place."""
-    scene = special.point.own_solver.system.scene
-    try:
-        return adjoint.splitting(parameter)
-    except ConvergenceError as trouble:
-        place = f"{scene.load} = {special.point.load:.8g}, {parameter} = {adjoint.values[parameter]:.8g}"
-        raise ConvergenceError(f"The {special.kind} at {place} has no derivative: {trouble}.") from None
 
 
 def _bounds(

@@ -288,10 +288,8 @@ class SpecialPoint:
     def derivative(self, parameter: str, *, along_the_rod: bool = False) -> Derivative:
         """Derivative of its load in a ``parameter``: how much stiffer, how much later it buckles; collective.
 
-        Of a fold, a branch point, a flutter or a divergence load; ``.value``, and ``.error``, which is computed when it
-        is asked for.  ``along_the_rod`` its ``.density`` is known, too, at folds and branch points: how the load
-        changes with a parameter that varies, a derivative per length of rod.  Raises
-        :class:`~rodfem.errors.InputError` for a parameter or a kind of special point that make no sense, and
+        ``.value``, and ``.error``, which is computed when it is asked for; ``along_the_rod`` at folds and branch points
+        a ``.density``, of a parameter that varies.  Raises :class:`~rodfem.errors.InputError` for what has none, and
         :class:`~rodfem.errors.ConvergenceError` where the parameter takes the special point apart.
         """
         from rodfem.codim2.sensitivity import derivative
