@@ -122,6 +122,14 @@ def test_an_eigenvalue_that_touches_zero_has_one_index() -> None:
         assert {index for x in found for index in (x.before, x.after, x.rest)} <= {0}
 
 
+def test_a_piece_that_ends_beside_a_touch_is_not_divided() -> None:
+    """``(1.02 - t)^2`` up to t = 1, and what the cubic is off at most, which is nothing at its ends."""
+    a, b = (Node(t, np.array([[(1.02 - t) ** 2]]), np.array([[2 * (t - 1.02)]]), 0) for t in (0.0, 1.0))
+    asked = list[float]()
+    assert Zeros(lambda a, b, s: asked.append(s), 1e-12).between(a, b, np.array([[0.05]])) == []
+    assert not asked
+
+
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize("other", [1.0, -0.1])
 def test_a_pair_that_the_cubic_does_not_have(known: bool, other: float) -> None:

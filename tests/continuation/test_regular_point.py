@@ -83,6 +83,18 @@ def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
     assert np.median(seen) < 1.5
 
 
+def test_a_mode_next_to_a_pitchfork_is_found_by_one_factorisation() -> None:
+    """The bent cord: its eigenvalue, 1e-4 of bending, rises with the square of the distance from the branch point."""
+    follower, branches = demo("cord", "reduced")
+    points = next(b for b in branches if b.name == "branch 1").points[1:3]
+    values = []
+    for point in points:
+        follower.regular.restart()
+        values.append(follower.regular.at(point.x).index.nearest)
+    assert max(values) < 1e-3 * follower.inertia.scale
+    assert values[1] / values[0] == pytest.approx((points[1].arclength / points[0].arclength) ** 2, rel=0.05)
+
+
 @pytest.mark.ranks
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
