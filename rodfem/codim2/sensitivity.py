@@ -14,18 +14,21 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
-from rodfem.codim2.adjoint import Adjoint, state_derivative
+from rodfem.codim2.adjoint import DIFFERENCES, Adjoint, state_derivative
 from rodfem.codim2.criteria import Plane, kept
 from rodfem.codim2.follow import Curve, RicherMesh, check_special
+from rodfem.codim2.neighbours import Neighbours
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FOLD
+from rodfem.continuation.normal_form import Origin, normal_form_of
 from rodfem.continuation.singular import SingularSystem
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.shape import halved
+from rodfem.fem.state import line
 from rodfem.output.words import number
 from rodfem.problem.functions import derived
-from rodfem.tolerances import TINY, unit
+from rodfem.tolerances import TINY, round_off, unit
 
 PIECES = 4
 """Pieces of each element on which a density is known."""
@@ -187,6 +190,34 @@ def _on_locus(solver: BranchSolver, special: SpecialPoint, parameter: str) -> De
             return bound(value, float(dp[0] / dp[1]), ROUNDED * abs(value), richer.rho), float("nan")
 
     return Derivative(value, bounds)
+
+
+# --- of a normal form
+
+
+def coefficient_derivative(special: SpecialPoint, parameter: str) -> Derivative:
+    """Derivative of the coefficient of a normal form: differences of the fourth order, of forms at points found again.
+
+    Raises :class:`InputError` for a point without one, :class:`ConvergenceError` for one that becomes of another kind.
+    """
+    solver, law = special.point.own_solver, special.law
+    scene, near, value = solver.system.scene, Neighbours([special]), 0.0
+    scene.check_constant(parameter)
+    if law is None:
+        raise InputError("This special point has no normal form: give a branch point from which a branch was followed.")
+    known, error = scene.parameters[parameter].value, 0.0
+    size = 10.0 * (abs(known) or 1.0)  # differences of a hundredth
+    for place, weight in DIFFERENCES:
+        (found,) = near.at({parameter: known + place * size})
+        with kept(solver.system):
+            solver.system.line = line(scene, {**found.values, scene.load: 0.0}, {scene.load: 1.0})
+            ordinate, way = solver.shape.ordinate(found.x), found.null[0]
+            left = special.located_to, round_off(ordinate, solver.units.ordinate)
+            form = normal_form_of(solver, Origin(found.x, found.load, ordinate, *left), way / solver.system.norm(way))
+        if form is None or (form.power, form.of) != (law.power, law.of):
+            raise ConvergenceError(f"The normal form becomes another one near {parameter} = {known:g}.")
+        value, error = value + weight / size * form.coefficient, error + abs(weight) / size * form.uncertainty
+    return Derivative(value, lambda: (error, float("nan")))
 
 
 # --- of a state

@@ -296,6 +296,12 @@ class SpecialPoint:
 
         return derivative(self, parameter, along_the_rod=along_the_rod)
 
+    def coefficient_derivative(self, parameter: str) -> Derivative:
+        """The same of the coefficient of its :attr:`law`: how much more, or less, a bent rod carries."""
+        from rodfem.codim2.sensitivity import coefficient_derivative
+
+        return coefficient_derivative(self, parameter)
+
     def tolerance(self, deviations: Mapping[str, float]) -> Tolerance:
         """Standard deviation of its load by those of constants, ``{"A": 0.02}``, to first order; and the mesh's error.
 

@@ -92,6 +92,25 @@ def test_deviations_of_a_load() -> None:
         buckling.tolerance({"A": -0.1})
 
 
+def test_of_the_coefficient_of_a_pitchfork() -> None:
+    """P = B pi^2/4 (1 + a^2/8), a = pi x/2 of the tip: pi^4/128 B x^2 (Timoshenko & Gere, section 2.7)."""
+    elastica = Scene(
+        name="elastica",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (c.B, 1.0, 1.0)),
+        parameters={"P": 1.0, "B": 1.5},
+        load="P",
+        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[1]),
+        span=(1.0, 5.0),
+        planar="e1",
+    )
+    buckling = rodfem.trace(elastica, depth=1).special("branch point")[0]
+    found = buckling.coefficient_derivative("B")
+    assert abs(found.value - pi**4 / 128) <= found.error < 1e-4
+
+
 def test_loads_of_a_double_point_split() -> None:
     """The column of one stiffness in two planes: pi^2 for B, and nothing for A, in some basis of the null vectors."""
     diagram = rodfem.trace(round_column(), plan=PLAN)
