@@ -354,7 +354,7 @@ TABLE = {
     },
     "rodfem/diagram/special_search.py": {
         "folds-have-no-other-side": (
-            "            self._missed(piece, at, fold=found)\n", "            pass\n", "continuation/test_unfolding.py"),
+            "self._missed(piece, at, fold=found)", "pass", "continuation/test_unfolding.py"),
         "what-turns-back-near-zero-is-passed": (
             "            self._missed(piece, of_miss(piece, p))", "            pass", "continuation/test_unfolding.py"),
         "steps-are-short-from-where-a-branch-goes-back-to": (
