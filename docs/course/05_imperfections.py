@@ -90,11 +90,10 @@ print(f"P = P1 (1 + {curvature:.9f} a^2) {tilt:+.6f} eps/a")
 #
 # rodfem computes the same numbers at every branch point (`law`: here in the tip's displacement $x \approx 2a/\pi$).
 # With $\varepsilon$ a parameter of the scene, the imperfect rod is `varying`. From small loads it bends, and never sees
-# a critical load. The other curve has to be entered from above, bent the wrong way; going down the rod snaps at a fold.
+# a critical load. rodfem also finds the other curve, on which a rod that is bent the wrong way snaps at a fold as the
+# load falls: near a least eigenvalue it looks for a branch point that an imperfection has taken apart.
 
 # %%
-from dataclasses import replace
-
 import rodfem
 from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free
 from rodfem.forms.energy import bending_and_twist
@@ -112,21 +111,12 @@ column = Scene(
     planar="e2",
 )
 
-
-def bent(s):  # quaternions of a rotation by -1.7 sin(pi s/2)
-    half = -0.85 * np.sin(np.pi * s / 2)
-    return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=1)
-
-
 straight = rodfem.trace(column, plan=Plan(depth=1))
 perfect = straight.special("branch point")[0]
 print(perfect, perfect.law, sep="\n")
-imperfect = column.varying("P", (1.0, 4.0), eps=0.02)
-followed = rodfem.trace(imperfect)
-other = rodfem.trace(replace(imperfect, start=bent, span=(4.0, 1.0), states="the other one"))
-(snap,) = other.special("fold")
-curves = {"perfect": straight, "followed": followed, "the other": other}
-show(equilibria(curves, "thrust $P$", "tip displacement").figure, "05_snap")
+real = rodfem.trace(column.varying("P", (1.0, 4.0), eps=0.02))
+(snap,) = real.special("fold", "detached 1")
+show(equilibria({"perfect": straight, "real": real}, "thrust $P$", "tip displacement").figure, "05_snap")
 
 # %% [markdown]
 # ## Number
@@ -139,7 +129,7 @@ show(equilibria(curves, "thrust $P$", "tip displacement").figure, "05_snap")
 # %%
 answer = perfect.law.coefficient * (2 / np.pi) ** 2 / EULER
 assert abs(answer - 1 / 8) < 1e-6 and abs(curvature - 1 / 8) < 1e-6
-assert followed.special() == [] and abs(snap.point.load - 2.5764720698) < 1e-8
+assert real.special(branch="first branch") == [] and abs(snap.point.load - 2.5764720698) < 1e-8
 print(f"curvature {answer:.9f} (1/8); fold at {snap.point.load:.10f}, by Koiter {near(-at_fold(0.02), 0.02):.4f}")
 
 # %% [markdown]
