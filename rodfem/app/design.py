@@ -18,7 +18,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from rodfem.codim2.neighbours import Neighbours, gradient, losses
+from rodfem.codim2.neighbours import Neighbours, losses
 from rodfem.diagram.diagram import MESH, PLAN, Diagram, trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import SCENE
@@ -178,12 +178,7 @@ class _Search:
 
     def _loads(self, near: Neighbours, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Critical loads (k,) in order, and their derivatives (k, n)."""
-
-        def make() -> tuple[np.ndarray, np.ndarray]:
-            found = sorted(near.at(dict(zip(self.names, numbers.tolist(), strict=True))), key=lambda each: each.load)
-            return np.array([x.load for x in found]), np.array([gradient(x, self.names) for x in found])
-
-        return derived(near, numbers.tobytes(), make)
+        return derived(near, numbers.tobytes(), lambda: near.loads(self.names, numbers))
 
     def _least(self, near: Neighbours, size: float, z: np.ndarray) -> tuple[float, np.ndarray]:
         """What is made least, and its derivatives: minus the bound ``t``, or minus a person's function of the loads."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from rodfem.codim2.adjoint import state_derivative
 from rodfem.codim2.criteria import kept
-from rodfem.codim2.neighbours import Neighbours, Values, gradient, in_parts, losses
+from rodfem.codim2.neighbours import Neighbours, Values, in_parts, losses
 from rodfem.continuation.branch import Point
 from rodfem.diagram.diagram import MESH, trace
 from rodfem.diagram.plan import Plan
@@ -39,7 +39,7 @@ CRITICAL, ORDINATE, SHAPE = "critical loads", "ordinate", "shape"
 WIDTHS = {CRITICAL: 1, ORDINATE: 2, SHAPE: 5}
 """Numbers in a row of each."""
 BLIND = 1e-9
-"""Least singular value of the Jacobian, of columns of size one, over the largest: less is not determined."""
+"""Least singular value of the Jacobian in sizes of the first guess, over the largest: less is not determined."""
 Rows = tuple[np.ndarray, np.ndarray]
 
 
@@ -95,15 +95,17 @@ def _fitted(model: _Model, weights: np.ndarray, *, known: bool) -> Identified:
     from scipy.optimize import least_squares
 
     rod, chosen, exact = model.scene, model.chosen, float(np.finfo(float).eps) ** 0.8
+    guess = np.array([rod.parameters[n].value for n in chosen])
+    size = np.where(guess, abs(guess), 1.0)
     answer = least_squares(
         lambda p: model.at(p)[0] / weights,
-        [rod.parameters[n].value for n in chosen],
+        guess,
         lambda p: model.at(p)[1] / weights[:, None],
         bounds=tuple(np.transpose([rod.parameters[n].admissible for n in chosen])),
-        x_scale="jac",
+        x_scale=size,
         **dict.fromkeys(("xtol", "ftol", "gtol"), exact),
     )
-    covariance, free = _covariance(answer.jac, chosen), len(weights) - len(chosen)
+    covariance, free = _covariance(answer.jac, size, chosen), len(weights) - len(chosen)
     if not known:
         covariance = covariance * (2 * answer.cost / free if free else np.nan)
     found = dict(zip(chosen, answer.x.tolist(), strict=True))
@@ -130,15 +132,13 @@ def _tables(data: Mapping[str, Any], deviations: Mapping[str, float] | None) -> 
     return out
 
 
-def _covariance(J: np.ndarray, chosen: Sequence[str]) -> np.ndarray:
+def _covariance(J: np.ndarray, size: np.ndarray, chosen: Sequence[str]) -> np.ndarray:
     """``(J^t J)^-1``; raises :class:`ConvergenceError` for unknowns that the data do not determine."""
-    size = np.linalg.norm(J, axis=0)
-    _, s, rows = np.linalg.svd(J / np.where(size, size, 1.0), full_matrices=True)
+    _, s, rows = np.linalg.svd(J * size, full_matrices=True)
     if len(s) < len(chosen) or s[-1] <= BLIND * s[0]:
         name = chosen[int(abs(rows[-1]).argmax())]
         raise ConvergenceError(f"The data do not determine {name}: give more of them, or fewer unknowns.")
-    inverse = np.linalg.inv((J / size).T @ (J / size))
-    return np.asarray(inverse / np.outer(size, size))
+    return np.asarray((rows.T / s**2) @ rows * np.outer(size, size))
 
 
 class _Model:
@@ -197,8 +197,8 @@ class _Model:
     def _of(self, kind: str, table: np.ndarray) -> Rows:
         """Residuals of a table, and their derivatives."""
         if self._critical is not None and kind == CRITICAL:
-            found = sorted(self._critical.at({n: self._values[n] for n in self.chosen}), key=lambda each: each.load)
-            return np.array([x.load for x in found]) - table[:, 0], np.array([gradient(x, self.chosen) for x in found])
+            loads, slopes = self._critical.loads(self.chosen, np.array([self._values[n] for n in self.chosen]))
+            return loads - table[:, 0], slopes
         data, solver = table[:, 1 if kind == ORDINATE else 2 :], self.solver.equilibria
         f, J = np.empty(data.shape), np.empty((*data.shape, len(self.chosen)))
         for load, x in self._states.items():

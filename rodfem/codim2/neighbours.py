@@ -63,6 +63,12 @@ class Neighbours:
         self._known, self.values = [(each.x, each.null) for each in found], end
         return found
 
+    def loads(self, names: Sequence[str], numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Critical loads (k,) in order at these ``numbers`` of constants, and their derivatives in them (k, n)."""
+        found = sorted(self.at(dict(zip(names, numbers.tolist(), strict=True))), key=lambda each: each.load)
+        slopes = [[np.trace(x.splitting(name)) / len(x.null) for name in names] for x in found]
+        return np.array([x.load for x in found]), np.array(slopes)
+
     def _solved(self, near: Sequence[Adjoint | tuple[PETSc.Vec, list[PETSc.Vec]]], values: Values) -> list[Adjoint]:
         """The special points from those ``near`` them."""
         known = [(each.x, each.null) if isinstance(each, Adjoint) else each for each in near]
@@ -88,11 +94,6 @@ class Neighbours:
         """Whether two special points have a null vector in common."""
         v, w = a.null[0], b.null[0]
         return bool(abs((self.system.metric * v).dot(w)) > PARALLEL * self.system.norm(v) * self.system.norm(w))
-
-
-def gradient(found: Adjoint, names: Sequence[str]) -> np.ndarray:
-    """Derivatives of the mean load of a special point in constants."""
-    return np.array([np.trace(found.splitting(name)) / len(found.null) for name in names])
 
 
 def losses(branch: Branch, number: int) -> list[SpecialPoint]:
