@@ -188,7 +188,7 @@ class System:
             compat.destroy_garbage(self.comm)
         state = State(self, local, gathered[len(self._numbered) :], line)
         if values:  # a row is left for its neighbours and met again
-            self._recent = [(values, state), *self._recent[: 3 if self.fields.unknowns <= FEW else 0]]
+            self._recent = [(values, state), *self._recent[: 7 if self.fields.unknowns <= FEW else 0]]
         return state
 
     def change(self, d: PETSc.Vec) -> NodalValues:
