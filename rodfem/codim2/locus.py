@@ -107,24 +107,32 @@ class Locus:
         """Plain lists, numbers and strings for a file; what was not computed is None."""
         columns = {name: self.values[:, i].tolist() for i, name in enumerate(self.names)}
         columns |= {name: plain(getattr(self, name)) for name in COLUMNS}
-        scene, own = self.system.scene, [self.system.scene.parameters[name] for name in self.names]
         return {
             "format": LOCUS.mark(),
-            "scene": scene.name,
-            "title": scene.title or scene.name,
-            "ordinate_name": scene.ordinate.name,
-            "natural": scene.units.ordinate,
-            "planar": bool(scene.planar),
-            "constants": {name: p.value for name, p in scene.parameters.items() if name not in self.names},
-            "discretization": mesh_of(self.system),
-            "labels": [p.label or name for name, p in zip(self.names, own, strict=True)],
-            "words": [p.words for p in own],
-            "units": [p.unit for p in own],
+            **self._of_scene(),
             **{name: getattr(self, name) for name in AS_THEY_ARE},
             "parameters": list(self.names),
             "columns": columns,
             "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
             "marks": [{"kind": m.kind, "row": m.row} for m in self.marks],
+        }
+
+    def _of_scene(self) -> dict[str, Any]:
+        """What a file says of the scene."""
+        scene = self.system.scene
+        constants = {name: p.value for name, p in scene.parameters.items() if name not in self.names}
+        own = [scene.parameters[name] for name in self.names]
+        return {
+            "scene": scene.name,
+            "title": scene.title or scene.name,
+            "ordinate_name": scene.ordinate.name,
+            "natural": scene.units.ordinate,
+            "planar": bool(scene.planar),
+            "constants": constants,
+            "discretization": mesh_of(self.system),
+            "labels": [p.label or name for name, p in zip(self.names, own, strict=True)],
+            "words": [p.words for p in own],
+            "units": [p.unit for p in own],
         }
 
     def save(self, path: Path) -> None:
