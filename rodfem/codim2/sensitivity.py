@@ -43,7 +43,7 @@ class Derivative:
     rates as eigenvalues.  Along the rod ``density`` (m,) has its means on pieces of the rod from ``ends`` (m,) to
     ``ends`` (m + 1,), a derivative per length, with a bound of the largest error, ``density_error``: ``density @
     diff(ends)`` is the value, if nothing at a point depends on the parameter.  Errors are computed when they are first
-    asked for, by a second mesh.
+    asked for, by a second mesh; collective.
     """
 
     value: float
@@ -67,7 +67,8 @@ class Derivative:
         return self._errors[1]
 
     def __repr__(self) -> str:
-        return f"<Derivative: {number(self.value, self.error)}>"
+        known = "_errors" in vars(self)  # one rank may print
+        return f"<Derivative: {number(self.value, self.error) if known else format(self.value, '.10g')}>"
 
 
 def derivative(special: SpecialPoint, parameter: str, *, along_the_rod: bool = False) -> Derivative:
