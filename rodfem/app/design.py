@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, pairwise
+from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 
@@ -161,18 +162,20 @@ class _Search:
         room = share * np.maximum(abs(self.numbers), abs(self.numbers).mean())
         low, high = (np.clip(self.numbers + side * room, *self.limits.T) for side in (-1, 1))
         held, k = partial(self._held, near, size), len(begin) * extra
-        answer = minimize(
-            partial(self._least, near, size),
-            np.append(self.numbers, [begin.min() / size] * extra),
-            jac=True,
-            method="SLSQP",
-            bounds=[*zip(low, high, strict=True), *[(None, None)] * extra],
-            constraints=[
-                {"type": kind, "fun": lambda z, of=of: held(z)[0][of], "jac": lambda z, of=of: held(z)[1][of]}
-                for kind, of in (("ineq", slice(k)), ("eq", slice(k, None)))
-            ],
-            options={"maxiter": 200, "ftol": SAME**1.5},
-        )
+        with catch_warnings():
+            filterwarnings("ignore", "Values in x were outside bounds")  # by round-off: scipy takes the bounds
+            answer = minimize(
+                partial(self._least, near, size),
+                np.append(self.numbers, [begin.min() / size] * extra),
+                jac=True,
+                method="SLSQP",
+                bounds=[*zip(low, high, strict=True), *[(None, None)] * extra],
+                constraints=[
+                    {"type": kind, "fun": lambda z, of=of: held(z)[0][of], "jac": lambda z, of=of: held(z)[1][of]}
+                    for kind, of in (("ineq", slice(k)), ("eq", slice(k, None)))
+                ],
+                options={"maxiter": 200, "ftol": SAME**1.5},
+            )
         self.numbers, self.reached, self.message = answer.x[:n], bool(answer.success), str(answer.message)
         return self.aim(self._loads(near, self.numbers)[0])
 
