@@ -16,7 +16,7 @@ import numpy as np
 import rodfem
 from rodfem import Attachment, Discretization, Ordinate, Parameter, Plan, Scene, StepControl, clamped, free, pinned
 from rodfem.continuation.arc import Piece
-from rodfem.continuation.crossings import at
+from rodfem.continuation.crossings import cubic_value
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.reduced_stiffness import Condensation
 
@@ -80,7 +80,9 @@ def draw(axes: Any, scene: Scene, title: str, ends: tuple[float, float] | None) 
     p, q = piece.node(a.x, a.tangent), piece.node(b.x, b.tangent)
     axes.axhline(0.0, color="0.7", lw=1)
     t = np.linspace(0.0, 1.0, 101)
-    axes.plot(t, [np.linalg.eigvalsh(at(p, q, x))[:2] / solver.inertia.scale for x in t], color="#0072B2", lw=2)
+    axes.plot(
+        t, [np.linalg.eigvalsh(cubic_value(p, q, x))[:2] / solver.inertia.scale for x in t], color="#0072B2", lw=2
+    )
     for x in np.linspace(0.0, 1.0, 9):
         node = p if x == 0 else q if x == 1 else piece.solve(p, q, p.s + x * (q.s - p.s))
         assert node is not None

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, endings
-from rodfem.output.plot_diagram import ENDS, between
+from rodfem.output.plot_diagram import ENDS, dense_rows
 from rodfem.output.plot_frequencies import draw_into
 from rodfem.output.style import END, HALO, PALETTE, axis_label
 
@@ -45,7 +45,7 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
         load, ordinate = (np.array(branch["columns"][x]) for x in ("load", "ordinate"))
         for rows, index, in_space in pieces(branch):
             style = ":" if index else "--" if in_space else "-"
-            curve = smooth(np.column_stack([load, ordinate]), rows, between(branch, "ordinate"))
+            curve = smooth(np.column_stack([load, ordinate]), rows, dense_rows(branch, "ordinate"))
             for sign in signs if np.ptp(ordinate) else (1,):
                 axes.plot(curve[:, 0], sign * curve[:, 1], style, color=colour, linewidth=width)
             text = f"{index} ({in_space})" if in_space != index else f"{index}"

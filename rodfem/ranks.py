@@ -90,7 +90,7 @@ def as_failure(comm: MPI.Comm) -> Iterator[None]:
 
 
 @contextmanager
-def without(what: str, comm: MPI.Comm, warn: Callable[[str], None]) -> Iterator[None]:
+def guard(what: str, comm: MPI.Comm, warn: Callable[[str], None]) -> Iterator[None]:
     """Go on where the block fails, on all ranks of ``comm``, and ``warn`` of ``what`` did not happen and why."""
     try:
         with as_failure(comm):

@@ -56,7 +56,7 @@ def unit_mode(system: System, x: PETSc.Vec) -> PETSc.Vec:
     """Left-most mode of the state ``x`` as a vector of the system, of norm 1."""
     coordinates = Coordinates(system)
     pencil, rows = coordinates.assemble(x), coordinates.blocks.rows
-    found = ReducedPencil(pencil).near(2, -100.0)
+    found = ReducedPencil(pencil).nearest(2, -100.0)
     lowest = found.vectors[:, abs(found.values - found.values[0]) < 1e-6 * abs(found.values[0])]
     every: Any = pencil.T @ lowest
     # of a line or a plane of modes the one that a fixed functional likes best: the same on fine and on coarse meshes

@@ -127,7 +127,7 @@ class OrdinateBound:
 
 
 @dataclass(frozen=True)
-class Again(Origin):
+class RicherPoint(Origin):
     """A point computed again on a richer mesh, and what is left open; ``rho`` is the part of the errors left there."""
 
     ordinate_error: float
@@ -159,8 +159,8 @@ class Enriched:
         self.coarse, self.system = solver, richer_system(solver.system)
         self.solver = BranchSolver(self.system)
         self.transfer = partial(transferred, solver.shape, self.system)
-        self.origins: list[tuple[SpecialPoint, Again]] = []
-        self._at_loads: dict[tuple[int, float], tuple[Point, Again]] = {}
+        self.origins: list[tuple[SpecialPoint, RicherPoint]] = []
+        self._at_loads: dict[tuple[int, float], tuple[Point, RicherPoint]] = {}
         self.of_ordinate = OrdinateBound(solver.shape, self.solver.shape)
         self._coarse, self.indicator = SmoothnessIndicator(solver), SmoothnessIndicator(self.solver)
 
@@ -183,7 +183,7 @@ class Enriched:
             if special.event is not None:
                 again = self._at_event(point, special.event)
             else:
-                again = self.again(point, fixed_load=True) if at_a_load else self._located(special)
+                again = self.solve(point, fixed_load=True) if at_a_load else self._located(special)
         except ConvergenceError as trouble:
             special.error_estimate = special.ordinate_error = float("inf")
             special.resolved = False
@@ -194,16 +194,16 @@ class Enriched:
         special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
         special.bounds = cache(partial(derived, (self.coarse, self.solver), (point.x, again.x, again.last), again.rho))
 
-    def again(self, point: Point, *, fixed_load: bool) -> Again:
+    def solve(self, point: Point, *, fixed_load: bool) -> RicherPoint:
         """Solve for a point on the richer mesh, at its load, once, or across its tangent; or ConvergenceError."""
         if not fixed_load:
-            return self._again(point, fixed_load=False)
+            return self._solve(point, fixed_load=False)
         key = id(point), self.system.damping
         if key not in self._at_loads:
-            self._at_loads[key] = point, self._again(point, fixed_load=True)
+            self._at_loads[key] = point, self._solve(point, fixed_load=True)
         return self._at_loads[key][1]
 
-    def _again(self, point: Point, *, fixed_load: bool) -> Again:
+    def _solve(self, point: Point, *, fixed_load: bool) -> RicherPoint:
         system, x = self.system, self.transfer(point.x, state=True)
         first = x.copy()
         row = self.solver.axis
@@ -222,7 +222,7 @@ class Enriched:
         changed = self.indicator.changed(first, x, state=True)
         rho = self.rho([point.x], [x])
         ordinate_error = self.of_ordinate(point.x, x, float(left[1]), rho)
-        return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed, x - before)
+        return RicherPoint(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed, x - before)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
         """Set the uncertainty of a law of the first mesh: that of the rod's law, infinite without another."""
@@ -235,7 +235,7 @@ class Enriched:
         if again is not None and alike(again, law):
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
 
-    def _at_event(self, point: Point, event: Event | Level) -> Again:
+    def _at_event(self, point: Point, event: Event | Level) -> RicherPoint:
         """The point of the richer mesh at which an event happens: the nearest one, of several."""
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
         node, along = nearest_event(self.solver, event, x, tangent)
@@ -247,9 +247,9 @@ class Enriched:
         changed = self.indicator.changed(x, found, state=True)
         rho = max(self.rho([point.x], [found]), LEFT)
         ordinate_error = self.of_ordinate(point.x, found, left, rho)
-        return Again(found, load, ordinate, load_left, left, ordinate_error, rho, changed, tangent * along)
+        return RicherPoint(found, load, ordinate, load_left, left, ordinate_error, rho, changed, tangent * along)
 
-    def _located(self, special: SpecialPoint) -> Again:
+    def _located(self, special: SpecialPoint) -> RicherPoint:
         """The fold or branch point on the richer mesh, and its ordinate: the same singular system."""
         solver, point, metric = self.solver, special.point, self.solver.inertia.metric
         x, k = self.transfer(point.x, state=True), special.multiplicity
@@ -270,7 +270,7 @@ class Enriched:
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(modes[0], sharp, state=False))
         ordinate_error = self.of_ordinate(point.x, found.x, left, rho)
-        again = Again(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed, found.last)
+        again = RicherPoint(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed, found.last)
         self.origins.append((special, again))
         return again
 

@@ -260,7 +260,7 @@ class AccuracyControl:
         richer, solver = self.meshes.richer(point.mesh), self.meshes.solvers[point.mesh]
         richer.solver.damp(solver.system.damping > 0)
         try:
-            again = richer.again(point, fixed_load=self._at_bound(point))
+            again = richer.solve(point, fixed_load=self._at_bound(point))
         except ConvergenceError:
             return inf
         negative = _index(point, richer, again.x)
@@ -277,7 +277,7 @@ def _index(point: Point, richer: Enriched, x: PETSc.Vec) -> int:
     inertia = richer.solver.inertia
     found = inertia.at(x)
     drifts = found.drifts
-    below = found.below(-inertia.tolerance)
+    below = found.eigenvalue_count(-inertia.tolerance)
     if below < point.negative:
         index = found.count()
         return point.negative if point.negative <= index.negative + max(index.zero - drifts, 0) else index.negative

@@ -27,7 +27,7 @@ from math import inf, isfinite
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import Again, Enriched
+from rodfem.adaptivity.error_estimate import Enriched, RicherPoint
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
@@ -36,7 +36,7 @@ from rodfem.continuation.kinds import FOLD, NUMBER
 from rodfem.continuation.observer import Remark
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.linalg.orthogonal import across
+from rodfem.linalg.orthogonal import complement
 from rodfem.stability.inertia import NULL, ROUGH, Factored
 from rodfem.stability.motion_names import names_for
 from rodfem.stability.near_zero import SPARE, NearZero, decide, near_zero, quotients, soft_limit
@@ -79,8 +79,8 @@ class SoftStates:
         least = self._differing(point, fixed_load) if compare and self._richer else 0
         if clear and not least:
             return False
-        near, branch = self._near(point, least, family)
-        modes, others = self._modes(point, near), _across(metric, near.vectors, vanishing)
+        near, branch = self._small_eigenvalues(point, least, family)
+        modes, others = self._modes(point, near), _rank(metric, near.vectors, vanishing)
         for i in set(range(len(modes))).difference(others):
             modes[i] = replace(modes[i], uncertainty=max(abs(modes[i].value), modes[i].uncertainty))
         if others and self._richer:
@@ -91,12 +91,12 @@ class SoftStates:
         self._record(point, near, modes)
         return bool(point.soft)
 
-    def _near(self, point: Point, least: int, family: bool) -> tuple[NearZero, list[PETSc.Vec]]:
+    def _small_eigenvalues(self, point: Point, least: int, family: bool) -> tuple[NearZero, list[PETSc.Vec]]:
         """Eigenvalues near zero, but for that of a ``family`` itself, and its tangent."""
         near = near_zero(self.solver.inertia.at(point.x), least=least)
         if not family or point.tangent is None:
             return near, []
-        kept = _across(self.solver.system.metric, near.vectors, [point.tangent])
+        kept = _rank(self.solver.system.metric, near.vectors, [point.tangent])
         return near.at(kept, near.rest + len(near.vectors) - len(kept)), [point.tangent]
 
     def _modes(self, point: Point, near: NearZero) -> list[SoftMode]:
@@ -129,10 +129,10 @@ class SoftStates:
         with self.solver.system.clock.scope("error bars"):
             richer = self._companion(0)
             try:
-                there, again = _on(richer, point, fixed_load)
+                there, again = _counterpart(richer, point, fixed_load)
                 inertia = richer.solver.inertia
                 found = inertia.at(there.x)
-                below = found.below(-inertia.tolerance)
+                below = found.eigenvalue_count(-inertia.tolerance)
                 if below == point.negative:
                     self.uncompared = "" if again.resolved else again.unlike(point.load)
                     return int(self._moved(point, found) if again.resolved else not fixed_load)
@@ -162,7 +162,7 @@ class SoftStates:
         for level in range(2):  # meshes beyond that of the state
             richer = self._companion(level)
             try:
-                point, again = _on(richer, point, fixed_load, soft=soft)
+                point, again = _counterpart(richer, point, fixed_load, soft=soft)
                 zeros = [v / richer.system.norm(v) for v in map(partial(richer.transfer, state=False), zeros)]
                 finer, rounding = _nearest(richer.solver, point, len(modes), zeros)
             except ConvergenceError:
@@ -190,12 +190,12 @@ class SoftStates:
         return self._companions[level]
 
 
-def _across(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], others: Sequence[PETSc.Vec]) -> list[int]:
+def _rank(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], others: Sequence[PETSc.Vec]) -> list[int]:
     """Numbers of the vectors that are no combination of others."""
-    return [i for i, v in enumerate(vectors) if across(metric, [v], others)]
+    return [i for i, v in enumerate(vectors) if complement(metric, [v], others)]
 
 
-def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
+def _counterpart(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, RicherPoint]:
     """Point on a richer mesh, and what was found when it was computed there; or ConvergenceError."""
     system = richer.system
     given = system.damping
@@ -203,10 +203,10 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
     try:
         try:
             system.damping = first
-            again = richer.again(point, fixed_load=fixed_load)
+            again = richer.solve(point, fixed_load=fixed_load)
         except ConvergenceError:
             system.damping = second
-            again = richer.again(point, fixed_load=fixed_load)
+            again = richer.solve(point, fixed_load=fixed_load)
     finally:
         system.damping = given
     if soft and not again.resolved:
@@ -223,7 +223,7 @@ def _nearest(
     found.count()
     with solver.inertia.afresh():
         nearest = found.nearest(len(zeros) + number + SPARE, NULL)[1]
-    vectors = [v for v in nearest if across(solver.system.metric, [v], zeros)][:number]
+    vectors = [v for v in nearest if complement(solver.system.metric, [v], zeros)][:number]
     q = quotients(found, vectors, TOLERANCE * solver.inertia.scale)
     row = solver.axis if point.tangent is None else solver.row(point.tangent)
     settled = solver.inertia.at(stepped(solver, point.x, row))
@@ -259,11 +259,11 @@ class SoftRows:
 
     def _examine_given(self, branch: Branch, family: bool) -> bool:
         """The same at loads asked for, at ends and events; whether one is undecided, or not on the richer mesh."""
-        given = _given(branch)
+        given = _requests(branch)
         counted = {id(s.point): s.point.negative for s in given}
         for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
             states = self._of(s.point.mesh)
-            states.examine(s.point, fixed_load=s.kind.given, compare=self.error_bars, family=family)
+            states.examine(s.point, fixed_load=s.kind.request, compare=self.error_bars, family=family)
             if states.uncompared and isfinite(s.error_estimate) and s.resolved:  # else the special point says so
                 self._uncompared.setdefault(branch.name, (s.point.load, states.uncompared))
         for s in given:
@@ -311,10 +311,10 @@ class SoftRows:
         return f"{where} the index is {words} ({worst}): {remedy}."
 
 
-def _given(branch: Branch) -> list[SpecialPoint]:
+def _requests(branch: Branch) -> list[SpecialPoint]:
     """Loads asked for, ends and events of a ``branch``, but for those at special points."""
     singular = {id(s.point) for s in branch.special if s.kind.counted or s.test_function == "stretch"}
-    return [s for s in branch.special if (s.kind.given or s.kind.test == NUMBER) and id(s.point) not in singular]
+    return [s for s in branch.special if (s.kind.request or s.kind.test == NUMBER) and id(s.point) not in singular]
 
 
 def _is_doubtful(branch: Branch, given: Sequence[SpecialPoint]) -> bool:

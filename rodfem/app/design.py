@@ -95,7 +95,7 @@ def design(
     for _ in range(ROUNDS):
         points = losses(trace(search.rod, mesh, replace(plan, error_bars=False))[0], LOADS)
         if not points:
-            low, high = plan.over(scene)
+            low, high = plan.load_range(scene)
             raise InputError(f"The first branch loses no stability from {low:g} to {high:g}: give a wider range.")
         if search.aim(np.array([special.point.load for special in points])) >= reached - SAME * abs(reached) > -np.inf:
             break

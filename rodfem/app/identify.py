@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rodfem.codim2.adjoint import state_derivative
-from rodfem.codim2.criteria import kept
+from rodfem.codim2.criteria import restoration
 from rodfem.codim2.neighbours import Neighbours, Values, in_parts, losses
 from rodfem.continuation.branch import Point
 from rodfem.diagram.diagram import MESH, trace
@@ -178,7 +178,7 @@ class _Model:
 
     def _rows(self, values: Values) -> Rows:
         own, equilibria = {**self._values, **values}, self.solver.equilibria
-        with kept(equilibria.system):
+        with restoration(equilibria.system):
             self._states = in_parts(self._moved, self._states, (self._values, own))
             self._values = own
             parts = [self._of(kind, table) for kind, table in self.tables.items()]

@@ -111,7 +111,7 @@ def many_main(words: Sequence[str]) -> None:
         _trace(given, rows, [_asked(row, statement, options, f"{given.table}, rod {i}") for i, row in enumerate(rows)])
 
 
-def _named(options: Parser) -> dict[str, argparse.Action]:
+def _column_options(options: Parser) -> dict[str, argparse.Action]:
     """Options by the names that a column may have."""
     found = {action.dest: action for action in options._actions if action.dest not in ("help", "output")}
     return found | {x.option_strings[0][2:]: x for x in found.values()} | {"steps": found["largest"]}
@@ -123,7 +123,7 @@ def _rows(table: Path, options: Parser) -> list[dict[str, str]]:
         rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
     except (OSError, ValueError) as trouble:
         raise InputError(f"{table} cannot be read ({trouble}): give a table of text.") from trouble
-    if unknown := [name for name in (rows or [{"": ""}])[0] if name not in _named(options)]:
+    if unknown := [name for name in (rows or [{"": ""}])[0] if name not in _column_options(options)]:
         what = f"has a column {unknown[0]!r}" if rows else "has no line of a rod"
         raise InputError(f"{table} {what}: {COLUMNS}; {options.prog} --help lists them.")
     return rows
@@ -133,7 +133,7 @@ def _asked(row: Mapping[str, str], statement: Statement, options: Parser, where:
     """Scene, mesh and plan of a line, of which an empty cell is the default; raises :class:`InputError` with it."""
     words = list[str]()
     for name, cell in row.items():
-        action, values = _named(options)[name], (cell or "").split()
+        action, values = _column_options(options)[name], (cell or "").split()
         if isinstance(action, argparse.BooleanOptionalAction) and cell.lower() in ("true", "false"):
             words.append(action.option_strings[cell.lower() == "false"])
         elif values:

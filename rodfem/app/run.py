@@ -132,7 +132,7 @@ class Terminal(Report):
         on_first(self.comm, lambda: save_json(self.data | {"files": self.files}, self.output / "diagram.json"))
 
     @contextmanager
-    def _without(self, diagram: Diagram, branch: Branch, special: SpecialPoint) -> Iterator[None]:
+    def _guard(self, diagram: Diagram, branch: Branch, special: SpecialPoint) -> Iterator[None]:
         """Go on where the block fails, and keep a warning of the special point with the diagram."""
         try:
             yield
@@ -174,7 +174,7 @@ class Terminal(Report):
         bar = self.plan.error_bars or self.plan.accuracy is not None
         for branch in diagram:
             for special, name in product(_to_follow(branch), sorted(asked)):
-                with self._without(diagram, branch, special):
+                with self._guard(diagram, branch, special):
                     found = special.derivative(name)
                     special.derivatives[name] = found.value, found.error if bar else nan
 
@@ -187,7 +187,7 @@ class Terminal(Report):
         saved: list[tuple[str, int]] = []
         for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
             found: tuple[Verdict | None, Modes | None] = None, None
-            with self._without(diagram, branch, special):
+            with self._guard(diagram, branch, special):
                 found = _verdict(finder_on(special.point.mesh), special, plan)
             verdict, modes = found
             if verdict is None:
@@ -195,7 +195,7 @@ class Terminal(Report):
             self.verdict(branch.name, f"{scene.load} = {special.point.load:.10g}", verdict.at(special.point), modes)
             if modes is not None:
                 self._name("modes.h5")
-                keep = partial(save_modes, modes, file, branch.name, special.row, _about(diagram))
+                keep = partial(save_modes, modes, file, branch.name, special.row, _header(diagram))
                 on_first(self.comm, partial(keep, first=not saved, scene=scene))
                 saved.append((branch.name, special.row))
         if saved:
@@ -226,7 +226,7 @@ class Terminal(Report):
                         "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
                     )
                 known = len(near)
-                with self._without(diagram, branch, special):
+                with self._guard(diagram, branch, special):
                     near.append(diagram.locus(special, asked[0], asked[1:]))
                 for found in near[known:]:
                     self.say(found.text())
@@ -255,7 +255,7 @@ def _verdict(finder: ModeFinder, special: SpecialPoint, plan: Plan) -> tuple[Ver
     return finder.assessor(special.point.x, plan.method), None
 
 
-def _about(diagram: Diagram) -> dict[str, Any]:
+def _header(diagram: Diagram) -> dict[str, Any]:
     """What a file of modes says of its scene and its mesh."""
     scene, mesh = diagram.scene, asdict(diagram.solvers[0].system.fields.discretization)
     about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}

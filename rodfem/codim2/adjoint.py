@@ -24,7 +24,7 @@ from collections.abc import Callable
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.criteria import IMPERFECT, kept
+from rodfem.codim2.criteria import IMPERFECT, restoration
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.singular import SHARP, SingularSystem
 from rodfem.errors import ConvergenceError
@@ -153,7 +153,7 @@ def state_derivative(
     system = solver.system
     scene, there, load = system.scene, x.copy(), system.scalar(x)
     at = {**dict(zip(scene.parameters, system.line.origin.tolist(), strict=True)), scene.load: load}
-    with kept(system):
+    with restoration(system):
         system.set_load(there, at[parameter])
         system.line = line(scene, {**at, parameter: 0.0}, {parameter: 1.0})
         tangent = solver.load_tangent(there, increasing=True)

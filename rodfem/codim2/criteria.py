@@ -144,7 +144,7 @@ class Plane:
 
 
 @contextmanager
-def kept(system: System) -> Iterator[None]:
+def restoration(system: System) -> Iterator[None]:
     """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries."""
     verification = system.verification
     before, dropped, notices = (system.line, system.phase), {*verification.dropped}, [*verification.notices]
@@ -165,7 +165,7 @@ def predict(nodes: list[LocusPoint], s: float) -> Prediction:
     return _combined(lagrange(np.array([n.s for n in recent]), s), [n.p for n in recent], [n.x for n in recent])
 
 
-def between(a: LocusPoint, b: LocusPoint, s: float) -> Prediction:
+def interpolant(a: LocusPoint, b: LocusPoint, s: float) -> Prediction:
     """Cubic through two nodes with their tangents at arclength ``s``."""
     return _combined(cubic_weights(b.s - a.s, s - a.s), [a.p, a.dp, b.p, b.dp], [a.x, a.dx, b.x, b.dx])
 

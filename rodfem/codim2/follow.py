@@ -28,10 +28,10 @@ from rodfem.codim2.criteria import (
     Oscillation,
     Plane,
     Singular,
-    between,
-    kept,
+    interpolant,
     null_vectors,
     predict,
+    restoration,
     unstable,
 )
 from rodfem.codim2.locus import Locus, Mark, Row
@@ -93,23 +93,23 @@ class Half:
 
     def _advance(self, recent: list[LocusPoint], step: float) -> float:
         """Add the next node, predicted by ``recent`` ones, and what is before it; how far it is from its prediction."""
-        node, moved, bound = self._next(recent, step)
+        node, moved, bound = self._step(recent, step)
         last = self.steps[-1]
-        self.ended = node.ended or self._lost_convexity(last, node) or self._between(last, node)
+        self.ended = node.ended or self._lost_convexity(last, node) or self._insert(last, node)
         if not self.ended:
             self.nodes.append(node)
             self.ended = bound or self._closed(last, node)
         self.steps.append(node)
         return moved
 
-    def _next(self, recent: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:
+    def _step(self, recent: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:
         """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""
         last = recent[-1]
         guess = predict(recent, last.s + step)
         p, x, dp, dx = guess
         over = self.plane.outside(p)
         if over is None:
-            node = self._after(last, self.criterion.correct(guess, last, 0.5 * step))
+            node = self._place(last, self.criterion.correct(guess, last, 0.5 * step))
             over = self.plane.outside(node.p)
             if over is None:
                 if self._cosine(node, dp, dx) < ALIGNED or node.s - last.s > 2 * step:
@@ -123,7 +123,7 @@ class Half:
         p[which] = bound
         node = self.criterion.correct((p, x, self.plane.axis(which), None), last, max(0.5 * step, REACH))
         node.p[which] = bound
-        node = self._after(last, node if self._cosine(node, dp, dx) >= 0 else node.reversed())
+        node = self._place(last, node if self._cosine(node, dp, dx) >= 0 else node.reversed())
         if self.plane.outside(node.p) is not None or node.s - last.s > 2 * step:
             raise ConvergenceError("it leaves near a corner of the bounds")
         return node, 0.0, self._bound(which, bound)
@@ -138,7 +138,7 @@ class Half:
         while step > 0.1 * GAP:
             try:
                 guess = predict([here], here.s + step)
-                node = self._after(here, self.criterion.correct(guess, here, 0.5 * step))
+                node = self._place(here, self.criterion.correct(guess, here, 0.5 * step))
                 if node.orientation != here.orientation or self._cosine(node, here.dp, here.dx) < ALIGNED:
                     raise ConvergenceError("the curve turns, or another one crosses it")
             except ConvergenceError:
@@ -152,7 +152,7 @@ class Half:
     def _bound(self, which: int, bound: float) -> str:
         return f"{self.plane.names[which]} = {bound:g}, its bound"
 
-    def _after(self, last: LocusPoint, node: LocusPoint) -> LocusPoint:
+    def _place(self, last: LocusPoint, node: LocusPoint) -> LocusPoint:
         node.s = last.s + self.criterion.length(node.p - last.p, node.x - last.x)
         return node
 
@@ -163,9 +163,9 @@ class Half:
         a, b = self.criterion.length(node.dp + dp, node.dx + dx), self.criterion.length(node.dp - dp, node.dx - dx)
         return (a * a - b * b) / 4
 
-    def _between(self, last: LocusPoint, node: LocusPoint) -> str:
+    def _insert(self, last: LocusPoint, node: LocusPoint) -> str:
         """Insert what lies between the last node and the next one; a reason if the curve ends there."""
-        rows, ended = self.points.between(last, node)
+        rows, ended = self.points.rows(last, node)
         for row, kind in rows:
             self.marks[len(self.nodes)] = kind
             self.nodes.append(row)
@@ -182,7 +182,7 @@ class Half:
         size = float(np.linalg.norm(whole))
         if len(self.steps) < 3 or not size or not 0 < part @ whole <= size**2:
             return ""
-        p, x, dp, dx = between(a, b, a.s + (part @ whole) / size**2 * (b.s - a.s))
+        p, x, dp, dx = interpolant(a, b, a.s + (part @ whole) / size**2 * (b.s - a.s))
         near = self.criterion.length(p - start.p, x - start.x) < 0.1 * (b.s - a.s)
         if not near or self._cosine(start, dp, dx) < ALIGNED:
             return ""
@@ -211,7 +211,7 @@ class RicherMesh:
         """Bounds of the errors of both parameters, and whether the mesh resolves the state; or ConvergenceError."""
         near, resolved = self._transferred(node), True
         if node.sought is None:
-            found = self.again(node)
+            found = self.solve(node)
             there, located_to = found.p, found.located_to
             resolved = self._changed(near, found) <= RESOLVED_TO
         else:
@@ -220,7 +220,7 @@ class RicherMesh:
         each = zip(node.p, there, node.located_to + located_to, strict=True)
         return [bound(*pair, self.rho) for pair in each], resolved
 
-    def again(self, node: LocusPoint) -> LocusPoint:
+    def solve(self, node: LocusPoint) -> LocusPoint:
         """The point of the richer mesh across the curve; raises :class:`ConvergenceError`."""
         near = self._transferred(node)
         return self.criterion.correct((node.p, near.x, node.dp, None), near, 0.1)
@@ -255,7 +255,7 @@ def locus(
     is left as it was; ``doubtful``: its mesh leaves the index next to the point open.
     """
     plane = Plane(solver.system, parameter, bounds)
-    with solver.system.clock.scope("locus"), kept(plane.system):
+    with solver.system.clock.scope("locus"), restoration(plane.system):
         curve = Curve(solver, special, plane, doubtful=doubtful or special.resolved is False)
         curve.follow(steps)
         found = curve.locus(*curve.errors(error_bars))
@@ -352,7 +352,7 @@ class Curve:
 
     def rows(self, which: int, value: float) -> list[Row]:
         """Rows at which parameter ``which`` has a ``value``, solved for on the mesh, each once, the start first."""
-        with kept(self.plane.system):
+        with restoration(self.plane.system):
             found = self._crossings(which, value)
         other, sizes = 1 - which, (float(self.plane.sizes[1 - which]), self.solver.units.ordinate)
         places = [(float(n.p[other]), n.ordinate) for n in found]

@@ -14,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.codim2.adjoint import Adjoint
-from rodfem.codim2.criteria import kept
+from rodfem.codim2.criteria import restoration
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.singular import SingularSystem
@@ -58,7 +58,7 @@ class Neighbours:
     def at(self, values: Mapping[str, float]) -> list[Adjoint]:
         """Each special point at these ``values`` of constants; raises :class:`ConvergenceError` if one is lost."""
         end = {**self.values, **values}
-        with kept(self.system):
+        with restoration(self.system):
             found: list[Adjoint] = in_parts(self._solved, self._known, (self.values, end))
         self._known, self.values = [(each.x, each.null) for each in found], end
         return found

@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-from rodfem.codim2.criteria import Criterion, LocusPoint, Plane, Sought, between
+from rodfem.codim2.criteria import Criterion, LocusPoint, Plane, Sought, interpolant
 from rodfem.continuation.branch_solver import lagrange
 from rodfem.continuation.kinds import GAP
 from rodfem.errors import ConvergenceError
@@ -109,7 +109,7 @@ def place(criterion: Criterion, node: LocusPoint, sought: Sought, windows: tuple
 def _in_window(criterion: Criterion, node: LocusPoint, sought: Sought, half: float) -> Place:
     """Where ``sought`` is, by points of a window of this ``half`` width; raises :class:`ConvergenceError`."""
     t = half * PLACES
-    nodes = [_ahead(criterion, node, float(s)) for s in t]
+    nodes = [_tangent_point(criterion, node, float(s)) for s in t]
     tables = [[sought.of(n) for n in nodes], *np.array([n.p for n in nodes]).T]
     f, *through = (Chebyshev.fit(t, values, POINTS - 1, domain=[-half, half]) for values in tables)
     # each coefficient may be wrong by as much as the last two: by |T_k(0)| times that the value, |T_k'(0)| the slope
@@ -128,7 +128,7 @@ def _in_window(criterion: Criterion, node: LocusPoint, sought: Sought, half: flo
     return Place(s, ds, through, nodes, half, np.zeros(2))
 
 
-def _ahead(criterion: Criterion, node: LocusPoint, s: float) -> LocusPoint:
+def _tangent_point(criterion: Criterion, node: LocusPoint, s: float) -> LocusPoint:
     """Point that is at ``s`` on the tangent of ``node``, corrected; ConvergenceError out of the bounds."""
     p = node.p + s * node.dp
     if criterion.plane.outside(p) is not None:
@@ -142,7 +142,7 @@ class Codim2Points:
     def __init__(self, criterion: Criterion) -> None:
         self.criterion, self.plane = criterion, criterion.plane
 
-    def between(self, a: LocusPoint, b: LocusPoint) -> tuple[list[Row], str]:
+    def rows(self, a: LocusPoint, b: LocusPoint) -> tuple[list[Row], str]:
         """Rows between two nodes, and why the curve ends there, or nothing."""
         if _reverses(a, b, NONE * self.plane.width):
             coupling = self.located(a, b, lambda n: float(n.coupling @ a.coupling))
@@ -159,8 +159,8 @@ class Codim2Points:
     def located(self, a: LocusPoint, b: LocusPoint, f: Test) -> LocusPoint | None:
         """Point between two others at which ``f`` vanishes; None where it cannot be located."""
         try:
-            s = zero_between(lambda s: f(self._at(a, b, s)), a.s, b.s, 1e-8)  # an arclength: before it is placed
-            return self._at(a, b, s)
+            s = zero_between(lambda s: f(self._point(a, b, s)), a.s, b.s, 1e-8)  # an arclength: before it is placed
+            return self._point(a, b, s)
         except (ConvergenceError, ValueError):
             return None
 
@@ -183,7 +183,7 @@ class Codim2Points:
         found = list[LocusPoint]()
         for share in np.arange(1, PARTS) / PARTS:
             with suppress(ConvergenceError):
-                found.append(self._at(a, b, a.s + float(share) * (b.s - a.s)))
+                found.append(self._point(a, b, a.s + float(share) * (b.s - a.s)))
         return found
 
     def _cusp(self, p: LocusPoint, q: LocusPoint, a: LocusPoint, b: LocusPoint) -> list[Row]:
@@ -193,7 +193,7 @@ class Codim2Points:
             return []
         if _coupling_vanishes(cusp, a, b, 1e-3):  # the place of a cusp is known to no more
             # no solution locates it: corrections slide along the curve of branch points
-            return [(_within(cusp, p, q), PASSES)]
+            return [(_enclosure(cusp, p, q), PASSES)]
         return [(self._placed(cusp, _reversal(self.plane, p, q)), "cusp")]
 
     def _turns(self, a: LocusPoint, b: LocusPoint, turning: np.ndarray) -> list[Row]:
@@ -209,15 +209,15 @@ class Codim2Points:
 
     # --- where it is -----------------------------------------------------------------------------------------------
 
-    def _at(self, a: LocusPoint, b: LocusPoint, s: float) -> LocusPoint:
+    def _point(self, a: LocusPoint, b: LocusPoint, s: float) -> LocusPoint:
         """Point of the curve between two nodes at an arclength; raises :class:`ConvergenceError`."""
-        return replace(self.criterion.correct(between(a, b, s), a), s=s)
+        return replace(self.criterion.correct(interpolant(a, b, s), a), s=s)
 
     def _placed(self, node: LocusPoint, sought: Sought) -> LocusPoint:
         """The point near ``node`` that is ``sought``, with uncertainties of its place along the curve, too."""
         try:
             found = place(self.criterion, node, sought)
-            better = _ahead(self.criterion, node, found.s)
+            better = _tangent_point(self.criterion, node, found.s)
         except ConvergenceError:
             along = np.maximum(abs(node.dp), UNPLACED * self.plane.width)
             return replace(node, located_to=node.located_to + UNPLACED * along)
@@ -233,7 +233,7 @@ class Codim2Points:
         try:
             found = place(self.criterion, node, sought)
         except ConvergenceError:
-            return _within(node, a, b)
+            return _enclosure(node, a, b)
         end = found.interpolated(node)
         end.ordinate = self.criterion.solver.shape.ordinate(end.x)
         return replace(end, s=node.s + found.s, sought=sought, windows=found.windows)
@@ -246,13 +246,13 @@ class Codim2Points:
     def _end(self, a: LocusPoint, b: LocusPoint, share: float, end: LocusPoint | None) -> tuple[LocusPoint, str]:
         """The last row and words for its place: ``end``, or if that is not in the step, at a ``share`` of it."""
         if end is None or self.criterion.length(end.p - a.p, end.x - a.x) > b.s - a.s:
-            end = _within(self._on_cubic(a, b, a.s + share * (b.s - a.s)), a, b)
+            end = _enclosure(self._on_cubic(a, b, a.s + share * (b.s - a.s)), a, b)
         each = zip(self.plane.names, end.p, end.located_to, strict=True)
         return end, f"near {', '.join(f'{name} = {number(v, error)}' for name, v, error in each)}"
 
     def _on_cubic(self, a: LocusPoint, b: LocusPoint, s: float) -> LocusPoint:
         """Point of the cubic between two nodes, with what the first one has else."""
-        p, x, dp, dx = between(a, b, s)
+        p, x, dp, dx = interpolant(a, b, s)
         size = self.criterion.length(dp, dx)
         return replace(a, p=p, x=x, dp=dp / size, dx=dx / size, s=s, ordinate=self.criterion.solver.shape.ordinate(x))
 
@@ -279,7 +279,7 @@ def _coupled(a: LocusPoint, b: LocusPoint) -> np.ndarray:
     return np.asarray(size > NONE * size.max())
 
 
-def _within(node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
+def _enclosure(node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
     """A point of which no more is known than that it is as close as the farther one of two nodes."""
     return replace(node, located_to=np.maximum(abs(node.p - a.p), abs(node.p - b.p)) + a.located_to)
 

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
 from rodfem.codim2.adjoint import DIFFERENCES, Adjoint, state_derivative
-from rodfem.codim2.criteria import Plane, kept
+from rodfem.codim2.criteria import Plane, restoration
 from rodfem.codim2.follow import Curve, RicherMesh, check_special
 from rodfem.codim2.neighbours import Neighbours
 from rodfem.continuation.branch import Point, SpecialPoint
@@ -84,7 +84,7 @@ def derivative(special: SpecialPoint, parameter: str, *, along_the_rod: bool = F
     check_special(solver, special)
     if not special.kind.singular:
         return _on_locus(solver, special, parameter)
-    with solver.system.clock.scope("locus"), kept(solver.system):
+    with solver.system.clock.scope("locus"), restoration(solver.system):
         adjoint = adjoint_of(special)
         splitting = adjoint.splitting(parameter)
         along = adjoint.density(parameter, PIECES) if along_the_rod else ()
@@ -145,7 +145,7 @@ def _bounds(
     rho = halved(solver.system.fields.discretization.degree)
     with solver.system.clock.scope("error bars"):
         richer = derived(special, "richer", lambda: _richer(special))
-        with kept(richer.system):
+        with restoration(richer.system):
             again = richer.splitting(parameter)
             error = bound(value, float(np.trace(again)) / len(again), ROUNDED * abs(value), rho)
             if not along:
@@ -177,7 +177,7 @@ def _on_locus(solver: BranchSolver, special: SpecialPoint, parameter: str) -> De
     room = min(abs(end - known.value) for end in known.admissible)
     near, own = 0.05 * unit(load, one=solver.units.load), min(0.05 * (abs(known.value) or 1.0), 0.5 * room)
     plane = Plane(solver.system, parameter, ((load - near, load + near), (known.value - own, known.value + own)))
-    with solver.system.clock.scope("locus"), kept(solver.system):
+    with solver.system.clock.scope("locus"), restoration(solver.system):
         curve = Curve(solver, special, plane, doubtful=False)
     node = curve.first
     if node.ended:
@@ -185,9 +185,9 @@ def _on_locus(solver: BranchSolver, special: SpecialPoint, parameter: str) -> De
     value = float(node.dp[0] / node.dp[1])
 
     def bounds() -> tuple[float, float]:
-        with solver.system.clock.scope("error bars"), kept(solver.system):
+        with solver.system.clock.scope("error bars"), restoration(solver.system):
             richer = RicherMesh(curve.criterion, special.kind, node)
-            dp = richer.again(node).dp
+            dp = richer.solve(node).dp
             return bound(value, float(dp[0] / dp[1]), ROUNDED * abs(value), richer.rho), float("nan")
 
     return Derivative(value, bounds)
@@ -210,7 +210,7 @@ def coefficient_derivative(special: SpecialPoint, parameter: str) -> Derivative:
     size = 10.0 * (abs(known) or 1.0)  # differences of a hundredth
     for place, weight in DIFFERENCES:
         (found,) = near.at({parameter: known + place * size})
-        with kept(solver.system):
+        with restoration(solver.system):
             solver.system.line = line(scene, {**found.values, scene.load: 0.0}, {scene.load: 1.0})
             ordinate, way = solver.shape.ordinate(found.x), found.null[0]
             left = special.located_to, round_off(ordinate, solver.units.ordinate)

@@ -24,7 +24,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import ALIGNED, BranchSolver, between, cubic
+from rodfem.continuation.branch_solver import ALIGNED, BranchSolver, cubic, interpolant
 from rodfem.continuation.branch_solver import Knot as Row
 from rodfem.continuation.crossings import Node, clear, places
 from rodfem.continuation.kinds import EVENT, LEVEL, Kind
@@ -70,7 +70,7 @@ class Arc:
 
     def curve(self, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
         """State and direction of the polynomial."""
-        return between(self.a, self.b, s)
+        return interpolant(self.a, self.b, s)
 
     def state(self, s: float) -> PETSc.Vec:
         """The equilibrium; raises :class:`ConvergenceError` where there is none."""
@@ -253,7 +253,7 @@ class Piece(Chord):
         self.moving = np.linalg.svd(still)[0][:, still.shape[1] :]
 
     @property
-    def still(self) -> int:
+    def omissions(self) -> int:
         """Number of amplitudes that were left out."""
         return self.moving.shape[0] - self.moving.shape[1]
 
@@ -425,7 +425,7 @@ class LevelPiece(SoughtPiece):
 
     def node(self, x: PETSc.Vec, tangent: PETSc.Vec, seen: Any = None) -> Node:
         """Node at a state with its unit tangent."""
-        below = self.solver.spectrum.at(x).below(self.event.value / self.solver.units.omega2)
+        below = self.solver.spectrum.at(x).eigenvalue_count(self.event.value / self.solver.units.omega2)
         speed, none = float(self.row.dot(tangent)), np.zeros((0, 0))
         return Node(self.place(x), none, none, below, Knot(x, tangent * (1.0 / speed), speed))
 

@@ -119,7 +119,7 @@ def cubic_weights(h: float, s: float) -> tuple[np.ndarray, np.ndarray]:
     return value, np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
 
 
-def between(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+def interpolant(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """State and direction at ``s`` on the polynomial of least degree through two states and what tangents they have."""
     h = b.arclength - a.arclength
     if a.tangent is not None and b.tangent is not None:
@@ -154,7 +154,7 @@ class RegularPoint:
     index: Index  # by the count of the factors
     tangent: PETSc.Vec  # unit tangent, on the side of increasing load
 
-    def along(self, row: PETSc.Vec) -> PETSc.Vec:
+    def unit_tangent(self, row: PETSc.Vec) -> PETSc.Vec:
         """Unit tangent on the side to which ``row`` points."""
         return self.tangent * (-1.0 if row.dot(self.tangent) < 0 else 1.0)
 
@@ -187,7 +187,7 @@ class RegularPoints:
     def _found_at(self, x: PETSc.Vec) -> RegularPoint | None:
         inertia, found = self.inertia, self.inertia.at(x)
         try:
-            below = found.below(0.0)
+            below = found.eigenvalue_count(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
             return None
         # inverse iteration: one step a point along a branch, three from generic vectors
@@ -330,7 +330,7 @@ class BranchSolver:
                 f"{self.system.scalar(x):g}: choose constants that make it so, or another load."
             )
 
-    def given(self, kind: Kind, point: Point) -> SpecialPoint:
+    def request(self, kind: Kind, point: Point) -> SpecialPoint:
         """Special point at a load that is given: nothing changes there."""
         return SpecialPoint(kind, point, point.negative, point.negative, round_off(point.load, self.units.load))
 
@@ -453,7 +453,7 @@ class BranchSolver:
         if not outcome.converged:
             return Step(x, load, outcome)
         at = self.regular.at(x)
-        tangent, index = (at.along(row), at.index) if at else (self._tangent(row, x), None)
+        tangent, index = (at.unit_tangent(row), at.index) if at else (self._tangent(row, x), None)
         return Step(x, system.scalar(x), outcome, tangent, index, row.dot(tangent), system.distance(last.x, x))
 
     def damp(self, freedoms: int) -> None:
@@ -469,7 +469,7 @@ class BranchSolver:
     def tangent(self, row: PETSc.Vec, at: PETSc.Vec) -> PETSc.Vec:
         """Unit tangent of the branch at a state, on the side to which ``row`` points."""
         regular = self.regular.at(at)
-        return regular.along(row) if regular else self._tangent(row, at)
+        return regular.unit_tangent(row) if regular else self._tangent(row, at)
 
     def _tangent(self, row: PETSc.Vec, at: PETSc.Vec) -> PETSc.Vec:
         """The same by LU factors."""

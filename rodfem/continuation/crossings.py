@@ -80,7 +80,7 @@ def coefficients(a: Node, b: Node) -> list[np.ndarray]:
     return [a.H, h * a.slope, 3 * d - h * (2 * a.slope + b.slope), h * (a.slope + b.slope) - 2 * d]
 
 
-def at(a: Node, b: Node, t: float, order: int = 0) -> np.ndarray:
+def cubic_value(a: Node, b: Node, t: float, order: int = 0) -> np.ndarray:
     """The cubic at t, or its derivative."""
     h, u = b.s - a.s, 1 - t
     if order:
@@ -124,7 +124,7 @@ def fourth(a: Node, b: Node, c: Node | None) -> np.ndarray:
         return _size(np.stack(coefficients(a, b)[2:]), np.full(2, h**4))
     left, right = c.s - a.s, c.s - b.s
     steep = 2 * abs(left * right) * max(abs(left + right), h / 2)  # in the middle slopes do not tell
-    off = np.stack([c.H - at(a, b, left / h), c.slope - at(a, b, left / h, 1) / h])
+    off = np.stack([c.H - cubic_value(a, b, left / h), c.slope - cubic_value(a, b, left / h, 1) / h])
     return _size(off, np.array([(left * right) ** 2, steep]))
 
 
@@ -163,7 +163,7 @@ class Zeros:
     tolerance: float  # of eigenvalues of several modes that pass zero at one place
     misses: list[Node] = field(default_factory=list)  # where an eigenvalue is nearly zero, and does not pass it
 
-    def between(self, a: Node, b: Node, size: np.ndarray, depth: int = 0) -> list[Crossing]:
+    def crossings(self, a: Node, b: Node, size: np.ndarray, depth: int = 0) -> list[Crossing]:
         """All crossings in a piece divided ``depth`` times, by the ``size`` of its :func:`fourth` derivative."""
         off = SAFE * (b.s - a.s) ** 4 / 16 * size
         if clear(a, b, off):
@@ -176,7 +176,7 @@ class Zeros:
         if middle is None:
             return _passed(a, b, groups)
         known, size = len(self.misses), fourth(a, b, middle)
-        out = [*self.between(a, middle, size, depth + 1), *self.between(middle, b, size, depth + 1)]
+        out = [*self.crossings(a, middle, size, depth + 1), *self.crossings(middle, b, size, depth + 1)]
         if miss and not out and len(self.misses) == known:
             self.misses.append(middle)
         return out
@@ -184,7 +184,7 @@ class Zeros:
 
 def _passed(a: Node, b: Node, groups: list[list[float]]) -> list[Crossing]:
     """Crossings at the roots of the cubic, in ``groups``; the index on either side of each is that of the cubic."""
-    between = [a.far + negative(at(a, b, (p[-1] + q[0]) / 2)) for p, q in pairwise(groups)]
+    between = [a.far + negative(cubic_value(a, b, (p[-1] + q[0]) / 2)) for p, q in pairwise(groups)]
     sides, out, h = pairwise([a.index, *between, a.far + negative(b.H)]), list[Crossing](), b.s - a.s
     for group, (before, after) in zip(groups, sides, strict=False):
         own, others, rates = _passing(a, b, group)
@@ -231,10 +231,10 @@ def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
 def _passing(a: Node, b: Node, group: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vectors (k, m) of the eigenvalues that pass zero in a ``group``, all others, and the rates (m,) of these in t."""
     t, m = float(np.mean(group)), len(group)
-    values, vectors = np.linalg.eigh(at(a, b, t))
+    values, vectors = np.linalg.eigh(cubic_value(a, b, t))
     order = np.argsort(abs(values))
     own = vectors[:, order[:m]]
-    return own, values[order[m:]], np.linalg.eigvalsh(own.T @ at(a, b, t, 1) @ own)
+    return own, values[order[m:]], np.linalg.eigvalsh(own.T @ cubic_value(a, b, t, 1) @ own)
 
 
 def together(a: Node, b: Node, found: np.ndarray, tolerance: float) -> list[list[float]]:
@@ -242,9 +242,9 @@ def together(a: Node, b: Node, found: np.ndarray, tolerance: float) -> list[list
     out: list[list[float]] = []
     before, fast = np.zeros(len(a.H)), 0.0
     for t in np.sort(found.real[(abs(found.imag) < REAL) & (found.real >= 0) & (found.real <= 1)]).tolist():
-        values, vectors = np.linalg.eigh(at(a, b, t))
+        values, vectors = np.linalg.eigh(cubic_value(a, b, t))
         v = vectors[:, abs(values).argmin()]
-        speed, apart = abs(float(v @ at(a, b, t, 1) @ v)), t - out[-1][-1] if out else 1.0
+        speed, apart = abs(float(v @ cubic_value(a, b, t, 1) @ v)), t - out[-1][-1] if out else 1.0
         alike = abs(v @ before) >= 0.9 and apart * (b.s - a.s) >= 1e-12  # one mode, at two places
         if out and apart * max(speed, fast) <= tolerance and not alike:
             out[-1].append(t)

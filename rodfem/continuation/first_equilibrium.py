@@ -33,17 +33,17 @@ def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, New
         return rest
     guess = solver.start(load)
     x, outcome = solver.at_load(guess, load)
-    if not _near(system, guess, x, outcome):
+    if not _resembles(system, guess, x, outcome):
         other = solver.at_load(_balanced(solver, guess), load)
-        if _near(system, guess, *other):
+        if _resembles(system, guess, *other):
             x, outcome = other
-    outcome, good = (outcome, True) if _near(system, guess, x, outcome) else examined(solver, x, outcome)
+    outcome, good = (outcome, True) if _resembles(system, guess, x, outcome) else examined(solver, x, outcome)
     if good and not _may_move(solver, x):
         return x, outcome
     damping, system.damping = system.damping, STILL * system.stiffness_scale
     other = solver.at_load(guess, load)  # the start may be one of a family, along which it need not move
     system.damping = damping
-    if _near(system, guess, *other):
+    if _resembles(system, guess, *other):
         return other
     if not good and (down := downhill(solver, load))[1].converged:
         return down
@@ -56,10 +56,10 @@ def _at_rest(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult
     if natural is None:
         return None
     x, outcome = solver.at_load(natural, load, reach=1.0)
-    return (x, outcome) if _near(solver.system, natural, x, outcome) and examined(solver, x, outcome)[1] else None
+    return (x, outcome) if _resembles(solver.system, natural, x, outcome) and examined(solver, x, outcome)[1] else None
 
 
-def _near(system: System, guess: PETSc.Vec, x: PETSc.Vec, outcome: NewtonResult) -> bool:
+def _resembles(system: System, guess: PETSc.Vec, x: PETSc.Vec, outcome: NewtonResult) -> bool:
     """Whether an equilibrium is the one that a guess means: but for strains, as a straight rod may stretch far."""
     difference, f = x - guess, system.fields
     if "v" in f.dofs:

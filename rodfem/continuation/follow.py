@@ -143,7 +143,7 @@ class _Walk:
         """A point at most ``reach`` away from the last one; None where that was too far, or the branch has ended."""
         last, most = self.points[-1], min(reach, self.steps.largest)
         self._step = min(self._step, most)
-        known, bounds = self._predicting(last), self._around(last.load)
+        known, bounds = self._predicting(last), self._stops(last.load)
         low, high = (bound + sign * ON_BOUND * self.span for bound, sign in zip(bounds, (-1, 1), strict=True))
         made = self.solver.step(known, last.arclength + self._step, (low, high), 0.5 * self._step)
         bound = min(bounds, key=lambda bound: abs(bound - made.load))
@@ -151,7 +151,7 @@ class _Walk:
         if not low <= made.load <= high or (moved and abs(bound - made.load) < ON_BOUND * self.span):
             point = self._at_bound(known, made.load, bound)
         else:
-            point = self._along(known, made)
+            point = self._point(known, made)
         if point is None and not self.ended:
             self._halve(last, most)
         return point
@@ -164,7 +164,7 @@ class _Walk:
             point.slope, point.conjugate = self.solver.system.scalar(point.tangent), self.solver.energies(x).conjugate
         self._step, self._missed, self._failures = self._next, "", 0
 
-    def _around(self, load: float) -> tuple[float, float]:
+    def _stops(self, load: float) -> tuple[float, float]:
         """The nearest stops or ends on either side of a load, but for one that it is at."""
         below, above = ([s for s in self.stops if sign * (s - load) > SAME_LOAD * self.span] for sign in (-1, 1))
         return max([self.ends[0], *below]), min([self.ends[1], *above])
@@ -179,7 +179,7 @@ class _Walk:
             known = [replace(last, tangent=self.solver.tangent(self.solver.row(last.tangent), at=last.x))]
         return known
 
-    def _along(self, known: list[Point], made: Step) -> Point | None:
+    def _point(self, known: list[Point], made: Step) -> Point | None:
         """The point of a step that was made, if it is one of the branch."""
         if made.outcome is None or made.tangent is None or made.aligned <= ALIGNED:
             return None

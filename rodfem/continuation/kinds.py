@@ -47,7 +47,7 @@ class Kind(str):
         return self.test in (EIGENVALUE, UNFOLDING)
 
     @property
-    def given(self) -> bool:
+    def request(self) -> bool:
         """Whether its load is given, and nothing happens there."""
         return self.test in (LOAD, "")
 

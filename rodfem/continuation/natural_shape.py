@@ -112,7 +112,7 @@ def _slope(scene: Scene, x: np.ndarray, i: int, h: float, c: Any) -> float:
 def _placed(scene: Scene, load: float, q: np.ndarray, r: np.ndarray) -> tuple[np.ndarray, float]:
     """Quaternions of a shape turned to where the ends are, and by how much it is off, in lengths or radian."""
     (first, last), c = [rotation_of(scene, load, side) for side in range(2)], scene.constants(load)
-    places = [[np.nan if x is None else plain(x) for x in side.held(c)] for side in scene.sides]
+    places = [[np.nan if x is None else plain(x) for x in side.support(c)] for side in scene.sides]
     chord = np.subtract(places[1], places[0])
     if first is not None:
         turn = first

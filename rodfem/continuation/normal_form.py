@@ -63,7 +63,7 @@ class Leading:
         """Whether it is certainly not zero, and more than ``least``."""
         return abs(self.best) > max(least, self.missed)
 
-    def over(self, other: Leading, power: int) -> tuple[float, float]:
+    def ratio(self, other: Leading, power: int) -> tuple[float, float]:
         """Ratio to a ``power`` of another coefficient, which is significant, and its uncertainty."""
         best, size = self.best / other.best**power, abs(other.best)
         left = (abs(self.best) + self.left) / (size - other.left) ** power - abs(self.best) / size**power
@@ -220,9 +220,9 @@ def _transcritical(load: Leading, x: Term, one: float) -> NormalForm:
     """Slope of the load in the ordinate, of a size ``one``, or in the distance where that has no linear term."""
     side = int(np.sign(load.best))
     if x is None or x[0] != LINEAR:
-        best, left = load.over(ONE, 1)
+        best, left = load.ratio(ONE, 1)
         return NormalForm(TRANSCRITICAL, abs(best), 1, left, side, DISTANCE)
-    best, left = load.over(x[1], 1)
+    best, left = load.ratio(x[1], 1)
     return NormalForm(TRANSCRITICAL, best / one, 1, left / one, side)
 
 
@@ -235,7 +235,7 @@ def _pitchfork(load: Leading, hidden: float, x: Term, one: float) -> NormalForm:
     term, of, part = (ONE, DISTANCE, 0.0) if x is None else (x[1], ORDINATE, x[2])
     power = 1 if x is not None and x[0] == QUADRATIC else 2
     size = 1.0 if x is None else one**power
-    best, left = load.over(term, power)
+    best, left = load.ratio(term, power)
     left += part * abs(best) + hidden / abs(term.best) ** power
     side = int(np.sign(load.best)) if load.significant() else 0
     return NormalForm(PITCHFORK, best / size, power, left / size, side, of)

@@ -180,7 +180,7 @@ class SingularSystem:
 
     def adjoint(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]]]:
         """Null vectors at a solution, and ``y`` (k, k), ``S y_ij = -D(S v_i) v_j`` across them; no ``y`` at folds."""
-        _, (V, *_), G, _ = self._modes(self._at(x, 0.0).matrix)
+        _, (V, *_), G, _ = self._modes(self._matrix(x, 0.0).matrix)
         (Z, N), bordered = self._split(G), self._bordered[0]
         null = [combine(V, z) for z in Z.T]
         if self.fold:
@@ -188,7 +188,7 @@ class SingularSystem:
         images = [[self.system.new_vector() for _ in null] for _ in null]
         for v, row in zip(null, images, strict=True):
             for step, weight in SHARP:
-                matrix = self._at(x + v * (step * DIFFERENCE), 0.0, moved=True).matrix
+                matrix = self._matrix(x + v * (step * DIFFERENCE), 0.0, moved=True).matrix
                 for image, other in zip(row, null, strict=True):
                     image.axpy(weight / (2 * DIFFERENCE), self._image(matrix, other))
         return null, [[self._across(bordered.solve([-y]), V, (N, G)) for y in row] for row in images]
@@ -235,7 +235,7 @@ class SingularSystem:
         noise = max(self.inertia.at(x).noise(combine(at.V, z)) for z in at.Z.T)
         return bool(abs(self.system.scalar(step[0]) * at.rows[-1, 1]) <= noise * self.count)
 
-    def _at(self, x: PETSc.Vec, t: float, *, moved: bool = False) -> Factored:
+    def _matrix(self, x: PETSc.Vec, t: float, *, moved: bool = False) -> Factored:
         """S at a state and a second parameter; ``moved`` from the last state, with its phase conditions."""
         if self._section is not None:
             self.system.line = self._section.line(t)
@@ -271,7 +271,7 @@ class SingularSystem:
         """Factor the bordered matrix, and solve with it; derivatives of an ``old`` linearisation serve again."""
         system = self.system
         columns = [] if self._section is None or old else [self._second(x, t)]
-        found = self._at(x, t)
+        found = self._matrix(x, t)
         columns.insert(0, found.border.copy())
         residual = system.new_vector()
         system.at(x).residual(residual)
@@ -320,7 +320,7 @@ class SingularSystem:
                 there, share = x + v * (step * DIFFERENCE), weight / (2 * DIFFERENCE)
                 if self._section is not None:
                     f[1] += share * left.dot(self._second(there, t))
-                found = self._at(there, t, moved=True)
+                found = self._matrix(there, t, moved=True)
                 f[0] += share * left.dot(found.border)
                 y.axpy(share, self._image(found.matrix, left))
         return y, f
@@ -387,7 +387,7 @@ class SingularSystem:
         changes = [1.0, *share]
         if self._section is not None:  # the derivatives so far are those of an iterate
             at, changes = self._linear(x, t, sharp=True), [1.0, *np.zeros(len(share))]
-        matrix = self._at(x, t).matrix
+        matrix = self._matrix(x, t).matrix
         _, (modes, *_), *_ = self._modes(matrix)  # of this very state
         null = [combine(modes, z) for z in at.Z.T]
         # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times

@@ -15,12 +15,12 @@ from petsc4py import PETSc
 from rodfem.continuation.arc import STRAYED, Piece
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.crossings import Crossing, Node, at
+from rodfem.continuation.crossings import Crossing, Node, cubic_value
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
 from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
-from rodfem.linalg.orthogonal import across, combine, orthonormalize
+from rodfem.linalg.orthogonal import combine, complement, orthonormalize
 from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import Index
 from rodfem.stability.reduced_stiffness import SOFT
@@ -114,7 +114,7 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
 def _interpolated(piece: Piece, p: Node, q: Node, s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Eigenvalues and vectors of H, and W, between two nodes: modes near those of the state there."""
     t, (a, b) = (s - p.s) / (q.s - p.s), (node.kept.reduced for node in (p, q))
-    values, own = np.linalg.eigh(at(piece.whole(p), piece.whole(q), t))
+    values, own = np.linalg.eigh(cubic_value(piece.whole(p), piece.whole(q), t))
     return values, own, (1 - t) * a.W + t * b.W
 
 
@@ -148,11 +148,11 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
     solver, system, x, null = piece.solver, piece.solver.system, found.x, found.vectors
     tangent = _tangent(solver, at.slope, found, fold=fold)
     system.set_phase(x)
-    index = Index(at.negative, system.phase.count + len(null) + piece.still)
+    index = Index(at.negative, system.phase.count + len(null) + piece.omissions)
     point = solver.point(x, piece.begin + piece.place(x), tangent, index=index)
     left = (0.0 if fold else at.uneven * load_uncertainty(solver, found)) + round_off(point.load, solver.units.load)
     coupling = max(coupling_of(solver, x, v) for v in null)
-    nearby = across(solver.inertia.metric, found.modes, null)
+    nearby = complement(solver.inertia.metric, found.modes, null)
     special = SpecialPoint(FOLD if fold else BRANCH_POINT, point, at.before, at.after, left, null, nearby, coupling)
     special.unfolding = float("nan") if fold else found.size
     special.test_function = "slope" if fold else "mu"

@@ -196,14 +196,14 @@ def _weights(solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec],
     else:
         tried = np.concatenate([np.eye(n), np.random.default_rng(n).normal(size=(12 * (n - 1), n))])
     for weights in tried:
-        seen = _seen(solver, origin, ways, weights / np.linalg.norm(weights), reach)
-        seen = seen if seen is None else _seen(solver, origin, ways, seen, reach)
+        seen = _direction(solver, origin, ways, weights / np.linalg.norm(weights), reach)
+        seen = seen if seen is None else _direction(solver, origin, ways, seen, reach)
         if seen is not None and all(abs(seen @ known) < 0.999 for known in found):
             found.append(seen)
     return found
 
 
-def _seen(
+def _direction(
     solver: BranchSolver, origin: PETSc.Vec, ways: Sequence[PETSc.Vec], weights: np.ndarray, reach: float
 ) -> np.ndarray | None:
     """Weights (n,) of the direction in which an equilibrium is, that is found in that of others; None without one."""

@@ -159,7 +159,7 @@ class Deflation:
         for _ in range(10):
             state = system.at(x + step * factor)
             unit = {f.turning.name: f.turning.normalised(state.turned)}  # quaternions of unit length
-            trial = system.vector(f.filled(state.named | unit), state.drifts)
+            trial = system.vector(f.filled(state.parts | unit), state.drifts)
             system.at(trial).residual(equations)
             if isfinite(equations.norm()):
                 trial.copy(x)
@@ -239,7 +239,7 @@ def turned_over(system: System, base: PETSc.Vec) -> list[PETSc.Vec]:
 def _turned(system: System, base: PETSc.Vec, vector: np.ndarray) -> PETSc.Vec:
     """State ``base`` whose rotations are turned by a rotation ``vector`` at each node."""
     f, state = system.fields, system.at(base)
-    return system.vector(f.filled(state.named | {f.turning.name: f.turning.turned(state.turned, vector)}))
+    return system.vector(f.filled(state.parts | {f.turning.name: f.turning.turned(state.turned, vector)}))
 
 
 def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
@@ -277,7 +277,7 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
     """Equilibria of traced branches at exactly ``load``, each once, which a search for further ones deflates."""
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
-        for point in _along(solver, branch, [interpolated(p, solver) for p in branch.points], load):
+        for point in _equilibria(solver, branch, [interpolated(p, solver) for p in branch.points], load):
             if known.distance(point.x) >= APART:
                 point.branch = branch.name
                 found.append(point)
@@ -285,7 +285,7 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
     return found
 
 
-def _along(solver: BranchSolver, branch: Branch, points: Sequence[Point], load: float) -> Iterator[Point]:
+def _equilibria(solver: BranchSolver, branch: Branch, points: Sequence[Point], load: float) -> Iterator[Point]:
     """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a ``branch``, which are on its mesh.
 
     At a fold or a branch point Newton's method at the load itself has nothing to go by: they are what was located.

@@ -71,7 +71,7 @@ class Mirror:
     def __call__(self, shape: Shape, x: PETSc.Vec) -> PETSc.Vec:
         """Image of the state ``x``; drift scalars of the image are zero."""
         system, f, state = shape.system, shape.system.fields, shape.system.at(x)
-        named, ends = state.named, sum(system.scene.interval) - f.all_vertices()[::-1]
+        named, ends = state.parts, sum(system.scene.interval) - f.all_vertices()[::-1]
         for block in f.blocks:
             weights = self.weights(system, block.name)
             named[block.name] = state.values(block.name) * weights
@@ -87,7 +87,7 @@ def _misfit(state: State, table: np.ndarray) -> np.ndarray:
     """Translation (3,) by which a centreline, given in elements from left to right, misses the ends that are held."""
     (left, right), shift = state.fields.scene.sides, np.zeros(3)
     for end, r in ((right, table[-1, -1]), (left, table[0, 0])):  # the left end has the last word
-        shift = np.where([p is not None for p in end.held(state.constants())], r, shift)
+        shift = np.where([p is not None for p in end.support(state.constants())], r, shift)
     return shift
 
 
@@ -224,20 +224,20 @@ class Orbits:
 
         Exact for translations and one rotation; for more of them the angles are found in turn, three times.
         """
-        image, found = self.system.metric * self._still(x), []
+        image, found = self.system.metric * self._remainder(x), []
         turns = self.rotations * (3 if len(self.rotations) > 1 else 1)
         for y, orbits in zip(self.states, self._orbits, strict=True):
             for turn, i in enumerate(turns):
                 orbit = self._orbit(y, i) if turn else orbits[i]
                 y = orbit.at(orbit.amount(image))
-            apart = self._still(x - y)
+            apart = self._remainder(x - y)
             found.append((self.system.norm(apart), apart))
         return found
 
     def _orbit(self, y: PETSc.Vec, symmetry: int) -> Orbit:
-        return Orbit(self.system, y, symmetry, self._still)
+        return Orbit(self.system, y, symmetry, self._remainder)
 
-    def _still(self, x: PETSc.Vec) -> PETSc.Vec:
+    def _remainder(self, x: PETSc.Vec) -> PETSc.Vec:
         """Part of ``x`` across all translations."""
         out = x.copy()
         for t, weighed in zip(self.translations, self._weighed, strict=True):
@@ -252,9 +252,9 @@ def _same_rotations(system: System, x: PETSc.Vec) -> list[PETSc.Vec]:
     held = bool((f.number[f.dofs[field]] < 0).any())
     if system.scene.closed or system.comm.allreduce(held, op=MPI.LOR):
         return []
-    values = state.named[field]
+    values = state.parts[field]
     others = [-values] if field == "q" else [values + 2 * np.pi * turn for turn in (1, -1, 2, -2)]
-    out = [system.vector(f.filled(state.named | state.scalars | {field: other}), state.drifts) for other in others]
+    out = [system.vector(f.filled(state.parts | state.scalars | {field: other}), state.drifts) for other in others]
     for image in out:
         system.set_load(image, system.scalar(x))
     return out

@@ -59,7 +59,7 @@ class Critical:
 
 def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:
     """Cluster of some eigenvalues of a state's ``spectrum``, and the conjugates of complex ones."""
-    found = pencil.of(spectrum, np.array(places))
+    found = pencil.frequencies(spectrum, np.array(places))
     conjugates = [found.vectors.conj()] if found.values.imag.any() else []
     vectors = np.concatenate([found.vectors, *conjugates], axis=1)
     return Cluster(real_span(pencil, vectors), float(found.values.real.mean()))
@@ -110,7 +110,7 @@ class Mean:
         if not self.zeros:
             return self.measured(load, self.cluster).cluster.mean
         pencil, size = self.measured.pencil(load), self.cluster.size
-        values = pencil.near(size + 2, SHIFT * pencil.system.scene.units.omega2).values
+        values = pencil.nearest(size + 2, SHIFT * pencil.system.scene.units.omega2).values
         return float(values[np.argsort(abs(values), kind="stable")[:size]].real.mean())
 
     def noise(self, load: float) -> float:

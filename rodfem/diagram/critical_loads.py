@@ -66,7 +66,7 @@ class CriticalLoads:
         self._ahead = list[Meeting]()
         self.poles = list[int]()  # in the last step: changes of the number of negative eigenvalues through infinity
 
-    def between(self, a: Side, b: Side, behind: Side | None, zeros: int) -> list[Critical]:
+    def critical_loads(self, a: Side, b: Side, behind: Side | None, zeros: int) -> list[Critical]:
         """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish."""
         self._zeros, self.poles = zeros, []
         sides = [a, *self._met(a, b, behind), b]

@@ -88,7 +88,7 @@ class Diagram:
     @property
     def span(self) -> tuple[float, float]:
         """Range of the load, its start first."""
-        return self.plan.over(self.scene)
+        return self.plan.load_range(self.scene)
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -115,7 +115,7 @@ class Diagram:
         """
         every = list(chain.from_iterable(b.special for b in (self if branch is None else [self[branch]])))
         if kind is None:
-            return [s for s in every if not s.kind.given]
+            return [s for s in every if not s.kind.request]
         found = [s for s in every if kind in s.names]
         known = [*KINDS, *LAWS, *map(attrgetter("name"), self.plan.events)]
         if not found and kind not in known:
@@ -412,10 +412,10 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         with clock("setup"):
             mesh = _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
-            if plan.accuracy is None and (doubt := check_start(found, plan.over(scene))):
+            if plan.accuracy is None and (doubt := check_start(found, plan.load_range(scene))):
                 recorder.warn(doubt)
-        asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.over(scene))}
-        if stressed := misfit(scene, plan.over(scene)[0]):
+        asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.load_range(scene))}
+        if stressed := misfit(scene, plan.load_range(scene)[0]):
             recorder.note(stressed)
         recorder.system(found.system, plan.accuracy)
         plan = _with_bars(plan, found, recorder)

@@ -149,21 +149,21 @@ class LoadSteps:
         self.solver, self.least = solver, LEAST * abs(span[1] - span[0])
         self.known, self.step = [first], inf
 
-    def to(self, load: float) -> PETSc.Vec:
+    def reach(self, load: float) -> PETSc.Vec:
         """Equilibrium on the path at a ``load`` further on; raises :class:`ConvergenceError`."""
         last = self.known[-1]
         while last.load != load:
-            last = self._next(last, load)
+            last = self._step(last, load)
             self.known = [*self.known[1 - ROWS :], last]
         return last.x
 
-    def _next(self, last: Point, load: float) -> Point:
+    def _step(self, last: Point, load: float) -> Point:
         """Next state of the path, at the ``load`` or on the way to it."""
         ahead = load - last.load
         size = min(abs(ahead), self.step)
         while size > 0.0:
             there = load if size >= abs(ahead) else last.load + copysign(size, ahead)
-            x = self._found(there)
+            x = self._equilibrium(there)
             if x is not None:
                 self.step = max(2.0 * size, self.step)
                 return replace(last, x=x, load=there)
@@ -176,7 +176,7 @@ class LoadSteps:
             "smaller range, or another parameter as the load."
         )
 
-    def _found(self, load: float) -> PETSc.Vec | None:
+    def _equilibrium(self, load: float) -> PETSc.Vec | None:
         """Equilibrium on the path at a ``load``; None where there is none, or none that is surely on it."""
         solver, last = self.solver, self.known[-1]
         if len(self.known) > 1 and (x := self._predicted(self.known, load)) is not None:

@@ -46,7 +46,7 @@ def equivalent(a: Point, b: Point, units: Units, tolerance: float = 1e-8, of_str
     return all(abs(p - q) <= allowed * unit(p, q, one=one) for p, q, allowed, one in pairs)
 
 
-def near(a: Point, b: Point, units: Units, steps: float = 2.0) -> bool:
+def neighbours(a: Point, b: Point, units: Units, steps: float = 2.0) -> bool:
     """Whether points ``a``, ``b`` of a rod with these ``units`` could be neighbours, ``steps`` apart, on one branch."""
     reach = 0.05 * steps
     close = abs(a.load - b.load) <= reach * unit(a.load, one=units.load)
@@ -139,7 +139,7 @@ def loop_end(branch: Branch, step: Step, width: float, alike: Alike) -> Point | 
         passed = solver.system.distance(b.x, first.x) < b.arclength - a.arclength
         return b if passed else None
     first = branch.points[0 if branch.parent is None else 1]
-    if not (_passes(a, b, first) and near(first, a, solver.units, 4)):
+    if not (_passes(a, b, first) and neighbours(first, a, solver.units, 4)):
         return None
     try:
         point = Arc(solver, a, b).at_load(first.load)
@@ -156,7 +156,7 @@ def _passes(a: Point, b: Point, first: Point) -> bool:
 def connection(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:
     """Recognise a ``special`` point that one of the ``branches`` has; a reason if the ``branch`` ends there."""
     from_the_side, where = special.test_function == "slope", f"at {load} = {special.point.load:.8g}"
-    found = next(_known(branch, special, branches, alike), None)
+    found = next(_copies(branch, special, branches, alike), None)
     if found is None:
         return f"meets another branch {where}" if from_the_side else ""
     other, i = found
@@ -169,7 +169,7 @@ def connection(branch: Branch, special: SpecialPoint, branches: Sequence[Branch]
     return f"meets {other.name} {where}"
 
 
-def _known(
+def _copies(
     branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike
 ) -> Iterator[tuple[Branch, int]]:
     """Yield where a ``special`` point of a ``branch`` is known: a branch, and the number of the point on it."""

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rodfem.continuation.arc import Arc, End, SoughtPiece, end, piece_with
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.branch_solver import BranchSolver, between
+from rodfem.continuation.branch_solver import BranchSolver, interpolant
 from rodfem.continuation.kinds import USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
@@ -59,11 +59,11 @@ def at_loads(step: Step, loads: Sequence[float]) -> list[SpecialPoint]:
         for load in loads
         if step.begins and load == step.a.load
     ]
-    found += [point for arc in step.pieces() for load in loads for point in _on(step, arc, load)]
-    return [step.solver.given(USER, point) for point in found]
+    found += [point for arc in step.pieces() for load in loads for point in _arc_point(step, arc, load)]
+    return [step.solver.request(USER, point) for point in found]
 
 
-def _on(step: Step, arc: Arc, load: float) -> Iterator[Point]:
+def _arc_point(step: Step, arc: Arc, load: float) -> Iterator[Point]:
     """The point at a load on an arc of the step, if there is one, without its beginning."""
     if (arc.a.load - load) * (arc.b.load - load) < 0:
         yield arc.at_load(load)
@@ -82,7 +82,7 @@ class Events:
         self._flat: dict[str, list[float]] = {}
         self._last: tuple[Point, End] | None = None
 
-    def between(self, step: Step) -> list[SpecialPoint]:
+    def special_points(self, step: Step) -> list[SpecialPoint]:
         """Special points of the events that happen in a step."""
         if not self.events:
             return []
@@ -107,7 +107,7 @@ class Events:
     def _end(self, step: Step, row: Point) -> End:
         """The end of a step at a row, which may be that of the step before."""
         if self._last is None or self._last[0] is not row:
-            direction = between(step.a, step.b, row.arclength)[1]
+            direction = interpolant(step.a, step.b, row.arclength)[1]
             self._last = row, end(step.solver, row.arclength, row.x, direction)
         return self._last[1]
 

@@ -19,7 +19,7 @@ from rodfem.continuation.switching import directions, lines, start_branch
 from rodfem.deflation.search import Deflation, equilibria_at
 from rodfem.deflation.symmetries import Orbits
 from rodfem.diagram.equilibria import Overfull, first_state, name_of_first
-from rodfem.diagram.equivalence import are_images, equivalent, near, other_ordinates
+from rodfem.diagram.equivalence import are_images, equivalent, neighbours, other_ordinates
 from rodfem.diagram.special_search import Gap, arms
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
@@ -43,7 +43,7 @@ class Explorer(Tracer):
         self.trace(self._primary())
         self._branch_off(0)
         for load in self.plan.at if self.plan.tries else ():
-            with self.without(f"The search at {load:g} was given up"):
+            with self.guard(f"The search at {load:g} was given up"):
                 self._search(load)
         return self.branches
 
@@ -87,9 +87,9 @@ class Explorer(Tracer):
             return points
         kept = list[Point]()
         for point in points:
-            with self.without(f"A state found at {self.scene.load} = {point.load:.8g} was not followed"):
+            with self.guard(f"A state found at {self.scene.load} = {point.load:.8g} was not followed"):
                 with self.solver.system.clock.scope("error bars"):
-                    again = self.meshes.richer(point.mesh).again(point, fixed_load=True)
+                    again = self.meshes.richer(point.mesh).solve(point, fixed_load=True)
                 if not again.resolved:
                     raise ConvergenceError(again.unlike(point.load))
                 kept.append(point)
@@ -110,12 +110,12 @@ class Explorer(Tracer):
                 while self._crossed < len(self.specials.gaps) and not self._enough():
                     self._crossed += 1
                     gap = self.specials.gaps[self._crossed - 1]
-                    with self.without(f"The other side of the gap at {gap.point.load:.8g} was not followed"):
+                    with self.guard(f"The other side of the gap at {gap.point.load:.8g} was not followed"):
                         self._detached(gap, branch.depth + 1)
                 for i, special in enumerate(branch.special):
                     if special.to_follow and not self._enough():
                         where = f"{branch.name} at {special.point.load:.8g}"
-                        with self.without(f"No branch could be followed from {where}"):
+                        with self.guard(f"No branch could be followed from {where}"):
                             self._switch(branch, i, special)
 
     def _enough(self) -> bool:
@@ -141,7 +141,7 @@ class Explorer(Tracer):
 
     def _first(self) -> Point:
         start, stop = self.span
-        x, outcome = self._held(start)
+        x, outcome = self._fine_start(start)
         solver = self.solver
         if not outcome.converged:
             raise ConvergenceError(
@@ -156,7 +156,7 @@ class Explorer(Tracer):
             self._leave_family(point, family, stop > start)
         return point
 
-    def _held(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
+    def _fine_start(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
         """First state on a mesh that holds its half-waves; with an accuracy, on one of some finer ones."""
         while True:
             try:
@@ -331,7 +331,7 @@ class Explorer(Tracer):
     def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
         return any(
-            near(branch.points[1], row, self.solver.units)
+            neighbours(branch.points[1], row, self.solver.units)
             for other in self.branches
             for end in other.special
             if end.connects_to is not None and self.alike(end.point, special.point, SAME_SPECIAL)

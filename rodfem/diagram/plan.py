@@ -97,7 +97,7 @@ class Plan:
         if self.method not in ("", AUTO):
             find(self.method)
 
-    def over(self, scene: Scene) -> tuple[float, float]:
+    def load_range(self, scene: Scene) -> tuple[float, float]:
         """Range of the load: that of the plan, or that of the scene."""
         return scene.span if self.span is None else self.span
 
@@ -108,7 +108,7 @@ class Plan:
         """
         if discretization is not None:
             self._check_mesh(scene, discretization)
-        span = self.over(scene)
+        span = self.load_range(scene)
         scene.check_span(span)
         check_load(scene)
         if self.events and not scene.conservative:
@@ -208,7 +208,7 @@ def entries(plan: Plan, scene: Scene) -> dict[str, Any]:
     """What JSON can hold of a ``plan`` for a ``scene``; steps are a text, events their names."""
     chosen = {f.name: getattr(plan, f.name) for f in fields(plan)}
     return chosen | {
-        "span": plan.over(scene),
+        "span": plan.load_range(scene),
         "steps": repr(plan.steps),
         "events": [event.name for event in plan.events],
     }

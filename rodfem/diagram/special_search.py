@@ -115,34 +115,34 @@ class SpecialSearch:
             self._short.append((first, 2 * last - first, (last - first) / PARTS))
             raise Unresolved
 
-    def after(self, b: Point) -> list[SpecialPoint]:
+    def advance(self, b: Point) -> list[SpecialPoint]:
         """Special points that the row ``b`` shows, in order; a singular row, of no index, waits for the next one."""
         settled = self._open[0]
         if settled.mesh != b.mesh:
             self._open = [interpolated(settled, self.meshes.solvers[b.mesh])]
         try:
             self._open.append(b)
-            return self._shown() if self._regular(b) or len(self._open) > PATIENCE else []
+            return self._points() if self._regular(b) or len(self._open) > PATIENCE else []
         except Unresolved:
             self._open = [settled]
             raise
 
     def rest(self) -> list[SpecialPoint]:
         """Special points among the last rows of a branch that only its end shows: those of singular rows."""
-        return self._shown(ended=True) if len(self._open) > 1 else []
+        return self._points(ended=True) if len(self._open) > 1 else []
 
-    def beyond(self, a: Point, b: Point) -> list[SpecialPoint]:
+    def overshoot(self, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points between a row and a point past the end of its branch."""
-        return self._between(a, b, ended=True)
+        return self._search(a, b, ended=True)
 
     def _regular(self, point: Point) -> bool:
         """Whether no more eigenvalues are zero than all along, to working accuracy."""
         self._prepare(self._open[0])
         return self._reduced(point).zero <= min(self._reduced(p).zero for p in self._open)
 
-    def _shown(self, *, ended: bool = False) -> list[SpecialPoint]:
+    def _points(self, *, ended: bool = False) -> list[SpecialPoint]:
         a, b = self._open[0], self._open[-1]
-        found = self._between(a, b, ended=ended)
+        found = self._search(a, b, ended=ended)
         self._open, self._before = [b], a
         return found
 
@@ -214,16 +214,16 @@ class SpecialSearch:
             p, q = (middle, q) if middle.index == p.index else (p, middle)
         return q.kept.x
 
-    def _between(self, a: Point, b: Point, *, ended: bool = False) -> list[SpecialPoint]:
+    def _search(self, a: Point, b: Point, *, ended: bool = False) -> list[SpecialPoint]:
         """Special points between two rows, of which those between are singular."""
         piece, p, q = self._nodes(a, b)
-        self.undecided = piece.still + piece.solver.system.active_drifts(b.x)
+        self.undecided = piece.omissions + piece.solver.system.active_drifts(b.x)
         margin = ASIDE * (q.s - p.s)
-        p = p if p.kept.reduced.zero <= piece.still else piece.solve(p, q, p.s + margin) or p
-        q = q if q.kept.reduced.zero <= piece.still or not ended else piece.solve(p, q, q.s - margin) or q
+        p = p if p.kept.reduced.zero <= piece.omissions else piece.solve(p, q, p.s + margin) or p
+        q = q if q.kept.reduced.zero <= piece.omissions or not ended else piece.solve(p, q, q.s - margin) or q
         out, pieces = self._turning(piece, p, q, ended=ended)
         zeros, size = Zeros(piece.solve, piece.solver.inertia.tolerance), self._fourth(piece, p, q)
-        for crossing in chain.from_iterable(zeros.between(*ends, size) for ends in pieces):
+        for crossing in chain.from_iterable(zeros.crossings(*ends, size) for ends in pieces):
             turns = piece.turn(*crossing.piece) is not None
             special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
             if special is not None:
@@ -261,7 +261,7 @@ class SpecialSearch:
     ) -> tuple[list[SpecialPoint], list[tuple[Node, Node]]]:
         """The branch point at which the load turns back, if there is one, and the pieces on both sides of it."""
         turn = piece.turn(p, q)
-        found = None if turn is None else self._touching(piece, (p, q), turn, ended=ended)
+        found = None if turn is None else self._touch_point(piece, (p, q), turn, ended=ended)
         if found is None:
             return [], [(p, q)]
         (touch, *made), pieces = found, list[tuple[Node, Node]]()
@@ -281,7 +281,7 @@ class SpecialSearch:
         before = piece.node(row.x, row.tangent, self._reduced(row))
         return fourth(p, q, before if before.s < p.s else None)
 
-    def _touching(
+    def _touch_point(
         self, piece: Piece, ends: tuple[Node, Node], s: float, *, ended: bool
     ) -> tuple[SpecialPoint, Node, Node] | None:
         """Branch point at which the load turns back, where a side branch ends, and states next to it.

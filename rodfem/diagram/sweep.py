@@ -36,11 +36,11 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.shape import halved
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
-from rodfem.ranks import as_failure, without
+from rodfem.ranks import as_failure, guard
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.inertia import Index
-from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, begins_slowly, named
+from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, begins_slowly, label
 from rodfem.stability.spectrum import SHIFT
 from rodfem.tolerances import DRIFT, ROUND_OFF, round_off, unit
 
@@ -63,8 +63,8 @@ class Sweep:
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.solvers: Sequence[BranchSolver] = [solver]
         scene = solver.system.scene
-        self.span, self.units, self._load = plan.over(scene), scene.units, scene.load
-        self._asked = [self._known(load) for load in plan.at]
+        self.span, self.units, self._load = plan.load_range(scene), scene.units, scene.load
+        self._asked = [self._snap(load) for load in plan.at]
         self.eigensolver = NonsymmetricSolver(solver.system)
         self.number = plan.spectrum or FREQUENCIES
         self.curves = Curves(solver.system.comm)
@@ -87,19 +87,19 @@ class Sweep:
             branch.ended = f"no convergence: {trouble}"
             self.observer.warn(str(trouble))
         last = branch.points[-1]
-        branch.special.append(self.solver.given(END, last))
+        branch.special.append(self.solver.request(END, last))
         branch.renumber()
         if self.plan.error_bars:
             self._error_bars(branch)
         Quadrature(self.solvers, self.observer, self._load).examine(branch)
         self.observer.finished(branch)
         if self._zeros:
-            with without("Whether frequencies stay zero was not examined", comm, self.observer.warn):
+            with guard("Whether frequencies stay zero was not examined", comm, self.observer.warn):
                 self._family(last)
         self.finished()
         return self.branches
 
-    def _known(self, load: float, others: Sequence[float] = ()) -> float:
+    def _snap(self, load: float, others: Sequence[float] = ()) -> float:
         """An end of the range, or one of ``others``, from which a load differs by round-off; else that load."""
         least = 1e-12 * max(map(abs, self.span))  # a step that is less is round-off
         return next((other for other in (*self.span, *others) if abs(load - other) <= least), load)
@@ -108,7 +108,7 @@ class Sweep:
         """Loads at which tables have corners, and all those of the sweep, in its order."""
         a, b = self.span
         stops = [load for load in self.solver.system.scene.stops if min(a, b) < load < max(a, b)]
-        own = [self._known(load, self._asked) for load in (*np.linspace(a, b, LOADS).tolist(), *stops)]
+        own = [self._snap(load, self._asked) for load in (*np.linspace(a, b, LOADS).tolist(), *stops)]
         loads = np.unique([*own, *self._asked]).tolist()
         return stops, loads if a < b else loads[::-1]
 
@@ -130,7 +130,7 @@ class Sweep:
             steps = LoadSteps(self.solver, latest, self.span)
             self._take(branch, latest)
             for load in loads[1:]:
-                state = steps.to(load)
+                state = steps.reach(load)
                 point = self._point(state)
                 if why := Arc(self.solver, latest, point).lost_convexity() or self._dependent(state):
                     return why
@@ -168,16 +168,16 @@ class Sweep:
         before, row = self._rows[-2:-1], self._rows[-1]
         self._record(row, on_the_way=True)
         if before:
-            self._between(branch, before[0], row, following)
+            self._insert(branch, before[0], row, following)
         branch.points.append(row.point)
         if row.point.load in self._asked:
-            self._special(branch, self.solver.given(USER, row.point))
+            self._special(branch, self.solver.request(USER, row.point))
         self.observer.progress(branch, row.point)
 
     def _row(self, point: Point) -> Row:
         """A point with all its eigenvalues, and its left-most frequencies with the names of those that are recorded."""
         pencil = self.eigensolver.at(point.x)
-        found = named(pencil.system, pencil.leftmost(self.number), pencil.turned, self.number)
+        found = label(pencil.system, pencil.leftmost(self.number), pencil.turned, self.number)
         return Row(point, Side(point.load, point.x, pencil.spectrum), found)
 
     def _family(self, last: Point) -> None:
@@ -237,12 +237,12 @@ class Sweep:
         point.motion = list(found.kinds[: self.number])
         point.curve = self.curves.numbers(found, keep=on_the_way)[: self.number]
 
-    def _between(self, branch: Branch, first: Row, second: Row, following: Row | None) -> None:
+    def _insert(self, branch: Branch, first: Row, second: Row, following: Row | None) -> None:
         """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
         a, b, behind = first.point, second.point, following and following.side
-        zeros = min(first.found.still(), second.found.still())
+        zeros = min(first.found.zeros(), second.found.zeros())
         with self.solver.system.clock.scope("location"):
-            events = self.critical.between(first.side, second.side, behind, zeros)
+            events = self.critical.critical_loads(first.side, second.side, behind, zeros)
         negative = a.negative
         for event in events:
             after = negative + event.change
@@ -318,7 +318,7 @@ class Sweep:
         with self.solver.system.clock.scope("error bars"):
             comm, warn, errors = self.solver.system.comm, self.observer.warn, SweepErrors(self.solver, self.span)
             for s in branch.special:
-                with without(f"No error of the {s.kind.words} at {s.point.load:.6g} was estimated", comm, warn):
+                with guard(f"No error of the {s.kind.words} at {s.point.load:.6g} was estimated", comm, warn):
                     errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
@@ -377,7 +377,7 @@ def mesh_of_frequencies(
     scene: Scene, formulation: str, plan: Plan, accuracy: float, comm: MPI.Comm
 ) -> tuple[Discretization, float]:
     """Discretisation on which frequencies change by less than the accuracy if it is refined, and by how much."""
-    loads, number = np.linspace(*plan.over(scene), 3), plan.spectrum or FREQUENCIES
+    loads, number = np.linspace(*plan.load_range(scene), 3), plan.spectrum or FREQUENCIES
     mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
     system = System(scene, mesh, comm)
     values, symmetries = _frequencies(system, loads, number), system.symmetries
@@ -401,7 +401,7 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
     found = []
     for load in loads:
         x = at_load(solver, x, float(load))
-        values = eigensolver.at(x).near(number + 2, SHIFT * system.scene.units.omega2).values
+        values = eigensolver.at(x).nearest(number + 2, SHIFT * system.scene.units.omega2).values
         found.append(values[np.argsort(abs(values))][: number + 2])
     if min(map(len, found)) < number:
         raise ConvergenceError(

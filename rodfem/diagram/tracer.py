@@ -23,7 +23,7 @@ from rodfem.diagram.events import Events, Step, at_loads
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
-from rodfem.ranks import as_failure, without
+from rodfem.ranks import as_failure, guard
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import DRIFT, ROUND_OFF
 
@@ -48,7 +48,7 @@ class Tracer:
         """Start with no branch, on the mesh of the ``solver``; the ``plan`` must have passed its :meth:`Plan.check`."""
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.scene = solver.system.scene
-        self.span = plan.over(self.scene)
+        self.span = plan.load_range(self.scene)
         self.low, self.high = sorted(self.span)
         self.branches: list[Branch] = []
         self.meshes = Meshes(solver, plan.accuracy)
@@ -83,9 +83,9 @@ class Tracer:
             branch.ended = f"{NO_CONVERGENCE}: {trouble}"
             self.observer.warn(Remark(str(trouble), branch.points[-1].load))
 
-    def without(self, what: str) -> AbstractContextManager[None]:
+    def guard(self, what: str) -> AbstractContextManager[None]:
         """Go on where the block fails, and warn of ``what`` did not happen and why."""
-        return without(what, self.solver.system.comm, self.observer.warn)
+        return guard(what, self.solver.system.comm, self.observer.warn)
 
     def trace_whole(self, point: Point, name: str, depth: int) -> None:
         """Follow a branch through a point, which has a tangent, in both directions, as one."""
@@ -98,7 +98,7 @@ class Tracer:
             self._finish(back)
             return
         first = branch.points[0]
-        branch.special.append(self.solver.given(END, first))
+        branch.special.append(self.solver.request(END, first))
         branch.special[-1].note = f"begins here: {back.ended}"
         branch.renumber()
         self.trace(branch)
@@ -195,7 +195,7 @@ class Tracer:
         if row.stretch <= 0:
             self._end_at_zero_stretch(branch, previous, row)
         self._require_convexity(branch, previous, row)
-        self._between(branch, previous, row, closed=bool(last))
+        self._add_special_points(branch, previous, row, closed=bool(last))
         history.append(row)
         self._append(branch, row)
         if last:
@@ -206,10 +206,10 @@ class Tracer:
         branch.append(row)
         self.observer.progress(branch, row)
 
-    def _between(self, branch: Branch, a: Point, b: Point, *, closed: bool = False) -> None:
+    def _add_special_points(self, branch: Branch, a: Point, b: Point, *, closed: bool = False) -> None:
         """Insert special points between two points, the second maybe where the branch began."""
         with self.solver.system.clock.scope("location"):
-            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(b)
+            specials = [] if a is branch.points[0] and branch.parent else self.specials.advance(b)
             self._leave(branch, specials, b)
             step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
             self._insert(branch, specials + self._requests(step))
@@ -233,7 +233,7 @@ class Tracer:
 
     def _requests(self, step: Step) -> list[SpecialPoint]:
         """What the plan asks for in a step."""
-        return at_loads(step, self.plan.at) + self.events.between(step)
+        return at_loads(step, self.plan.at) + self.events.special_points(step)
 
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
@@ -280,10 +280,10 @@ class Tracer:
             self._require_convexity(branch, a, near)
             if near.negative != a.negative:  # what passes zero before is zero at the end once more
                 require_equilibrium(self.solvers[near.mesh], near)
-                self._between(branch, a, near)
+                self._add_special_points(branch, a, near)
                 branch.append(near)
                 a = near
-        self._between(branch, a, last)
+        self._add_special_points(branch, a, last)
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
         if not isnan(end.error_estimate):
             self.control.check(end)
@@ -312,7 +312,7 @@ class Tracer:
                 raise ConvergenceError(f"there is no equilibrium at {self.scene.load} = {load:g}")
             s = last.arclength + self.solver.system.distance(last.x, x)
             further = self.solver.point(x, s, self.solver.load_tangent(x, load > last.load), outcome)
-            found = self.specials.beyond(interpolated(previous, self.solver), further)
+            found = self.specials.overshoot(interpolated(previous, self.solver), further)
         width = 1e-6 * (self.high - self.low)  # nearer is the last state
         for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
             if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
@@ -343,13 +343,11 @@ class Tracer:
         self._singular_start(branch)
         last = branch.points[-1]
         if branch.ended == END_OF_RANGE and last.zero > self.specials.undecided:
-            with self.without(
-                f"The last state, at {self.scene.load} = {last.load:g}, is singular, and was not resolved"
-            ):
+            with self.guard(f"The last state, at {self.scene.load} = {last.load:g}, is singular, and was not resolved"):
                 self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special if s.kind != USER):
-            branch.special.append(self.solver.given(END, last))
+            branch.special.append(self.solver.request(END, last))
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
@@ -365,7 +363,7 @@ class Tracer:
         self.finished()
 
     def _soft_modes(self, branch: Branch) -> None:
-        with self.without(f"Soft modes of {branch.name} were not found"):
+        with self.guard(f"Soft modes of {branch.name} were not found"):
             self.soft.examine(branch)
             branch.explain()  # once more: richer meshes may have decided more than a factorisation does
         for sentence in self.soft.undecided(branch):
@@ -375,6 +373,6 @@ class Tracer:
         with self.solver.system.clock.scope("error bars"):
             for special in branch.special:
                 if isnan(special.error_estimate):
-                    with self.without(f"No error was estimated at {self.scene.load} = {special.point.load:.8g}"):
+                    with self.guard(f"No error was estimated at {self.scene.load} = {special.point.load:.8g}"):
                         self.meshes.richer(special.point.mesh).estimate(special)
                 self.control.label(special)

@@ -20,7 +20,7 @@ from rodfem.linalg.matrices import shared_matrix
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
-    from rodfem.fem.known import Known
+    from rodfem.fem.known import TableFunctions
 
 
 class Places:
@@ -88,7 +88,7 @@ class Assembler:
     ``pointer`` and ``function`` are the form, and the address of what assembles it, for other compiled code.
     """
 
-    def __init__(self, form: Any, cells: Cells, known: Known, load: int, *, inside: bool = False) -> None:
+    def __init__(self, form: Any, cells: Cells, known: TableFunctions, load: int, *, inside: bool = False) -> None:
         self.form, self._code = form, module("fem/assembly")
         ffi, size = self._code.ffi, cells.dofs.shape[1]
         integrals = compat.integrals(form)

@@ -18,7 +18,7 @@ from rodfem.expressions import apply_algebra_lowering, extract_type
 from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import FEW, Discretization, Fields
-from rodfem.fem.known import Known, readable
+from rodfem.fem.known import TableFunctions, readable
 from rodfem.fem.state import Line, load_line
 from rodfem.forms import inertia, lagrangian
 from rodfem.forms.kinematics import curvature, strain
@@ -92,12 +92,12 @@ class Equations:
         u, test, trial = fields.u, ufl.TestFunction(fields.space), ufl.TrialFunction(fields.space)
         dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": self.quadrature_degree(k)})
         self.measures = point_measures(mesh, [*scene.interval, *scene.joints])
-        self.known = Known(fields, self.quadrature_degree(k) // 2)
-        f = self.unknowns = self._named(ufl.split(u))
+        self.known = TableFunctions(fields, self.quadrature_degree(k) // 2)
+        f = self.unknowns = self._parts(ufl.split(u))
         c = self.constants = self._constants(f.load)
-        along = self.along()
+        along = self.rod_place()
         W = scene.energy(along.v, along.k, c)
-        a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
+        a, b = self._parts(ufl.split(test), f.turned), self._parts(ufl.split(trial), f.turned)
         sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
         acting = [x for x in sites if not x[0].nodal]
         acting.sort(key=lambda x: x[2] is not None)  # first along the rod, then at points
@@ -150,7 +150,7 @@ class Equations:
         f, c, own = self.unknowns, self.constants, self.fields.scene.inertia
         kinetic = inertia.rotary(f.q, a.q, b.q, tuple(own.rho_I(c))) * dx
         if f.r is not None and own.along:
-            kinetic += inertia.resistive(self.along().d3, a.r, b.r, own.rho_A(c), own.along(c)) * dx
+            kinetic += inertia.resistive(self.rod_place().d3, a.r, b.r, own.rho_A(c), own.along(c)) * dx
         elif f.r is not None:
             kinetic += inertia.translational(a.r, b.r, own.rho_A(c)) * dx
         return kinetic + sum(_terms("kinetic", sites, dx))
@@ -179,7 +179,7 @@ class Equations:
         fields = self.fields
         return form_compiler.expression(self.compilable(vector), points[:, None], fields.mesh, fields.owned_cells)
 
-    def along(self, wrap: Callable[[Any], Any] = lambda x: x) -> Place:
+    def rod_place(self, wrap: Callable[[Any], Any] = lambda x: x) -> Place:
         """Place of the functions that hold all along the rod; slope and curvatures pass through ``wrap``."""
         f, c, scene = self.unknowns, self.constants, self.fields.scene
         v = strain(scene.free_strains, self.components(f.v, len(scene.free_strains)))
@@ -199,8 +199,8 @@ class Equations:
         if part.s is None:
             x, c, at, measure = along, self.constants, lambda expression: expression, None
         else:
-            x, c, at, measure = self._at(f, part.s)
-        free = [i for i, p in enumerate(part.of.held(c)) if p is None and i != scene.normal]
+            x, c, at, measure = self._place(f, part.s)
+        free = [i for i, p in enumerate(part.of.support(c)) if p is None and i != scene.normal]
         y = [at(f.scalars[name]) for name in names] + blocks
         first, second = (SimpleNamespace(r=None if v.r is None else at(v.r), q=at(v.q)) for v in variations)
         return Site(x, c, y, at(f.turned), scene.normal, free, first, second, self._whole), measure
@@ -214,7 +214,7 @@ class Equations:
         first, last = turning.start(scene.start, np.array(scene.interval), scene.interval)[:, 0]
         return fem.Constant(self.fields.mesh, 2 * np.pi * np.round((last - first) / (2 * np.pi)))
 
-    def _at(self, f: Any, s: float) -> tuple[Place, Any, Any, Any]:
+    def _place(self, f: Any, s: float) -> tuple[Place, Any, Any, Any]:
         """Place at arclength ``s``, the constants there, what restricts a field to it, and its measure."""
         scene = self.fields.scene
         measure, inside = self.measures(s)
@@ -232,7 +232,7 @@ class Equations:
         """Gauss degree twice the degree, and the midpoint rule for linear elements, as in Kumar & Healey (2010)."""
         return 1 if degree == 1 else 2 * degree
 
-    def _named(self, parts: Any, at: Any = None) -> SimpleNamespace:
+    def _parts(self, parts: Any, at: Any = None) -> SimpleNamespace:
         """Fields and scalars of a mixed function by name; ``r`` and ``n`` are None where there are none.
 
         ``turned`` is the field of the rotation, ``q`` the quaternion that it stands for; of a variation its change

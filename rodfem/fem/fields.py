@@ -319,7 +319,7 @@ class Fields:
         return self.comm.size == 1 and not compat.COMPLEX and self.discretization.factors == CHAIN
 
     @property
-    def along(self) -> int:
+    def chain_size(self) -> int:
         """Number of unknowns of the matrices that are factored along the rod; 0 where PETSc is to factor them."""
         return self.unknowns if self.discretization.factors == CHAIN else 0
 

@@ -243,8 +243,8 @@ class Reduced(Formulation):
         out = [Unknown(force, i, UNIT[i]) for i in inside if scene.known_force(i, c) is None]
         for side, end in enumerate(scene.sides):
             if not scene.plain[side]:
-                place = Group(LETTERS[side], f"position of the {SIDES[side]} end", "", Motion.POSITION, end.held)
-                out += [Unknown(place, i, UNIT[i]) for i in inside if end.held(c)[i] is None]
+                place = Group(LETTERS[side], f"position of the {SIDES[side]} end", "", Motion.POSITION, end.support)
+                out += [Unknown(place, i, UNIT[i]) for i in inside if end.support(c)[i] is None]
         return out
 
     def left_out(self, scene: Scene) -> list[str]:
@@ -316,7 +316,7 @@ def _end_position(
     """
     return [
         given(x) if x is not None else scalars.get(f"{LETTERS[side]}{i + 1}", 0.0 if i == scene.normal else None)
-        for i, x in enumerate(scene.sides[side].held(c))
+        for i, x in enumerate(scene.sides[side].support(c))
     ]
 
 

@@ -63,7 +63,7 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
     """Find a basis of all exact symmetries; raises :class:`SceneError` where the equations are no numbers anywhere."""
     fields, parts = equations.fields, elementary_generators(equations.fields)
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
-    moved, dofs_held = np.zeros((len(parts),) * 2), _held(fields)
+    moved, dofs_held = np.zeros((len(parts),) * 2), _clamped(fields)
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
     for seed in range(3):
         state = generic_state(equations, seed)
@@ -88,9 +88,9 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
     asked_at = np.flatnonzero(greatest <= 1e4 * greatest.min())
     conditions, magnitudes = np.vstack([rows[i] for i in asked_at]), np.max([sizes[i] for i in asked_at], axis=0)
     nearly = 1e-6  # of these motions those are chosen that do not change what acts on the rod
-    moving = _moving(_kept(free, conditions, magnitudes, nearly), moved)
+    moving = _moving(_kernel(free, conditions, magnitudes, nearly), moved)
     keeping = moving @ _keeping_loads(equations, [Symmetry(w, parts) for w in moving.T])
-    basis = _moving(_kept(keeping, conditions, magnitudes, INVARIANT), moved)
+    basis = _moving(_kernel(keeping, conditions, magnitudes, INVARIANT), moved)
     return [Symmetry(w, parts) for w in simplest(basis).T]
 
 
@@ -104,7 +104,7 @@ def _moving(motions: np.ndarray, moved: np.ndarray) -> np.ndarray:
     return np.asarray(motions @ combinations[:, squares > EXACT])
 
 
-def _kept(motions: np.ndarray, conditions: np.ndarray, magnitudes: np.ndarray, exact: float) -> np.ndarray:
+def _kernel(motions: np.ndarray, conditions: np.ndarray, magnitudes: np.ndarray, exact: float) -> np.ndarray:
     """Combinations of ``motions`` (m, n) that fulfil ``conditions`` (..., m), ``exact`` relative to their terms."""
     terms = abs(motions.T) @ magnitudes
     terms = np.where(terms > 0, terms, terms.max(initial=0.0) or 1.0)
@@ -122,7 +122,7 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
     lengths = abs(changes / equations.fields.sizes).max(axis=(0, 2))
     lengths = np.where(lengths > 0, lengths, 1.0)
-    along = [_along(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
+    along = [_derivatives(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
     size = max(largest for _, largest in along)
     if size == 0.0:
         return np.eye(len(found))
@@ -130,7 +130,7 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     return np.asarray(_null_space(np.array([row for row, _ in along]) / size, round_off) / lengths[:, None])
 
 
-def _along(state: NodalValues, changes: np.ndarray, step: float = 1e-3) -> tuple[np.ndarray, float]:
+def _derivatives(state: NodalValues, changes: np.ndarray, step: float = 1e-3) -> tuple[np.ndarray, float]:
     """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its largest value."""
     equations, loads = state.equations, state.equations.loads
     assert loads is not None
@@ -163,7 +163,7 @@ def find_motion_along(equations: Equations) -> Symmetry | None:
         residual = state.covector()
         row, terms = changes @ residual, abs(changes) @ abs(residual)
         rows.append(row / terms.max())
-        held.append((changes[:-1] / fields.sizes)[:, _held(fields)].T)
+        held.append((changes[:-1] / fields.sizes)[:, _clamped(fields)].T)
     free = _null_space(np.vstack(held))
     exact, along = np.array(rows)[:, :-1] @ free, np.array(rows)[:, -1]
     # dL[derivative] + sum_j a_j dL[g_j] = 0 at all states, for one a: least squares, and its residual decides
@@ -243,7 +243,7 @@ def simplest(basis: np.ndarray) -> np.ndarray:
     return np.where(abs(rows) > 1e-9, rows, 0.0).T  # the rest is round-off of the elimination
 
 
-def _held(fields: Fields) -> np.ndarray:
+def _clamped(fields: Fields) -> np.ndarray:
     """Local degrees of freedom that an end holds, or that a planar rod does without."""
     dofs = [d.ravel() for d in fields.dofs.values()]
     used = np.unique(np.concatenate(dofs))

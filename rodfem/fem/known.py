@@ -42,7 +42,7 @@ KEPT = {sign * value for sign in (-1.0, 1.0) for value in (0.25, 0.5, 1.0, 2.0, 
 """Numbers that belong to formulas, as the half of an energy."""
 
 
-class Known:
+class TableFunctions:
     """Tables of a scene as a dolfinx Function, None if it has no table.
 
     ``along`` are values of the ``tables`` along the rod in each local cell, (cells, values), in the order in which a
@@ -97,7 +97,7 @@ class Known:
                 )
         return ""
 
-    def cut(self, pieces: int) -> Known:
+    def cut(self, pieces: int) -> TableFunctions:
         """The same on equal pieces of this rank's elements, those of the first piece of all elements before others."""
         out, own = copy(self), self.along[: self._fields.owned_cells]
         values = own.reshape(len(own), self._degree + 1, -1)
@@ -172,7 +172,7 @@ def _moments(table: Table, a: float, b: float, p: int) -> tuple[np.ndarray, floa
     return coefficients, float(weights @ ((values - basis @ coefficients) ** 2).sum(axis=1))
 
 
-def readable(form: Any, mesh: Any, known: Known | None = None) -> Any:
+def readable(form: Any, mesh: Any, known: TableFunctions | None = None) -> Any:
     """Return a form, or an expression, with what is ``known`` for tables, and constants on ``mesh`` for its numbers.
 
     Integers and powers stay.  What is no form, as a sum without terms, is returned as it is.
@@ -191,7 +191,7 @@ class _Readable(MultiFunction):
 
     expr = MultiFunction.reuse_if_untouched
 
-    def __init__(self, mesh: Any, known: Known | None) -> None:
+    def __init__(self, mesh: Any, known: TableFunctions | None) -> None:
         super().__init__()
         self.known, self.constant = known, cache(lambda value: fem.Constant(mesh, value))
 

@@ -214,7 +214,7 @@ def relax(
         step = linear_step(system, x, row, 1.0 / tau)
         if step is None or not isfinite(size := system.norm(step)):
             break
-        if isfinite(longest) and along(system, x, step) < 0:
+        if isfinite(longest) and quadratic_form(system, x, step) < 0:
             tau *= 0.5
             continue
         x.axpy(-LARGEST / max(size, LARGEST), step)  # constraints are mended in one step, however long
@@ -240,7 +240,7 @@ def _arrival(system: System, x: PETSc.Vec, row: PETSc.Vec, accepts: Callable[[PE
     return outcome
 
 
-def along(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:
+def quadratic_form(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:
     """``dx.(K + M/tau) dx = dx.F - dy.c`` of a damped step ``(K + M/tau, C; C^t, 0) (dx, dy) = (F, c)``."""
     equations = system.new_vector()
     system.at(x).residual(equations)

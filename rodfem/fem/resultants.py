@@ -191,7 +191,7 @@ class Resultants:
     def _components(self) -> list[Any]:
         """Strain, curvature, force and moment as expressions of the state, one after the other."""
         e, fields, scene = self.shape.system.equations, self.shape.system.fields, self.shape.system.scene
-        f, c, along = e.unknowns, e.constants, e.along(ufl.variable)
+        f, c, along = e.unknowns, e.constants, e.rod_place(ufl.variable)
         density = scene.energy(along.v, along.k, c)
         for part in scene.parts:
             if isinstance(part.of, Constraint) and part.s is None:
@@ -277,7 +277,7 @@ def _of_support(resultants: Resultants, x: PETSc.Vec, side: int, contact: np.nda
     if "r" in fields.dofs:
         return Reaction(summed(mine * work[fields.dofs["r"][cell, node]]), moment)
     rows = dict(zip(fields.scalars, fields.copies.T, strict=False))
-    for i in (i for i, held in enumerate(scene.sides[side].held(state.constants())) if held is None):
+    for i in (i for i, held in enumerate(scene.sides[side].support(state.constants())) if held is None):
         force[i] = summed(work[rows.get(f"{LETTERS[side]}{i + 1}", [])].sum())
     return Reaction(force, moment)
 

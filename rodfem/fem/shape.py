@@ -169,7 +169,7 @@ class Shape:
         """
         system, out, c = self.system, given.local.copy(), given.constants()
         before, inside, chord = self.integrals(self.slopes(given))
-        left, right = ([None if p is None else float(p) for p in end.held(c)] for end in system.scene.sides)
+        left, right = ([None if p is None else float(p) for p in end.support(c)] for end in system.scene.sides)
         a = np.array([p if p is not None else (q or 0.0) - d for p, q, d in zip(left, right, chord, strict=True)])
         b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, chord, strict=True)])
         x = (self.s - system.scene.interval[0])[..., None] / system.scene.length

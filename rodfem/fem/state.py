@@ -103,7 +103,7 @@ class NodalValues:
         return dict(zip(self.fields.scalars, self.local[self.fields.copies[0]].tolist(), strict=False))
 
     @property
-    def named(self) -> dict[str, Any]:
+    def parts(self) -> dict[str, Any]:
         """Values of all fields and scalars by name: see :meth:`~rodfem.fem.fields.Fields.filled`."""
         return {name: self.values(name) for name in self.fields.dofs} | self.scalars
 
@@ -194,12 +194,12 @@ class State(NodalValues):
                 phase, push = system.phase.conditions[i], system.phase.pushes[i]
                 if phase is not None and push is not None:
                     out.axpy(value, push)
-                    value = self.along(phase) - system.phase.offsets[i]
+                    value = self.product(phase) - system.phase.offsets[i]
                 if system.has_scalars:
                     out.setValue(system.drifts[i], value)
                 out.assemble()
 
-    def along(self, phase: PETSc.Vec) -> float:
+    def product(self, phase: PETSc.Vec) -> float:
         """Product with a covector that has no component along scalars."""
         own, comm = self.fields.free_owned, self.fields.comm
         mine = float(phase.array_r[: len(own)].real @ self.local[own])

@@ -242,7 +242,7 @@ class Generators:
         return sp.vstack(every, format="csr")[rows][:, self._columns]
 
     @cached_property
-    def _back(self) -> sp.csr_matrix:
+    def _transposes(self) -> sp.csr_matrix:
         return self._stacked([A.T.tocsr() for A in self._linear])
 
     def _constant(self, state: State) -> np.ndarray:
@@ -271,7 +271,7 @@ class Generators:
     def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
         """``A^t y`` of all generators, (count, own rows)."""
         own = self.system.gathered(covector)[: len(self._columns)]
-        return times(self._back, own).reshape(len(self.motions), -1)
+        return times(self._transposes, own).reshape(len(self.motions), -1)
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
         """Vector of the system with these own rows, without component along drifts."""

@@ -103,7 +103,7 @@ class System:
         self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
-        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, self.natural_sizes)
+        self.lu = factors_of("lu", comm, self.fields.chain_size, self.fields.dense_rows, self.natural_sizes)
         self.compiled = compiled_newton(self, self.matrix, self.lu)
 
     def _rigid(self) -> Generators | None:

@@ -50,7 +50,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.kumar_healey.coordinates import Coordinates, MappedPencil
 from rodfem.kumar_healey.null_space import kernel
 from rodfem.linalg.orthogonal import generic
-from rodfem.stability.assessment import Assessor, Found, Method, SymmetricMethod
+from rodfem.stability.assessment import Assessor, Eigenvalues, Method, SymmetricMethod
 from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.spectrum import FINITE, krylov
 
@@ -74,7 +74,7 @@ class ReducedPencil:
         self.K, self.C, self.M = pencil.K, pencil.C, pencil.M
         self.kernel = kernel(self.C, pencil.place)
 
-    def near(self, number: int, target: float) -> Reduced:
+    def nearest(self, number: int, target: float) -> Reduced:
         """Return the ``number`` eigenvalues nearest to ``target``; :class:`ConvergenceError` if fewer are found."""
         n, solve = self.kernel.dimension, self.solver(target)
 
@@ -156,25 +156,25 @@ class Reduction(Method):
         super().__init__(work)
         self.coordinates = Coordinates(work.system)
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """With a shift below the spectrum."""
-        below = self.work.below(x)
-        found = self.reduced(x).near(number, below.shift)
+        below = self.work.low_pencil(x)
+        found = self.reduced(x).nearest(number, below.shift)
         return self.lifted(found, below.certifies(found.values), 1)
 
-    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+    def nearest(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """With a shift near zero."""
-        found = self.reduced(x).near(number, 1e-3 * scale_in_units(self.work.system))  # where it is singular at zero
-        return Found(self.work.one * found.values, [], found.errors, factorisations=1)
+        found = self.reduced(x).nearest(number, 1e-3 * scale_in_units(self.work.system))  # where it is singular at zero
+        return Eigenvalues(self.work.one * found.values, [], found.errors, factorisations=1)
 
     def reduced(self, x: PETSc.Vec) -> ReducedPencil:
         """The reduced pencil at ``x``, symmetry modes left out."""
         return ReducedPencil(self.coordinates.without_modes(x))
 
-    def lifted(self, found: Reduced, certified: bool, made: int, note: str = "") -> Found:
+    def lifted(self, found: Reduced, certified: bool, made: int, note: str = "") -> Eigenvalues:
         """What was ``found``, as vectors of the system in its units, with so many factorisations ``made``."""
         vectors = self.coordinates.lift(found.vectors)
-        return Found(self.work.one * found.values, vectors, found.errors, certified, made, note)
+        return Eigenvalues(self.work.one * found.values, vectors, found.errors, certified, made, note)
 
 
 class Cayley(Reduction, SymmetricMethod):
@@ -184,16 +184,16 @@ class Cayley(Reduction, SymmetricMethod):
         super().__init__(work)
         self._shift: float | None = None
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """With the shift of the last state; with a new one where a count finds some missing."""
-        below, reduced = self.work.below(x), self.reduced(x)
+        below, reduced = self.work.low_pencil(x), self.reduced(x)
         most, made = min(number + 2, reduced.kernel.dimension), 0
         for fresh in (False, True):
             if self._shift is None or fresh:
-                self._shift, made = cayley_shift(reduced.near(3, below.shift).values), made + 1
+                self._shift, made = cayley_shift(reduced.nearest(3, below.shift).values), made + 1
             try:
                 # the first two are equally far from the shift: more are asked for than wanted where they are multiple
-                found, made = reduced.near(most, self._shift), made + 1
+                found, made = reduced.nearest(most, self._shift), made + 1
             except ConvergenceError:
                 continue
             found = Reduced(found.values[:number], found.vectors[:, :number], found.errors[:number])
@@ -201,7 +201,7 @@ class Cayley(Reduction, SymmetricMethod):
                 certified, note = True, ""
                 break
         else:
-            found, made = reduced.near(number, below.shift), made + 1
+            found, made = reduced.nearest(number, below.shift), made + 1
             certified = below.certifies(found.values)
             note = ", but a count found some missing (equal eigenvalues): completed by shift-invert"
         if number > 1:

@@ -84,7 +84,7 @@ def compile_ahead(*names: str) -> None:
     """Begin to compile in other processes what :func:`module` finds then in the cache, unless that has it."""
     for name in names:
         full = _full_name(name)
-        if full not in _JOBS and _found(name) is None:
+        if full not in _JOBS and _library(name) is None:
             _JOBS[full] = Job(partial(_compile, name))
 
 
@@ -94,7 +94,7 @@ def module(name: str) -> Any:
     full = _full_name(name)
     if full in _JOBS:
         _JOBS.pop(full).wait()
-    found = _found(name) or _compile(name)
+    found = _library(name) or _compile(name)
     spec = importlib.util.spec_from_file_location(full, found)
     assert spec is not None and spec.loader is not None
     out = importlib.util.module_from_spec(spec)
@@ -130,7 +130,7 @@ def _full_name(name: str) -> str:
     return f"rodfem_{Path(name).name}_{key}"
 
 
-def _found(name: str) -> Path | None:
+def _library(name: str) -> Path | None:
     """Compiled module next to its code, from the wheel, or in the cache: to list that takes long, it has many files."""
     full = _full_name(name)
     places = ((PACKAGE / name).parent, code_cache.folder())

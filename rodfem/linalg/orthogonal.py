@@ -43,7 +43,7 @@ def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
     return out
 
 
-def across(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], known: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
+def complement(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], known: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
     """Orthonormal basis in a metric of what ``vectors`` span other than the ``known`` ones, which are orthonormal.
 
     What is less than half of a vector is round-off, or the error of the vectors: it spans nothing new.

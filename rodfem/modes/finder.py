@@ -42,7 +42,7 @@ from rodfem.stability.inertia import NOISE
 from rodfem.stability.near_zero import soft_limit
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
-from rodfem.stability.symmetric import CONVERGED, Found, SymmetricSolver
+from rodfem.stability.symmetric import CONVERGED, Eigenvalues, SymmetricSolver
 from rodfem.tolerances import SAME_EIGENVALUE
 
 SEEN = 1e-3
@@ -172,11 +172,15 @@ class ModeFinder:
         if not verdict.vectors:
             raise InputError("Counting alone finds no modes: choose another method than 'count'.")
         pencil = self.assessor.symmetric.at(x)
-        modes, vectors, duals = self._turned(x, Found(verdict.values, verdict.vectors, verdict.errors), pencil.mass)
+        modes, vectors, duals = self._turned(
+            x, Eigenvalues(verdict.values, verdict.vectors, verdict.errors), pencil.mass
+        )
         weights = _stacked([self.motions.dual(x, y) for y in duals])
         return modes, [modes.displacement, modes.rotation, *weights], _rounded(pencil, vectors, verdict.values)
 
-    def _turned(self, x: PETSc.Vec, found: Found, mass: PETSc.Mat) -> tuple[Few, list[PETSc.Vec], list[PETSc.Vec]]:
+    def _turned(
+        self, x: PETSc.Vec, found: Eigenvalues, mass: PETSc.Mat
+    ) -> tuple[Few, list[PETSc.Vec], list[PETSc.Vec]]:
         """Modes of a conservative state, and symmetries; the vectors of the former, and the duals of all."""
         vectors = [v.copy() for v in found.vectors]
         orthonormalize(vectors, mass)

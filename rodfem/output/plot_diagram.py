@@ -59,7 +59,7 @@ def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
     """Figure of a diagram, as :func:`draw_diagram` writes it, or that of axes that are ``given``: it is drawn there."""
     branches = diagram["branches"]
     with matplotlib.rc_context(style.STYLE):
-        figure, axes = style.sheet(diagram["title"], _about(diagram), given)
+        figure, axes = style.sheet(diagram["title"], _subtitle(diagram), given)
         handles, lines = draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
         if given is None and _is_flat(branches):
@@ -206,7 +206,7 @@ def _label_places(curve: Floats, half: Floats) -> Floats:
     return np.stack([curve[rows] + away, curve[rows] - away], axis=1).reshape(-1, 2)
 
 
-def _about(diagram: Mapping[str, Any]) -> str:
+def _subtitle(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
     d, special = diagram.get("discretization"), [s for b in diagram["branches"] for s in b.get("special", [])]
     parts = [mesh_in_words(d)] if d else []
@@ -228,7 +228,7 @@ def _accuracy(special: Branches) -> list[str]:
 # --- branches between their rows
 
 
-def between(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
+def dense_rows(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
     """Loads and values of a column between rows, (7, 2), by the row before, of the steps that are no straight lines.
 
     A long step, as the first one from a branch point, would show as a chord.  The load is the cubic Hermite spline of
@@ -252,7 +252,7 @@ def between(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
 
 def drawn(branch: Mapping[str, Any]) -> list[tuple[Piece, Floats]]:
     """Pieces of a branch, each with its curve (k, 2) of loads and ordinates, with points between rows."""
-    rows, more, found = _places(branch), between(branch, "ordinate"), []
+    rows, more, found = _places(branch), dense_rows(branch, "ordinate"), []
     for piece in pieces_of(branch):
         parts = [part for i in range(piece.first, piece.last) for part in (rows[i : i + 1], more.get(i, rows[:0]))]
         found.append((piece, np.vstack([*parts, rows[piece.last]])))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, KINDS, USER
 from rodfem.file_format import LOCUS
-from rodfem.output.style import FONT, HALO, PALETTE, STYLE, explain, named, save, sheet
+from rodfem.output.style import FONT, HALO, PALETTE, STYLE, axis_name, explain, save, sheet
 from rodfem.output.words import mesh_in_words, rounded_up
 from rodfem.tolerances import TINY
 
@@ -48,12 +48,12 @@ def draw_locus(loci: Sequence[Locus], path: Path) -> Path:
     for one in loci:
         LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
     with matplotlib.rc_context(STYLE):
-        figure, axes = sheet(loci[0]["title"], _about(loci))
+        figure, axes = sheet(loci[0]["title"], _subtitle(loci))
         axes.margins(0.04, 0.12)
         for one in loci:
             _draw_curve(axes, one, loci)
         words, units = (loci[0].get(name, ("", "")) for name in ("words", "units"))
-        load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
+        load, other = (axis_name(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
         axes.set_xlabel(other, fontsize=FONT + 1)
         axes.set_ylabel(load, fontsize=FONT + 1)
         known = any(pair[0] >= 0 for one in loci for pair in one["columns"]["index"])
@@ -92,7 +92,7 @@ def _write_indices(axes: Axes, one: Locus) -> None:
     axes.annotate(f"{low}|{high}", tuple(rows[row]), away, textcoords="offset points", color=colour, **look)
 
 
-def _about(loci: Sequence[Locus]) -> str:
+def _subtitle(loci: Sequence[Locus]) -> str:
     """Return the line that names the discretisation and the estimated error, and at how many points it was."""
     errors = [max(e) for one in loci for e in one["columns"]["error"] if e[0] is not None]
     text = mesh_in_words(loci[0]["discretization"])

@@ -109,10 +109,10 @@ def tex(text: str, always: bool = False) -> str:
 def axis_label(diagram: Mapping[str, Any]) -> str:
     """Load of a diagram for its axis: in words, where the scene has some, its symbol, and its unit if it has one."""
     words, unit = (str(diagram.get(f"parameter_{what}") or "") for what in ("words", "unit"))
-    return named(words, diagram["parameter_label"], unit)
+    return axis_name(words, diagram["parameter_label"], unit)
 
 
-def named(words: str, label: str, unit: str = "") -> str:
+def axis_name(words: str, label: str, unit: str = "") -> str:
     """A parameter for its axis: in words, where there are some, its symbol in TeX, and its ``unit`` if it has one."""
     symbol, words = tex(symbol_of(label), always=True), words.replace("$", "")
     return with_unit(f"{words} {symbol}" if words else symbol, unit)

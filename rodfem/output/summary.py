@@ -89,7 +89,7 @@ def called(name: str) -> str:
     return f"the {name}" if name == FIRST_BRANCH else name
 
 
-def _named(name: str) -> str:
+def _capital(name: str) -> str:
     """Name of a branch at the beginning of a sentence."""
     return name[:1].upper() + name[1:]
 
@@ -99,7 +99,7 @@ def _names(branches: Sequence[Data]) -> str:
     names = [called(branch["name"]) for branch in branches]
     if len(names) > MOST:
         return f"{len(names)} other branches"
-    return _named(" and ".join(filter(None, (", ".join(names[:-1]), names[-1]))))
+    return _capital(" and ".join(filter(None, (", ".join(names[:-1]), names[-1]))))
 
 
 # --- one branch
@@ -124,7 +124,7 @@ def _of_branch(branch: Data, data: Data) -> str:
 
 def _subject(branch: Data, data: Data) -> str:
     """Name of a branch, and where it comes from, as the beginning of a sentence."""
-    name, parent = _named(branch["name"]), branch["parent"]
+    name, parent = _capital(branch["name"]), branch["parent"]
     if branch is data["branches"][0]:
         return "The first branch" if branch["name"] == FIRST_BRANCH else f"The first branch, {branch['name']},"
     if parent is None:
@@ -245,13 +245,13 @@ def _ranges(data: Data) -> Iterator[str]:
     kinds = STABLE, UNDECIDED, PLANAR
     stable, undecided, planar = ([_cover(x.loads) for x in _intervals(data, kind)] for kind in kinds)
     lost = list(_unlocated(data))
-    for a, b in _without(stable + lost, *sorted(data["range"])):
+    for a, b in _gaps(stable + lost, *sorted(data["range"])):
         but = ", but there are states of undecided stability" if _overlap(undecided, a, b) else ""
         state = "state that is stable in space, too," if _overlap(planar, a, b) else "stable state"
-        yield f"From {_between(data, a, b, 'to')} no {state} was found{but}."
+        yield f"From {_interval(data, a, b, 'to')} no {state} was found{but}."
     for step in lost:
-        for a, b in _without(stable, *step):
-            yield f"Stability is not examined between {_between(data, a, b, 'and')}, where it changes."
+        for a, b in _gaps(stable, *step):
+            yield f"Stability is not examined between {_interval(data, a, b, 'and')}, where it changes."
 
 
 def _intervals(data: Data, kind: str) -> list[Interval]:
@@ -273,7 +273,7 @@ def _unlocated(data: Data) -> Iterator[tuple[float, float]]:
             yield _cover(_step(one, after)[1])
 
 
-def _without(ranges: Sequence[tuple[float, float]], low: float, high: float) -> Iterator[tuple[float, float]]:
+def _gaps(ranges: Sequence[tuple[float, float]], low: float, high: float) -> Iterator[tuple[float, float]]:
     """Parts of an interval of loads that no range covers, from below."""
     reached, least = low, SAME_SPECIAL * (high - low)
     for a, b in [*sorted((a, b) for a, b in ranges if b > low and a < high), (high, high)]:
@@ -288,7 +288,7 @@ def _coexistence(data: Data) -> Iterator[str]:
     found = [(*pair, *both) for pair in pairs if (both := _shared(*pair))]
     for one, other, a, b in found[:MOST]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
-        states, verb = f"From {_between(data, a, b, 'to')} two stable states", f"coexist, of {names}"
+        states, verb = f"From {_interval(data, a, b, 'to')} two stable states", f"coexist, of {names}"
         if _is_resolved(one) and _is_resolved(other):
             yield f"{states} {verb}: hysteresis is possible."
         else:
@@ -339,7 +339,7 @@ def _open(branches: Sequence[Data], data: Data) -> Iterator[str]:
 # --- loads
 
 
-def _between(data: Data, a: float, b: float, word: str) -> str:
+def _interval(data: Data, a: float, b: float, word: str) -> str:
     """Two loads with a word between them."""
     first, last = distinct_digits(a, b, width=_width(data))
     return f"{_load(data)} = {first} {word} {last}"

@@ -89,7 +89,7 @@ class Entry:
         """What a file has of a point; numbers that are not finite become null."""
         return plain(getattr(point, ATTRIBUTES.get(self.name, self.name)) if self.of is None else self.of(point))
 
-    def kept(self, column: Sequence[Any]) -> bool:
+    def occurs(self, column: Sequence[Any]) -> bool:
         """Whether a branch has this column: it is always there, or a row has something in it."""
         empty: dict[str, Any] = {"(P, ": [], "null": None, "text": ""}
         nothing = next((value for part, value in empty.items() if part in self.type), 0)
@@ -118,7 +118,7 @@ def branch_data(branch: Branch, rates: bool = False) -> dict[str, Any]:
         "name": branch.name,
         "parent": list(branch.parent) if branch.parent else None,
         "ended": branch.ended,
-        "columns": {entry.name: column for entry, column in columns.items() if entry.kept(column)},
+        "columns": {entry.name: column for entry, column in columns.items() if entry.occurs(column)},
         "special": [special_data(special) for special in branch.special],
         "singular_start": branch.singular_start,
         "image": branch.image,

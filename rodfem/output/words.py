@@ -136,7 +136,7 @@ def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
     for branch, special in ((b, special) for b in data["branches"] for special in b["special"]):
         row = row_of(branch, special["row"])
         found = {name: _read(special, name, inf, scale * (name == "ordinate")) for name in READ}
-        found |= _given(branch, special)
+        found |= _request(branch, special)
         load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in found.values())
         index = index_in_words(special, row) + (f", {special['zero']} zero" if special["zero"] else "")
         yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, _remarks(special, row)
@@ -155,9 +155,9 @@ def _read(special: Data, name: str, unknown: float | None, scale: float = 0.0) -
     return "" if bar is None else number(special[name], bar, special.get("resolved"), scale)
 
 
-def _given(branch: Data, special: Data) -> dict[str, str]:
+def _request(branch: Data, special: Data) -> dict[str, str]:
     """Load of a special point by its name where it is given, and exact."""
-    given = KINDS[special["kind"]].given and not is_solved(branch, special)
+    given = KINDS[special["kind"]].request and not is_solved(branch, special)
     return {"load": f"{special['load']:.10g}"} if given else {}
 
 
@@ -196,7 +196,7 @@ def readings_of(branch: Data, natural: Mapping[str, float]) -> list[dict[str, st
     found = [_reading(row_of(branch, row), natural) for row in range(rows)]
     for special in branch["special"]:
         here = {name: text for name in READ if (text := _read(special, name, None))}
-        given = {name: text + GIVEN for name, text in _given(branch, special).items()}
+        given = {name: text + GIVEN for name, text in _request(branch, special).items()}
         found[special["row"]] = _derived(special, branch) | here | given
     return found
 
@@ -267,7 +267,7 @@ def _doubts(branch: Data) -> dict[int, list[str]]:
 def _at_special(row: Data, specials: Sequence[Data]) -> Words | None:
     """Words of a row with a special point at which something happens; None without one."""
     kinds = [(KINDS[special["kind"]], special) for special in specials]
-    special = next((x for kind, x in kinds if not kind.given and kind.test != "number"), None)
+    special = next((x for kind, x in kinds if not kind.request and kind.test != "number"), None)
     if special is None or special["negative_before"] is None:
         return None
     before, after = special["negative_before"], special["negative_after"]

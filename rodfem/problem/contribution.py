@@ -177,7 +177,7 @@ class Contribution:
         """Fields that it adds, for a rotation of this degree."""
         return []
 
-    def held(self, c: Constants) -> list[Any]:
+    def support(self, c: Constants) -> list[Any]:
         """Position there: three expressions, None where it is free."""
         return [None] * 3
 
@@ -344,7 +344,7 @@ def acting(constraint: Constraint, scene: Scene) -> Constraint:
     turns, moves = (np.array([_slope(constraint, scene, x, y) for x in STATES[:2]]).any(axis=0) for y in ("q", "r"))
     if turns.any() or not moves.any():
         return constraint
-    held = [[x is not None for x in end.held(scene.constants())] for end in scene.sides]
+    held = [[x is not None for x in end.support(scene.constants())] for end in scene.sides]
     on_it = (np.array(held) | (np.arange(3) == scene.normal) | ~moves).all(axis=1)
     tangent = _in_surface(constraint, scene, 0), _in_surface(constraint, scene, 1)
     spare = bool(scene.closed | on_it.all())
@@ -364,7 +364,7 @@ def _in_surface(constraint: Constraint, scene: Scene, side: int) -> bool:
     if scene.closed or end.turning != AXIS:  # the right end of a ring has the tangent of the left one
         return end.turning == HELD or (scene.closed and side == 1)
     d = directors(np.array([number_of(x) for x in end.frame(c)]))
-    r = [0.0 if x is None else number_of(x) / scene.length for x in end.held(c)]
+    r = [0.0 if x is None else number_of(x) / scene.length for x in end.support(c)]
     try:
         normal = _slope(constraint, scene, (IDENTITY, r, UNDEFORMED, (0.0, 0.0, 0.0)), "r")
     except ArithmeticError:  # at no place of the surface

@@ -94,13 +94,13 @@ class End(Contribution):
     guide: ClassVar[Direction] = (0.0, 0.0, 0.0)
     """Direction in which it slides where that need not be e1, e2 or e3; zero without one."""
 
-    def held(self, c: Constants) -> list[Any]:
+    def support(self, c: Constants) -> list[Any]:
         """Position of the end: three expressions, None where the end is free."""
         return [None] * 3 if self.position is None else list(self.position(c))
 
     def fixed(self, c: Constants) -> np.ndarray:
         """Directions in which the position is held, as rows of (m, 3)."""
-        return np.array([e for e, x in zip(UNIT, self.held(c), strict=True) if x is not None]).reshape(-1, 3)
+        return np.array([e for e, x in zip(UNIT, self.support(c), strict=True) if x is not None]).reshape(-1, 3)
 
     def frame(self, c: Constants) -> Any:
         """Quaternion at which the directors are held, None where they are free."""
@@ -122,7 +122,7 @@ class End(Contribution):
 
     def clamps(self, block: Block, c: Constants) -> list[bool]:
         """Components of a continuous field that are given at the end; one for all of a rotation or a multiplier."""
-        held = [x is not None for x in self.held(c)]
+        held = [x is not None for x in self.support(c)]
         if block.name == "r":
             return held
         if block.along:  # what holds the end fulfils the constraint there
@@ -132,7 +132,7 @@ class End(Contribution):
     def contact_force(self, c: Constants) -> list[Any]:
         """Components of the contact force that dead forces prescribe, pulling outwards; None elsewhere."""
         force = [0.0] * 3 if self.force is None else self.force(c)
-        return [f if x is None else None for f, x in zip(force, self.held(c), strict=True)]
+        return [f if x is None else None for f, x in zip(force, self.support(c), strict=True)]
 
     @property
     def dead(self) -> bool:
@@ -189,7 +189,7 @@ class End(Contribution):
         if self.rotation is None or self.fixed_rotation is not None:
             return []
         if normal is None:
-            return list(UNIT) if self.hinge is None else across(self.hinge)
+            return list(UNIT) if self.hinge is None else normals(self.hinge)
         along = self.hinge is not None and abs(self.hinge[normal]) > 0.999 * float(np.linalg.norm(self.hinge))
         return [] if along else [UNIT[normal]]
 
@@ -246,7 +246,7 @@ def _size(what: str, values: Any, size: int) -> float:
     return norm if norm < np.inf else np.nan
 
 
-def across(axis: Direction) -> list[Direction]:
+def normals(axis: Direction) -> list[Direction]:
     """Two unit vectors across an axis."""
     return [tuple(map(float, row)) for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
 
@@ -309,14 +309,14 @@ class JoinedEnd(End):
     def lagrangian(self, at: Site) -> Iterator[Any]:
         """Share of this end in the equations of closure, with their multipliers."""
         sign, size = 1.0 if self.last else -1.0, 4 if at.whole is None else 1
-        turned = [at.turned] if size == 1 else at.turned if self.last else self.ahead(at.turned)
+        turned = [at.turned] if size == 1 else at.turned if self.last else self.image(at.turned)
         if self.last and size == 1:
             yield -at.y[0] * at.whole
         yield (-self.sign if size == 4 and not self.last else sign) * _dot(at.y[:size], turned, range(size))
         if len(at.y) > size:
             yield sign * _dot(at.y[size:], at.x.r, at.free)
 
-    def ahead(self, q: Any) -> Any:
+    def image(self, q: Any) -> Any:
         """Quaternion ``q`` turned by the ring's turn about d3."""
         c, s = np.cos(self.turn / 2), np.sin(self.turn / 2)
         return [c * q[0] - s * q[3], c * q[1] + s * q[2], c * q[2] - s * q[1], c * q[3] + s * q[0]] if self.turn else q
@@ -328,7 +328,7 @@ class JoinedEnd(End):
         if self.turn and scene.planar is not None:
             raise SceneError(f"A planar ring cannot have a turn of {self.turn:g}: leave planar or the turn out.")
         first, last = scene.start(np.array(scene.interval))
-        if self.sign * np.dot(self.ahead(first), last) <= 0:
+        if self.sign * np.dot(self.image(first), last) <= 0:
             turn = f" turned by {self.turn:g} about d3" if self.turn else ""
             what = f"make q(l) = {self.sign:+g} q(0){turn}, or choose Ring(odd={self.sign > 0})"
             raise SceneError(f"The start of the ring does not end as it begins: {what}.")
@@ -347,23 +347,23 @@ class SlidingHinge(End):
 
     guide: Direction = (0.0, 0.0, 1.0)  # type: ignore[misc]
 
-    def held(self, c: Constants) -> list[Any]:
+    def support(self, c: Constants) -> list[Any]:
         """Position of the end: None in the components that move."""
-        return [None if t else p for t, p in zip(self.guide, super().held(c), strict=True)]
+        return [None if t else p for t, p in zip(self.guide, super().support(c), strict=True)]
 
     def fixed(self, c: Constants) -> np.ndarray:
         """Directions across the guide, (2, 3)."""
-        return np.array(across(self.guide))
+        return np.array(normals(self.guide))
 
     def guiding(self) -> list[Direction | None]:
         """Unit vectors across the direction, among the components that move."""
         moving = np.flatnonzero(self.guide)
-        vectors = np.array(across(tuple(self.guide[i] for i in moving))).reshape(-1, len(moving))
+        vectors = np.array(normals(tuple(self.guide[i] for i in moving))).reshape(-1, len(moving))
         return [tuple(map(float, row)) for row in vectors @ np.eye(3)[moving]]
 
     def distances(self, at: Site) -> list[Any]:
         """Distances along these vectors."""
-        apart = [r - p for r, p in zip((at.x.r[i] for i in range(3)), super().held(at.c), strict=True)]
+        apart = [r - p for r, p in zip((at.x.r[i] for i in range(3)), super().support(at.c), strict=True)]
         return [sum(d * x for d, x in zip(v, apart, strict=True) if d) for v in self.guiding() if v]
 
     def check(self, side: str, scene: Scene) -> None:
@@ -371,7 +371,7 @@ class SlidingHinge(End):
         if scene.normal is not None and self.guide[scene.normal]:
             raise SceneError(f"The guide of the {side} end leaves the plane across {scene.planar}: turn it into that.")
         super().check(side, scene)
-        if None in super().held(scene.constants()):
+        if None in super().support(scene.constants()):
             raise SceneError(f"The guide of the {side} end has no place: give three components of a point on it.")
 
 
@@ -382,9 +382,9 @@ class CircularGuide(End):
     radius: float = 1.0
     normal: int = 2
 
-    def held(self, c: Constants) -> list[Any]:
+    def support(self, c: Constants) -> list[Any]:
         """Position of the end: None in the plane of the circle."""
-        return [p if i == self.normal else None for i, p in enumerate(super().held(c))]
+        return [p if i == self.normal else None for i, p in enumerate(super().support(c))]
 
     def guiding(self) -> list[Direction | None]:
         """One force, towards the centre."""
@@ -392,7 +392,7 @@ class CircularGuide(End):
 
     def distances(self, at: Site) -> list[Any]:
         """Distance from the circle, to first order."""
-        centre, plane = super().held(at.c), [i for i in range(3) if i != self.normal]
+        centre, plane = super().support(at.c), [i for i in range(3) if i != self.normal]
         return [(sum((at.x.r[i] - centre[i]) ** 2 for i in plane) - self.radius**2) / (2 * self.radius)]
 
     def check(self, side: str, scene: Scene) -> None:

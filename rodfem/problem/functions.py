@@ -250,7 +250,7 @@ def watched(c: Constants) -> tuple[Constants, set[str]]:
     return Watched(**vars(c)), asked
 
 
-class Known(SimpleNamespace):
+class CheckedPlace(SimpleNamespace):
     """A place; an attribute that it does not have is a :class:`SceneError`."""
 
     def __getattr__(self, name: str) -> Any:
@@ -268,7 +268,7 @@ class Known(SimpleNamespace):
 def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
     """Make a place of quaternion ``q``, rotation ``R``, arclength ``s``, centreline ``r`` (None: none) and ``more``."""
     d = {f"d{i + 1}": ufl.as_vector([R[j, i] for j in range(3)]) for i in range(3)}
-    return Known(q=q, R=R, s=s, **d, **({} if r is None else {"r": r}), **more)
+    return CheckedPlace(q=q, R=R, s=s, **d, **({} if r is None else {"r": r}), **more)
 
 
 def some_places(

@@ -448,7 +448,7 @@ class Scene(Contribution, metaclass=Stated):
     @property
     def joints(self) -> tuple[float, ...]:
         """Arclengths inside the rod that must be element boundaries, in ascending order; one for what is one place."""
-        return self._apart({*self.breaks, *(part.s for part in self.parts if part.s is not None)})
+        return self._distinct({*self.breaks, *(part.s for part in self.parts if part.s is not None)})
 
     @property
     def stops(self) -> tuple[float, ...]:
@@ -459,9 +459,9 @@ class Scene(Contribution, metaclass=Stated):
     def vertices(self) -> tuple[float, ...]:
         """Joints, and the knots of piecewise linear tables where these are few: there elements of a mesh meet."""
         knots = {s for table, name in self.tables if name == "s" for s in table.corners}
-        return self._apart({*self.joints, *(knots if len(knots) < 64 else ())})  # of more an element has several
+        return self._distinct({*self.joints, *(knots if len(knots) < 64 else ())})  # of more an element has several
 
-    def _apart(self, places: set[float]) -> tuple[float, ...]:
+    def _distinct(self, places: set[float]) -> tuple[float, ...]:
         """Places inside the rod in ascending order, one for what is one place."""
         inner = [s for s in sorted(places) if self.is_inside(s)]
         return tuple(s for i, s in enumerate(inner) if not i or not same_place(inner[i - 1], s, self.length))
@@ -512,7 +512,7 @@ class Scene(Contribution, metaclass=Stated):
 
     def end_positions(self, c: Constants) -> list[tuple[Any, Any]]:
         """Component by component the positions of both ends; that of the other end, or zero, where one is free."""
-        held = zip(*(end.held(c) for end in self.sides), strict=True)
+        held = zip(*(end.support(c) for end in self.sides), strict=True)
         pairs = [(right, right) if left is None else (left, left if right is None else right) for left, right in held]
         return [(0.0, 0.0) if pair == (None, None) else pair for pair in pairs]
 

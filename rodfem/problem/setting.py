@@ -98,7 +98,7 @@ class Setting:
         return total if total.any() else None
 
     @property
-    def down(self) -> Floats | None:
+    def gravity(self) -> Floats | None:
         """Direction of the dead force along the rod (3,), of gravity, say; None where there is none."""
         total = np.zeros(3) if self.distributed is None else self.distributed[1].sum(axis=0)
         return total if total.any() else None

@@ -64,7 +64,7 @@ def _support(scene: Scene, s: float, end: End, sample: Sample, springs: Floats |
         loads[1] *= end.turning != HELD
     if end.rotation is not None:
         frame = np.array([number_of(x) for x in end.frame(c)])
-    held = np.array([p is not None for p in end.held(c)])
+    held = np.array([p is not None for p in end.support(c)])
     return Support(
         s=s,
         kind=kind_of(len(end.fixed(c)), end.turning, bool(springs.any())),

@@ -277,7 +277,7 @@ def check_plane(scene: Scene) -> None:
 
 
 def _check_ends(scene: Scene, normal: int, c: Constants) -> None:
-    left, right = (end.held(c)[normal] for end in scene.sides)
+    left, right = (end.support(c)[normal] for end in scene.sides)
     if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
         held = f"at {float(left):g} and {float(right):g} along {scene.planar}"
         raise SceneError(f"The ends are held {held}, across which the rod is planar: hold both at the same.")

@@ -249,7 +249,7 @@ def check_reach(scene: Scene) -> None:
     if 2 in scene.free_strains or 0 in scene.free_strains:
         return
     for load in scene.loads():
-        left, right = (end.held(scene.constants(load)) for end in scene.sides)
+        left, right = (end.support(scene.constants(load)) for end in scene.sides)
         if None not in left and None not in right:
             distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5
             if distance > scene.length * (1 + NEGLIGIBLE):

@@ -21,7 +21,7 @@ from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json
 from rodfem.modes.modes import RIGID
 from rodfem.output.pieces import endings, pieces_of
-from rodfem.output.plot_diagram import between
+from rodfem.output.plot_diagram import dense_rows
 from rodfem.output.plot_frequencies import SPECIAL, curves_of, ranges_of, top
 from rodfem.output.plot_locus import LINES, in_words, plane_of, stable_region
 from rodfem.output.table import plain
@@ -55,7 +55,7 @@ Data = Mapping[str, Any]
 def branch_data(branch: Data, shapes: Shapes, colour: str, data: Data) -> dict[str, Any]:
     """A ``branch`` of the ``data`` of a diagram in a ``colour``; ``shapes`` are those of its rows."""
     columns, natural = branch["columns"], data["natural"]
-    words = words_of(branch, planar=bool(data.get("planar")), leaves=_left(branch, data["branches"]))
+    words = words_of(branch, planar=bool(data.get("planar")), leaves=_parent(branch, data["branches"]))
     different = list(dict.fromkeys(words))
     ordinates = {name: _clear(columns[name], natural.get(name, 0.0)) for name in _listed(columns)} | _derived(shapes)
     return {
@@ -67,7 +67,7 @@ def branch_data(branch: Data, shapes: Shapes, colour: str, data: Data) -> dict[s
         "load": columns["load"],
         "negative": columns["negative"],
         "ordinates": ordinates,
-        "between": _between(branch, ordinates),
+        "between": _curve(branch, ordinates),
         "readings": readings_of(branch, natural),
         "pieces": [{"rows": [x.first, x.last], "kind": x.kind, "index": x.label} for x in pieces_of(branch)],
         "special": [_special(x) for x in branch["special"]],
@@ -81,10 +81,10 @@ def branch_data(branch: Data, shapes: Shapes, colour: str, data: Data) -> dict[s
     }
 
 
-def _between(branch: Data, ordinates: Data) -> dict[str, dict[int, list[list[float]]]]:
+def _curve(branch: Data, ordinates: Data) -> dict[str, dict[int, list[list[float]]]]:
     """Loads and values of each ordinate between rows, by the row before, where these are far from each other."""
     more = {**branch, "columns": {**branch["columns"], **ordinates}}
-    return {name: {row: found.T.tolist() for row, found in between(more, name).items()} for name in ordinates}
+    return {name: {row: found.T.tolist() for row, found in dense_rows(more, name).items()} for name in ordinates}
 
 
 def ordinates_of(data: Data) -> list[str]:
@@ -93,7 +93,7 @@ def ordinates_of(data: Data) -> list[str]:
     return [*(name for name in _listed(first) if all(name in columns for columns in others)), *DERIVED]
 
 
-def _left(branch: Data, branches: Sequence[Data]) -> str:
+def _parent(branch: Data, branches: Sequence[Data]) -> str:
     """Name of the branch from whose branch point this one leaves; empty if its first row is elsewhere."""
     name, number = branch["parent"] or ("", 0)
     found = [x["special"][number]["load"] for x in branches if x["name"] == name and number < len(x["special"])]

@@ -105,13 +105,13 @@ def payload_of(folder: Path) -> dict[str, Any]:
     check_run(data, folder / "states.h5")
     unfit = f"The files in {folder} do not belong together ({{}}): run the scene again."
     with STATES.opened(folder / "states.h5", ("branches",), unfit) as file:
-        about, rods = _about(data, folder), rods_of(data, Loaded(file["branches"]), folder)
+        about, rods = _header(data, folder), rods_of(data, Loaded(file["branches"]), folder)
         names = [name for name in rods["branches"][0]["ordinates"] if name.startswith("reaction")]
         about["ordinates"] += [{"key": name, "name": name, "label": name} for name in names]
         return about | rods
 
 
-def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def _header(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Titles, labels, constants and origin."""
     units = {x: str(data.get(f"{name}_unit") or "") for x, name in (("load", "parameter"), ("ordinate", "ordinate"))}
     words = str(data.get("parameter_words") or "").replace("$", "")

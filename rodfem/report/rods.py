@@ -118,7 +118,7 @@ def _drawn(shapes: Shapes, group: Any, look: Look, shelf: dict[tuple[str, str], 
 
 def _common(setting: Setting, shapes: Shapes, look: Look) -> dict[str, Any]:
     """Cross-sections, size and direction of the pictures, by the state that is shown first."""
-    load = setting.force if setting.down is None else setting.down
+    load = setting.force if setting.gravity is None else setting.gravity
     return {
         "s": packed(shapes.s),
         "outline": packed(_outline(shapes, setting, look, OUTLINE)),
@@ -180,7 +180,7 @@ def shapes_of(group: Any, count: int) -> Shapes:
 # --- modes
 
 
-class Shown(NamedTuple):
+class DrawnMode(NamedTuple):
     """A mode with the bound of its ``error`` (nan: not estimated), and displacement and rotation (m, 3) at nodes ``s``.
 
     ``zero`` says that the count at the state has its eigenvalue among those that vanish, ``rates`` that it is of decay.
@@ -196,13 +196,13 @@ class Shown(NamedTuple):
     rates: bool = False
 
 
-def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[Shown]:
+def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[DrawnMode]:
     """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical."""
-    shown: list[Shown] = []
+    shown: list[DrawnMode] = []
     if path is not None:
         modes = load_modes(path, *place)
         each = zip(modes.value, modes.error, modes.motion, modes.displacement, modes.rotation, strict=True)
-        shown += [Shown(complex(mu), float(error), motion, modes.s, u, w) for mu, error, motion, u, w in each]
+        shown += [DrawnMode(complex(mu), float(error), motion, modes.s, u, w) for mu, error, motion, u, w in each]
     shown += [] if typical is None else _others(typical, s, [mode.value for mode in shown])
     shown.sort(key=lambda mode: (mode.motion in (SYMMETRY, RIGID), mode.value.real))
     others = [mode for mode in shown if mode.motion != SYMMETRY]
@@ -210,19 +210,21 @@ def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: 
     return [mode._replace(zero=any(mode is other for other in vanish)) for mode in shown]
 
 
-def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[Shown]:
+def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[DrawnMode]:
     """Modes that a run has recorded, but those with eigenvalues that are ``known``; these have symmetries, too."""
     least = SMALL * abs(typical.value).max(initial=0.0)
     each = zip(typical.value, typical.motion, typical.displacement, typical.rotation, strict=True)
     return [
-        Shown(complex(mu), np.nan, motion, s, u, w)
+        DrawnMode(complex(mu), np.nan, motion, s, u, w)
         for mu, motion, u, w in each
         if not (known and motion == SYMMETRY)
         and not any(abs(x - mu) <= SAME_EIGENVALUE * max(abs(mu), least) for x in known)
     ]
 
 
-def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Setting, look: Look) -> list[dict[str, Any]]:
+def motions_of(
+    modes: Sequence[DrawnMode], shapes: Shapes, row: int, setting: Setting, look: Look
+) -> list[dict[str, Any]]:
     """Modes of the state in a ``row`` as the page has them, with the maps of its supports at an amplitude of one."""
     r, frames = shapes[row]
     span = float(np.linalg.norm(np.ptp(r, axis=0)))
@@ -237,11 +239,11 @@ def motions_of(modes: Sequence[Shown], shapes: Shapes, row: int, setting: Settin
         size = drawn_size(u, w, span)
         parts = [(size * part(u), size * part(w)) for part in ([np.real, np.imag] if mode.value.imag else [np.real])]
         drawn = [packed(np.concatenate(part, axis=1)) for part in parts]
-        out.append(_about(mode) | {"parts": drawn, "maps": [moved(*part) for part in parts]})
+        out.append(_caption(mode) | {"parts": drawn, "maps": [moved(*part) for part in parts]})
     return out
 
 
-def _about(mode: Shown) -> dict[str, Any]:
+def _caption(mode: DrawnMode) -> dict[str, Any]:
     """Eigenvalue, in words with its error, and what the motion does: ``zero``, ``grows`` or neither."""
     exact, known = mode.motion in (SYMMETRY, RIGID), bool(np.isfinite(mode.error))
     zero = exact or mode.zero or bool(abs(mode.value) <= np.nan_to_num(mode.error, posinf=0.0))

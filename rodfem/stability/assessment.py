@@ -31,7 +31,7 @@ from rodfem.stability.near_zero import Decision, decide
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricSolver
 from rodfem.stability.soft_mode import ONE_SIDE, WORDS, SoftMode, is_stable, stability
 from rodfem.stability.spectrum import FINITE, Spectrum
-from rodfem.stability.symmetric import Found, SymmetricSolver, eigensolver
+from rodfem.stability.symmetric import Eigenvalues, SymmetricSolver, eigensolver
 
 COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
@@ -123,7 +123,7 @@ class Assessor:
         """Eigenvalues of states under loads without a potential."""
         return NonsymmetricSolver(self.system)
 
-    def below(self, x: PETSc.Vec) -> SymmetricSolver:
+    def low_pencil(self, x: PETSc.Vec) -> SymmetricSolver:
         """Symmetric pencil at ``x``, its shift below all eigenvalues."""
         pencil = self.symmetric.at(x)
         pencil.go_below()
@@ -176,7 +176,7 @@ class Assessor:
             *(perf_counter() - started, made + found.factorisations, name, reason + found.note),
         )
 
-    def _leftmost(self, x: PETSc.Vec, name: str, number: int) -> Found:
+    def _leftmost(self, x: PETSc.Vec, name: str, number: int) -> Eigenvalues:
         """By a method; of a small mesh with fewer than ``number`` eigenvalues LAPACK has the sentence on that."""
         try:
             with as_failure(self.system.comm):
@@ -192,7 +192,7 @@ class Assessor:
             raise
         return found
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """The ``number`` left-most eigenpairs of the conservative state ``x`` alone, without its index."""
         with as_failure(self.system.comm):
             return self._method(self.choose(AUTO, number)[0]).leftmost(x, number)
@@ -231,11 +231,11 @@ class Method:
         """Why it does not apply to a system, in words that follow its name; empty where it does."""
         return ""
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """The ``number`` left-most eigenvalues of a conservative state."""
         raise NotImplementedError
 
-    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+    def nearest(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """Eigenvalues nearest zero of a state under loads without a potential."""
         raise NotImplementedError
 
@@ -255,19 +255,19 @@ class Count(SymmetricMethod):
 
     finds_modes = False
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """Nothing."""
-        return Found(np.zeros(0), [], np.zeros(0), certified=True)
+        return Eigenvalues(np.zeros(0), [], np.zeros(0), certified=True)
 
 
 class ShiftInvert(Method):
     """SLEPc on the singular pencil: one sparse factorisation serves eigenvalues and count."""
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """By the Lanczos method, with a shift below the spectrum."""
         return self.work.symmetric.at(x).leftmost(number)
 
-    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+    def nearest(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """By the Arnoldi method."""
         return _nearest(self.work.nonsymmetric.at(x).near_zero(number), number)
 
@@ -281,12 +281,12 @@ class Dense(Method):
         unknowns = system.fields.unknowns
         return "" if unknowns <= LARGEST else f"is for at most {LARGEST} unknowns, not {unknowns}"
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """By the symmetric ``T`` of :mod:`rodfem.stability.spectrum`, positive for a shift below all eigenvalues.
 
         Raises :class:`InputError` if fewer than ``number`` are finite.
         """
-        below = self.work.below(x)
+        below = self.work.low_pencil(x)
         stiffness, mass = (gathered(A).real for A in below.scaled)
         pencil = Spectrum(stiffness, mass, below.shift)
         T = pencil.dual.T @ pencil.inverse
@@ -303,28 +303,28 @@ class Dense(Method):
             vectors[-1].array[:] = column[own]
         values = below.shift + 1.0 / nu
         errors = below.backward_errors(values, vectors)
-        return Found(self.work.one * values, below.unscaled(vectors), errors, below.certifies(values))
+        return Eigenvalues(self.work.one * values, below.unscaled(vectors), errors, below.certifies(values))
 
-    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+    def nearest(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """Those of all that are nearest zero."""
         return _nearest(self.work.nonsymmetric.at(x).leftmost(number), number)._replace(factorisations=0)
 
 
-def _nearest(found: Frequencies, number: int) -> Found:
+def _nearest(found: Frequencies, number: int) -> Eigenvalues:
     """The ``number`` of some eigenvalues that are nearest zero, in the order in which they were found."""
     nearest = np.sort(np.argsort(abs(found.values), kind="stable")[:number])
-    return Found(found.values[nearest], [], found.errors[nearest], factorisations=1)
+    return Eigenvalues(found.values[nearest], [], found.errors[nearest], factorisations=1)
 
 
 class Slicing(SymmetricMethod):
     """SLEPc's spectrum slicing: all eigenvalues in an interval, found by counting, with the left-most and few more."""
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+    def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """Those in an interval from below the spectrum."""
-        pencil, own = self.work.below(x), self.work.symmetric
+        pencil, own = self.work.low_pencil(x), self.work.symmetric
         # no simple factor: an end on an eigenvalue is unlikely
         low, width = own.shift, max(abs(own.shift), own.scale) * 1.0371
-        while pencil.below(low + width) < number:
+        while pencil.eigenvalue_count(low + width) < number:
             width *= 2
         high = low + width
         for wider in (0.0, 1e-9, 1e-7, 1e-5):  # an end on an eigenvalue is moved off it
@@ -333,11 +333,13 @@ class Slicing(SymmetricMethod):
                 break
         else:
             raise ConvergenceError(f"{low:.6g} or {high:.6g} is an eigenvalue: choose another method.")
-        complete = solver.getConverged() == pencil.below(high) - pencil.below(low)
+        complete = solver.getConverged() == pencil.eigenvalue_count(high) - pencil.eigenvalue_count(low)
         values, vectors = pencil.converged(solver, number)
         solver.destroy()
         errors = pencil.backward_errors(values, vectors)
-        return Found(self.work.one * values, pencil.unscaled(vectors), errors, complete, 3)  # SLEPc's own, at least
+        return Eigenvalues(
+            self.work.one * values, pencil.unscaled(vectors), errors, complete, 3
+        )  # SLEPc's own, at least
 
 
 def sliced(pencil: SymmetricSolver, low: float, high: float) -> SLEPc.EPS | None:

@@ -103,7 +103,7 @@ def members(
     size, offset = cluster.size, 1e-3 * pencil.system.scene.units.omega2  # at zero the matrix may be singular
     shift = 0.97 * cluster.mean if abs(cluster.mean) > offset else -offset
     for number, times in ((size + 2, 1.0), (3 * size + 10, FARTHER)):  # one next to the shift takes digits from others
-        found = pencil.near(number, cluster.mean + times * (shift - cluster.mean), left=left)
+        found = pencil.nearest(number, cluster.mean + times * (shift - cluster.mean), left=left)
         energy = squares(pencil.system.comm, found.vectors, found.weighed)
         share = (abs(pencil.product(basis, found.weighed)) ** 2).sum(axis=0) / energy
         if found.floating and abs(cluster.mean) > offset:

@@ -62,7 +62,7 @@ def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec
     for sigma, w in weak_combinations(pencil, system.scene.length):
         if sigma > DOUBTFUL or (sigma > NEGLIGIBLE and _distance(blocks, x, pencil, w) > STALLED):
             continue
-        names = named(pencil, _equations(system), w)
+        names = dependent_equations(pencil, _equations(system), w)
         remedy = TIGHT if taut(shape, x) else "remove those that follow from the others."
         raise SceneError(f"Constraints depend on one another ({names}): {remedy}")
 
@@ -154,7 +154,7 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     return float(np.linalg.norm(C @ vectors[:, 0])), vectors[:, 0]
 
 
-def named(pencil: Pencil, equations: Sequence[str], w: np.ndarray) -> str:
+def dependent_equations(pencil: Pencil, equations: Sequence[str], w: np.ndarray) -> str:
     """Constraints whose gradients cancel with multipliers ``w`` (p,); ``equations`` are words for the scalar ones."""
     w, words = abs(w) / np.linalg.norm(w), list[str]()
     fields = {name: f"constraint {name[1:]} along the rod" for name in pencil.where if name[1:].isdigit()}

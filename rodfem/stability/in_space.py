@@ -59,7 +59,7 @@ class InSpace:
         """
         planar = self.planar.at(x)
         quaternions = planar.fields.turning.quaternion(planar.turned)
-        named = planar.named | self._scalars(planar) | {"q": quaternions}
+        named = planar.parts | self._scalars(planar) | {"q": quaternions}
         state = self.system.vector(self.system.fields.filled(named))
         self.system.set_phase(state)
         residual = self.system.new_vector()

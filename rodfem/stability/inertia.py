@@ -83,7 +83,7 @@ class Inertia:
         self.metric.assemble()
         self._weights, self._shared = local_rows(self.metric).real, shared(self.matrix)
         self._on_metric = None if self._shared is None else places_in(self._shared.pattern, self._weights)
-        self.factors = factors_of("cholesky", system.comm, fields.along, fields.dense_rows, system.natural_sizes)
+        self.factors = factors_of("cholesky", system.comm, fields.chain_size, fields.dense_rows, system.natural_sizes)
         self.constraints, self.scale = fields.constraints(), system.stiffness_scale
         self.tolerance, self.resolution = ZERO_BAND * self.scale, 0.0
         self.vectors: list[PETSc.Vec] = []
@@ -214,7 +214,7 @@ class Inertia:
             )
         return int(below)
 
-    def across(self, own: np.ndarray, basis: np.ndarray, duals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def extension(self, own: np.ndarray, basis: np.ndarray, duals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Basis of what vectors (own rows, k) span in addition to a ``basis``, and its products with the metric.
 
         Both are orthonormal in the metric, ``duals`` are its products with the ``basis``.
@@ -297,7 +297,7 @@ class Factored:
         """Shift of the last count."""
         return self._own().shift
 
-    def below(self, sigma: float) -> int:
+    def eigenvalue_count(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``, symmetries left out; :class:`ConvergenceError` if the count fails."""
         own = self._own()
         with own.system.clock("stability"):
@@ -310,9 +310,9 @@ class Factored:
     def count(self) -> Index:
         """Index; two factorisations, the last of which serves :meth:`nearest`."""
         own = self._own()
-        negative = self.below(-own.tolerance)
+        negative = self.eigenvalue_count(-own.tolerance)
         # a phase condition takes its symmetry mode out of both counts, and it is a zero eigenvalue of the state
-        zero = self.below(own.tolerance) - negative + self.drifts
+        zero = self.eigenvalue_count(own.tolerance) - negative + self.drifts
         return Index(negative, zero)
 
     def nearest(self, number: int, accuracy: float = 1e-3, spare: int = 1) -> tuple[np.ndarray, list[PETSc.Vec]]:
@@ -325,7 +325,7 @@ class Factored:
         """
         own, block = self._own(), number + spare
         if own.factored == self._filled and abs(own.shift) > FAR * own.scale:
-            self.below(ZERO_BAND * own.scale)
+            self.eigenvalue_count(ZERO_BAND * own.scale)
         # the old vectors may span an invariant space that misses the nearest one
         vectors = np.stack([own.seed(i).array_r.real for i in range(block)], axis=1)
         for column, known in zip(vectors.T, own.vectors, strict=False):
@@ -370,7 +370,7 @@ class Factored:
         basis = duals = images = np.zeros((len(block), 0))
         new = block
         for _ in range(5):
-            new, weighed = own.across(new, basis, duals)
+            new, weighed = own.extension(new, basis, duals)
             if not new.shape[1]:
                 break
             basis, duals = np.hstack([basis, new]), np.hstack([duals, weighed])
@@ -382,7 +382,7 @@ class Factored:
         nu, z = nu[order], z[:, order[:size]]
         vectors = images @ z
         residuals = own.sizes(vectors - basis @ z * nu[:size])
-        return nu, own.across(vectors, basis[:, :0], basis[:, :0])[0], residuals
+        return nu, own.extension(vectors, basis[:, :0], basis[:, :0])[0], residuals
 
     def noise(self, mode: PETSc.Vec) -> float:
         """Round-off in the eigenvalue of a ``mode`` of metric norm 1, to first order.

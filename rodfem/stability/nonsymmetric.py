@@ -88,7 +88,7 @@ class Frequencies:
         """Magnitude below which an eigenvalue counts as zero."""
         return size_of_zero(self.values, self.one, self.floor)
 
-    def still(self) -> int:
+    def zeros(self) -> int:
         """Number of eigenvalues that are zero: of rigid motions, and their partners in Jordan blocks."""
         return int((abs(self.values) < STILL * self.far).sum())
 
@@ -100,7 +100,7 @@ class Frequencies:
         return replace(self, values=self.values[order], errors=self.errors[order], **columns)
 
 
-def named(system: System, found: Frequencies, turned: np.ndarray, number: int | None = None) -> Frequencies:
+def label(system: System, found: Frequencies, turned: np.ndarray, number: int | None = None) -> Frequencies:
     """Frequencies ``found`` at a state of a ``system``, the first ``number`` named; ``turned`` is its rotation field.
 
     A multiple eigenvalue has one name, that of its invariant subspace: its vectors are any in it.
@@ -229,7 +229,7 @@ class NonsymmetricPencil:
         small[row, column] = part.data[counted]
         return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(rows) else (0, 0.0)
 
-    def about(self, target: float) -> Spectrum:
+    def inverse(self, target: float) -> Spectrum:
         """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""
         out = Spectrum(*self._in_units(self.mass), target / self._one, self._one)
         out.order = self.system.scene.inertia.order
@@ -239,7 +239,7 @@ class NonsymmetricPencil:
     def spectrum(self) -> Spectrum:
         """All eigenvalues that the mesh has; of a mesh with many unknowns those nearest zero."""
         with self.system.clock("stability"):
-            found = self.about(SHIFT * self._one)
+            found = self.inverse(SHIFT * self._one)
             found.floor = self._floor(found)
             return found
 
@@ -263,40 +263,42 @@ class NonsymmetricPencil:
         several = (abs(values[slow] - values[slow[:1]]) > apart).any()
         if self.solver.floating or not len(slow) or not (self.solver.slow or several):
             return np.inf
-        found = self.of(spectrum, slow)
+        found = self.frequencies(spectrum, slow)
         energy = abs(squares(self.system.comm, found.vectors, found.weighed))
         columns = zip(found.vectors.T, energy.tolist(), strict=True)
         rounded = [rounding_of(self.matrix, v, v) / e for v, e in columns if e > 0]
         return max(SOLVED * one, float(spectrum.noise[slow].max()), NOISE * max(rounded, default=0.0))
 
-    def near(self, number: int, target: float, *, left: bool = False) -> Frequencies:
+    def nearest(self, number: int, target: float, *, left: bool = False) -> Frequencies:
         """Return the eigenvalues nearest to ``target``, ``number`` or more, or all there are, in ascending order.
 
         ``left`` vectors have ``z.S = mu z.M`` without conjugation, and no parts along free motions ``g``, where ``z.Mg
         = 0``.
         """
         with self.system.clock("stability"):
-            pencil = self.about(target)
+            pencil = self.inverse(target)
             pairs = pencil.greatest(number + SPARE, left=left)
             pairs = pairs.at(slice(len(pairs.nu) - _half(pairs.nu)))
-            return self._found(pencil, pencil.eigenvalues(pairs), pairs, left=left).in_order()
+            return self._frequencies(pencil, pencil.eigenvalues(pairs), pairs, left=left).in_order()
 
     def near_zero(self, number: int, *, left: bool = False) -> Frequencies:
         """Return more than the ``number`` eigenvalues nearest zero, with the names of their motions."""
-        found = self.near(number + BEYOND, SHIFT * self._one, left=left)
-        return named(self.system, found, self.turned)
+        found = self.nearest(number + BEYOND, SHIFT * self._one, left=left)
+        return label(self.system, found, self.turned)
 
     def leftmost(self, number: int) -> Frequencies:
         """Left-most eigenvalues, ``number`` or more of those nearest the origin, whose motions have no names yet."""
         nu = self.spectrum.pairs.nu[: max(number, FREQUENCIES) + BEYOND + SPARE]
-        return self.of(self.spectrum, np.arange(len(nu) - _half(nu))).in_order()
+        return self.frequencies(self.spectrum, np.arange(len(nu) - _half(nu))).in_order()
 
-    def of(self, spectrum: Spectrum, places: np.ndarray) -> Frequencies:
+    def frequencies(self, spectrum: Spectrum, places: np.ndarray) -> Frequencies:
         """Frequencies of some eigenvalues of a ``spectrum`` of this state, in its order and not named yet."""
-        found = self._found(spectrum, spectrum.values[places] / self._one, spectrum.pairs.at(places))
+        found = self._frequencies(spectrum, spectrum.values[places] / self._one, spectrum.pairs.at(places))
         return replace(found, floor=spectrum.floor)
 
-    def _found(self, spectrum: Spectrum, values: np.ndarray, pairs: Eigenpairs, *, left: bool = False) -> Frequencies:
+    def _frequencies(
+        self, spectrum: Spectrum, values: np.ndarray, pairs: Eigenpairs, *, left: bool = False
+    ) -> Frequencies:
         """Frequencies of ``values`` (k,) in natural units, of ``pairs`` of ``T``."""
         units, free = self.system.scene.units, self.solver.free
         vectors = spectrum.vectors(pairs, left=left)[self._own]

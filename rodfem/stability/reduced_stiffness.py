@@ -67,7 +67,7 @@ class Bordered:
             self.matrix = PETSc.Mat().createAIJ(((pattern.shape[0], along),) * 2, comm=self.comm)
             self.matrix.setPreallocationCSR((pattern.indptr, pattern.indices, pattern.data))
         kind, natural = "lu" if constraints is None else "cholesky", system.natural_sizes and self._sizes
-        chain = along if fields.along else 0
+        chain = along if fields.chain_size else 0
         self.factors = factors_of(kind, self.comm, chain, fields.dense_rows + borders, natural)
 
     def _sizes(self) -> PETSc.Vec:
@@ -163,20 +163,20 @@ class Condensation:
     def border(self, x: PETSc.Vec) -> np.ndarray:
         """The six modes nearest zero at a state ``x``, (own rows, 6), fewer if there are no more; any basis near."""
         found = self.inertia.at(x)
-        found.below(self.inertia.tolerance)
+        found.eigenvalue_count(self.inertia.tolerance)
         with self.inertia.afresh():
             return np.stack([v.array_r.real for v in found.nearest(6, 0.1)[1]], axis=1)
 
     def improved(self, reduced: ReducedStiffness) -> np.ndarray:
         """The border after a step of inverse iteration: ``W``, made orthonormal."""
         none = reduced.W[:, :0]
-        return self.inertia.across(reduced.W, none, none)[0]
+        return self.inertia.extension(reduced.W, none, none)[0]
 
     def at(self, x: PETSc.Vec, tangent: PETSc.Vec, phi: np.ndarray) -> ReducedStiffness:
         """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
         inertia, found, B = self.inertia, self.inertia.at(x), self._weighed(phi)
         try:
-            below, Z = found.below(0.0), found.factors.solve_all(B)
+            below, Z = found.eigenvalue_count(0.0), found.factors.solve_all(B)
             H, (values, vectors) = self._condensed(B, Z)
             if abs(values).min() < DOUBTFUL * inertia.scale:  # it may touch zero
                 Z = Z + found.factors.solve_all(B - inertia.times(Z))

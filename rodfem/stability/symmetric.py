@@ -42,7 +42,7 @@ CONVERGED = 1e-7
 """Residual, relative to the stiffness, above which a pair is rejected: the Krylov space broke down."""
 
 
-class Found(NamedTuple):
+class Eigenvalues(NamedTuple):
     """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
 
     ``factorisations`` are those in addition to the symmetric solver's; a ``note`` goes after the reason for the method.
@@ -67,7 +67,7 @@ class SymmetricSolver(PencilMatrices):
     def __init__(self, inertia: Inertia) -> None:
         super().__init__(inertia.system)
         self.inertia, fields = inertia, self.system.fields
-        self.factors = factors_of("cholesky", self.system.comm, fields.along, fields.dense_rows)
+        self.factors = factors_of("cholesky", self.system.comm, fields.chain_size, fields.dense_rows)
         self.scaled, self._shifted, self._factored = (self.matrix, self.mass), self.system.state_matrix(), np.nan
         self.scale = scale_in_units(self.system)
         self.shift, self.factorisations, self.last = -self.scale, 0, np.zeros(0)
@@ -107,7 +107,7 @@ class SymmetricSolver(PencilMatrices):
         self._factored = sigma
         self.factorisations += 1
 
-    def leftmost(self, number: int) -> Found:
+    def leftmost(self, number: int) -> Eigenvalues:
         """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer.
 
         More are computed where a count finds any missing: a Krylov method finds the second of two equal ones late.
@@ -142,7 +142,7 @@ class SymmetricSolver(PencilMatrices):
         """Move the shift below the spectrum; raises :class:`ConvergenceError` if it has no lower end."""
         step = max(abs(self.shift), self.scale)
         for _ in range(40):
-            if self.below(self.shift) == 0 and not self._shift_is_an_eigenvalue():
+            if self.eigenvalue_count(self.shift) == 0 and not self._shift_is_an_eigenvalue():
                 return
             self.shift -= step
             step *= 3
@@ -159,7 +159,7 @@ class SymmetricSolver(PencilMatrices):
         self.factors.solve(self.scaled[1] * mode, grown)
         return not self.system.norm(grown) * HIT * abs(self.shift) < 1.0
 
-    def below(self, sigma: float) -> int:
+    def eigenvalue_count(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``; :class:`ConvergenceError` if the count breaks down."""
         self.factor(sigma)
         return self.inertia.counted(self.factors, sigma, self._drifts)
@@ -169,12 +169,12 @@ class SymmetricSolver(PencilMatrices):
         small = SAME_EIGENVALUE * max(abs(values).max(), self.scale)
         distinct = values < values[-1] - small
         return (
-            self.below(values[0] - small) == 0
-            and self.below(values[-1] - small) == distinct.sum()
-            and self.below(values[-1] + small) >= len(values)
+            self.eigenvalue_count(values[0] - small) == 0
+            and self.eigenvalue_count(values[-1] - small) == distinct.sum()
+            and self.eigenvalue_count(values[-1] + small) >= len(values)
         )
 
-    def _solve(self, number: int, extra: int) -> Found:
+    def _solve(self, number: int, extra: int) -> Eigenvalues:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``."""
         self.factor(self.shift)
         if not self.factors.regular:
@@ -186,11 +186,11 @@ class SymmetricSolver(PencilMatrices):
             self.shift -= reach
             return self._solve(number, extra)
         if len(values) < number:
-            return Found(values, vectors, errors)
+            return Eigenvalues(values, vectors, errors)
         self.last = sum(vector.array_r for vector in vectors)
         cut = values[number - 1] + SAME_EIGENVALUE * max(abs(values[number - 1]), self.scale)
         known = int((values < cut).sum())
-        return Found(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
+        return Eigenvalues(values[:number], vectors[:number], errors[:number], self.eigenvalue_count(cut) == known)
 
     def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
         """``number`` eigenvalues or all there are, with vectors and backward errors, without what is no eigenpair.

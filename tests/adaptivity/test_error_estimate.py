@@ -220,7 +220,7 @@ def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch)
         return outcome
 
     monkeypatch.setattr(error_estimate, "correct", early)
-    again = richer.again(point, fixed_load=True)
+    again = richer.solve(point, fixed_load=True)
     moved = abs(again.ordinate - stopped[0])
     assert again.ordinate_left == pytest.approx(error_estimate.STEADY * moved, rel=1e-3)
     assert moved > 1e-6
@@ -231,7 +231,7 @@ def test_what_a_richer_mesh_leaves_of_a_boundary_layer(lam: float) -> None:
     """The curvature is ``2 w sin(theta/2)``, ``tan(theta/4) = tan(theta_0/4) exp(-w s)`` and the tension ``w^2``."""
     solver, s = Solver(boundary_layer.scene(), Discretization("auto", 8, 6)), np.linspace(0.0, 0.5, 2001)
     point, richer, w = solver.equilibrium(lam), Enriched(solver.equilibria), 10 ** (lam / 2)
-    again = richer.again(point, fixed_load=True)
+    again = richer.solve(point, fixed_load=True)
     exact = 2 * w * np.sin(2 * np.arctan(tan(boundary_layer.ANGLE / 4) * np.exp(-w * s)))
     points = point, richer.solver.point(again.x, 0.0, None)
     first, left = (np.linalg.norm(abs(p.profile(s).curvature[:, 1]) - exact) for p in points)

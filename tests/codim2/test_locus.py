@@ -27,7 +27,7 @@ from rodfem.codim2.follow import STEPS, locus
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.plot_locus import _about, draw_locus, stable_region
+from rodfem.output.plot_locus import _subtitle, draw_locus, stable_region
 from rodfem.problem.ends import pinned
 from rodfem.problem.scene import Ordinate, Scene
 from rodfem.report.branches import loci_of
@@ -213,11 +213,11 @@ def test_errors_that_are_not_known_are_said_to_be_so() -> None:
     json.dumps(data, allow_nan=False)
     assert data["without_estimate"] == [rows[0]]
     assert data["columns"]["error"][rows[0]] == [None, None]
-    told = re.search(r"curves accurate to (\S+) \((.*)\)$", _about([data]))
+    told = re.search(r"curves accurate to (\S+) \((.*)\)$", _subtitle([data]))
     assert told is not None and known <= float(told[1]) <= 2 * known  # rounded up to a digit
     assert told[2] == f"estimated at {len(rows) - 1} of {len(found.values)} points, without success at 1 more"
     found.error[rows] = np.inf
-    assert _about([found.data()]).endswith(f"the error could not be estimated at any of {len(rows)} points")
+    assert _subtitle([found.data()]).endswith(f"the error could not be estimated at any of {len(rows)} points")
 
 
 def test_nothing_is_left_behind() -> None:

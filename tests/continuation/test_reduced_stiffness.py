@@ -84,13 +84,13 @@ def test_all_zeros_are_eigenvalues_of_the_pencil() -> None:
 def test_crossings_and_their_indices() -> None:
     """One up at 0.3 and one down there: the index stays; a double one at 0.6; none where all is definite."""
     opposite = polynomial(np.diag([-0.3, 0.3]), np.diag([1.0, -1.0]))
-    (found,) = Zeros(lambda *_: None, 1e-9).between(*opposite, np.zeros((2, 2)))
+    (found,) = Zeros(lambda *_: None, 1e-9).crossings(*opposite, np.zeros((2, 2)))
     assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.3, 3, 3, (2, 2))
     double = polynomial(np.diag([0.6, 0.6, 1.0]), np.diag([-1.0, -1.0, 0.5]))
-    (found,) = Zeros(lambda *_: None, 1e-9).between(*double, np.zeros((3, 3)))
+    (found,) = Zeros(lambda *_: None, 1e-9).crossings(*double, np.zeros((3, 3)))
     assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.6, 2, 4, (3, 2))
     clear = polynomial(np.diag([1.0, -2.0]), np.diag([3.0, -1.0]))
-    assert Zeros(lambda *_: None, 1e-9).between(*clear, np.zeros((2, 2))) == []
+    assert Zeros(lambda *_: None, 1e-9).crossings(*clear, np.zeros((2, 2))) == []
 
 
 def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
@@ -104,7 +104,7 @@ def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
             return Node(s, exact(s), np.array([[2 * (s - 0.5)]]), 0)
 
         a, b = (Node(t, exact(t), np.array([[2 * (t - 0.5)]]), 0) for t in (0.0, 1.0))
-        found = Zeros(solve, 1e-12, misses).between(a, b, np.zeros((1, 1)))
+        found = Zeros(solve, 1e-12, misses).crossings(a, b, np.zeros((1, 1)))
         assert [round(c.s, 9) for c in found] == ([0.499, 0.501] if sign < 0 else [])
         assert [(c.before, c.after) for c in found] == ([(0, 1), (1, 0)] if sign < 0 else [])
         assert len(asked) == 1
@@ -118,7 +118,7 @@ def test_an_eigenvalue_that_touches_zero_has_one_index() -> None:
         def node(a: Node | None, b: Node | None, s: float, c=c) -> Node:
             return Node(s, np.array([[(s - c) ** 2]]), np.array([[2 * (s - c)]]), 0)
 
-        found = Zeros(node, 1e-12).between(node(None, None, 0.0), node(None, None, 1.0), np.zeros((1, 1)))
+        found = Zeros(node, 1e-12).crossings(node(None, None, 0.0), node(None, None, 1.0), np.zeros((1, 1)))
         assert {index for x in found for index in (x.before, x.after, x.rest)} <= {0}
 
 
@@ -126,7 +126,7 @@ def test_a_piece_that_ends_beside_a_touch_is_not_divided() -> None:
     """``(1.02 - t)^2`` up to t = 1, and what the cubic is off at most, which is nothing at its ends."""
     a, b = (Node(t, np.array([[(1.02 - t) ** 2]]), np.array([[2 * (t - 1.02)]]), 0) for t in (0.0, 1.0))
     asked = list[float]()
-    assert Zeros(lambda a, b, s: asked.append(s), 1e-12).between(a, b, np.array([[0.05]])) == []
+    assert Zeros(lambda a, b, s: asked.append(s), 1e-12).crossings(a, b, np.array([[0.05]])) == []
     assert not asked
 
 
@@ -142,6 +142,6 @@ def test_a_pair_that_the_cubic_does_not_have(known: bool, other: float) -> None:
         return Node(s, np.diag(value), np.diag(slope), 0)
 
     before, a, b = (solve(None, None, s) for s in (-1.0, 0.0, 1.0))
-    found = Zeros(solve, 1e-12).between(a, b, fourth(a, b, before if known else None))
+    found = Zeros(solve, 1e-12).crossings(a, b, fourth(a, b, before if known else None))
     assert [c.s for c in found] == pytest.approx(expected, abs=1e-3)
     assert abs(found[-1].after - found[0].before) == (other < 0)

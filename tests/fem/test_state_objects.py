@@ -121,7 +121,7 @@ def test_stale_factors_refuse() -> None:
     with pytest.raises(RuntimeError, match="not factored"):
         second.nearest(1)
     assert second.count() != index
-    for ask in (lambda: first.below(0.0), first.count, lambda: first.nearest(1), lambda: first.factors):
+    for ask in (lambda: first.eigenvalue_count(0.0), first.count, lambda: first.nearest(1), lambda: first.factors):
         with pytest.raises(RuntimeError, match="another state"):
             ask()
     again = inertia.at(x)
@@ -137,11 +137,11 @@ def test_a_stale_pencil_refuses() -> None:
     y, vibration = x.copy(), NonsymmetricSolver(system)
     system.set_load(y, 15.0)
     first = vibration.at(x)
-    found = first.near(2, 0.0)
+    found = first.nearest(2, 0.0)
     second = vibration.at(y)
-    assert second.near(2, 0.0).values != pytest.approx(found.values, rel=1e-3)
-    for ask in (lambda: first.near(2, 0.0), lambda: first.weighed(found.vectors), first.asymmetry):
+    assert second.nearest(2, 0.0).values != pytest.approx(found.values, rel=1e-3)
+    for ask in (lambda: first.nearest(2, 0.0), lambda: first.weighed(found.vectors), first.asymmetry):
         with pytest.raises(RuntimeError, match="another state"):
             ask()
     assert first.motion(found.vectors[:, :1]) == vibration.at(y).motion(found.vectors[:, :1])
-    assert vibration.at(x).near(2, 0.0).values == pytest.approx(found.values, rel=1e-10)
+    assert vibration.at(x).nearest(2, 0.0).values == pytest.approx(found.values, rel=1e-10)

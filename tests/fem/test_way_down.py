@@ -8,7 +8,7 @@ from petsc4py import PETSc
 from rodfem import Discretization, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import displaced_saddle
-from rodfem.fem.newton import along, linear_step
+from rodfem.fem.newton import linear_step, quadratic_form
 from rodfem.stability.pencil import Blocks
 
 pytestmark = pytest.mark.ranks
@@ -41,6 +41,6 @@ def test_a_step_is_uphill_where_it_is_too_long(
     motion = step.copy()
     motion.array[dual] = 0.0
     e.system.metric.mult(motion, weighed)
-    found = along(e.system, x, step)
+    found = quadratic_form(e.system, x, step)
     assert found == pytest.approx(moved @ (K @ moved) + weighed.dot(motion) / (times * half), rel=1e-9)
     assert (found > 0) is (times < 6)

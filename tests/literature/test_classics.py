@@ -375,7 +375,7 @@ def test_torque_on_a_cantilever(kind: str) -> None:
     for T in (0.3, 0.6, 0.9):
         x, outcome = solver.at_load(x, T)
         assert outcome.converged
-        values = NonsymmetricSolver(solver.system).at(x).near(4, -1e-3).values
+        values = NonsymmetricSolver(solver.system).at(x).nearest(4, -1e-3).values
 
         def frequency(mu: complex, T: float = T) -> complex:  # w'''' - i T w''' = mu w, where w = x + i y
             A = np.eye(4, k=1, dtype=complex)

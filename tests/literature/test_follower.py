@@ -89,7 +89,7 @@ def test_ordinate_of_a_load_that_is_not_known_better() -> None:
 @pytest.mark.few(1)
 @pytest.mark.parametrize("P", [0.0, 10.0])
 def test_two_planes(P: float) -> None:
-    values = vibration(P).near(6, 1.0).values[:6]
+    values = vibration(P).nearest(6, 1.0).values[:6]
     assert abs(values.imag).max() < 1e-7
     for v in values.real:
         weak, strong, scaled = column(v, P), column(v, P, EI=10), 10 * column(v / 10, P / 10)
@@ -102,10 +102,10 @@ def test_two_planes(P: float) -> None:
 
 
 def test_mass_and_inertia() -> None:
-    heavy = vibration(10.0, mass=2.0).near(2, 10.0).values
+    heavy = vibration(10.0, mass=2.0).nearest(2, 10.0).values
     assert abs(heavy - 26.7885149853 / 2).min() < 1e-9
     twist = (np.pi / 2) ** 2 / 1e-3  # clamped and free, with B3 = 1
-    assert abs(vibration(10.0, rotary_inertia=(0.0, 0.0, 1e-3)).near(2, 2400.0).values - twist).min() < 1e-9 * twist
+    assert abs(vibration(10.0, rotary_inertia=(0.0, 0.0, 1e-3)).nearest(2, 2400.0).values - twist).min() < 1e-9 * twist
 
 
 @pytest.mark.short
@@ -125,7 +125,7 @@ def test_motions_have_names() -> None:
 @pytest.mark.parametrize("P", [1.8, 30.0])
 def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: float) -> None:
     """Infinite eigenvalues come in Jordan blocks, which round-off brings near: none is among those returned."""
-    values = vibration(P, elements, degree).near(40, -1e-3).values
+    values = vibration(P, elements, degree).nearest(40, -1e-3).values
     assert len(values) <= 2 * elements * degree
     assert values.real.min() > -1e3
     assert abs(values).max() < 1e10

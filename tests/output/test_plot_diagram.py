@@ -15,8 +15,8 @@ from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
 from rodfem.output.plot_diagram import (
     SINGULAR,
     UNEXPLAINED,
-    between,
     dense,
+    dense_rows,
     draw_branches,
     draw_diagram,
     drawn,
@@ -172,18 +172,18 @@ def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
     branch = elastica(np.linspace(0.0, 0.7, 7))
     s = branch["columns"]["arclength"]
     branch["columns"]["ordinate"] = s * (0.55 - s)
-    found = between(branch, "ordinate")
+    found = dense_rows(branch, "ordinate")
     places = np.concatenate([s[row] + np.arange(1, 8) / 8 * (s[row + 1] - s[row]) for row in found])
     np.testing.assert_allclose(np.concatenate([x[:, 1] for x in found.values()]), places * (0.55 - places), atol=1e-12)
 
 
 def test_rows_close_to_each_other_and_corners_stay_as_they_are() -> None:
-    assert not between(elastica(np.linspace(0.0, 0.7, 200)), "ordinate")
-    assert between(elastica(np.linspace(0.0, 0.7, 5)), "ordinate")
+    assert not dense_rows(elastica(np.linspace(0.0, 0.7, 200)), "ordinate")
+    assert curve(elastica(np.linspace(0.0, 0.7, 5)), "ordinate")
     zigzag = abs(np.linspace(-0.2, 0.2, 9))
     corner = elastica(np.linspace(0.0, 0.7, 9))
     corner["columns"]["ordinate"] = zigzag
-    values = np.concatenate([found[:, 1] for found in between(corner, "ordinate").values()])
+    values = np.concatenate([found[:, 1] for found in curve(corner, "ordinate").values()])
     assert values.min() >= -1e-12 and values.max() <= 0.2 + 1e-12
 
 

@@ -283,7 +283,7 @@ def test_a_constant_is_a_function_of_the_constants() -> None:
         constraints=(integral(lambda x, c: x.k[2], 0.1),),
     )
     c = given.constants()
-    assert given.sides[0].held(c) == [0, 0, 0] and given.sides[1].force(c) == (0, 0, 1.0)
+    assert given.sides[0].support(c) == [0, 0, 0] and given.sides[1].force(c) == (0, 0, 1.0)
     assert given.inertia.rho_A(c) == given.attachments[0].mass(c) == 2.0 and given.has_inertia
     assert given.distributed(c) == (0.0, 0.0, 1.0) and given.constraints[0].equals(c) == 0.1
     slides = sliding_hinge((1, 0, 0), (0, 0, 2.0), force=3.0)

@@ -21,7 +21,7 @@ from rodfem.kumar_healey.null_space import kernel
 from rodfem.kumar_healey.reduction import ReducedPencil, cayley_shift
 from rodfem.stability import METHODS, find
 from rodfem.stability.assessment import Assessor, Method
-from rodfem.stability.dependence import named, smallest_singular, weak_combinations
+from rodfem.stability.dependence import dependent_equations, smallest_singular, weak_combinations
 from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import Blocks, Pencil
 
@@ -293,7 +293,7 @@ def test_dependent_constraints_are_named() -> None:
     assert sigma < 1e-13
     np.testing.assert_allclose(abs(vector[last[:2]]), 2**-0.5, rtol=1e-6)
     twin = replace(pencil, C=C.tocsr(), where=pencil.where | {"eta": np.zeros(0, dtype=int)})
-    assert named(twin, ["one end", "the other", "none"], vector) == "one end and the other"
+    assert dependent_equations(twin, ["one end", "the other", "none"], vector) == "one end and the other"
 
 
 # --- the method of Kumar and Healey (2010) ---------------------------------------------------------------------
@@ -415,7 +415,7 @@ def test_eigenvalues_are_those_of_dense_matrices(
     target, number = below(p), 4
     expected = null_space_values(p, target, number)
     reduction = ReducedPencil(p)
-    modes = reduction.near(number, target)
+    modes = reduction.nearest(number, target)
     scale = abs(expected).max()
     np.testing.assert_allclose(modes.values, expected, rtol=1e-9, atol=1e-11 * scale)
     assert modes.errors.max() < 1e-12
@@ -432,10 +432,10 @@ def test_elimination_by_the_paper_s_formula(coordinates: str) -> None:
     reduction = ReducedPencil(Coordinates(assessor.system, coordinates).assemble(x), "elimination")
     if coordinates == "full":
         with pytest.raises(ConvergenceError, match="use the inverse 'saddle'"):
-            reduction.near(3, -400.0)
+            reduction.nearest(3, -400.0)
         return
     for shift in (-400.0, cayley_shift(np.array([-300.0, 500.0]))):
-        np.testing.assert_allclose(reduction.near(3, shift).values, REFERENCE, rtol=1e-9)
+        np.testing.assert_allclose(reduction.nearest(3, shift).values, REFERENCE, rtol=1e-9)
 
 
 @pytest.mark.few(1)

@@ -24,7 +24,7 @@ def nearly_met(scene: Scene, load: float, size: int) -> tuple[NonsymmetricPencil
     solver = Solver(scene, Discretization("pointwise", 2, 4)).equilibria
     x, _ = first_equilibrium(solver, load)
     pencil = NonsymmetricSolver(solver.system).at(at_load(solver, x, load))
-    found = pencil.near(size + 2, 0.0)
+    found = pencil.nearest(size + 2, 0.0)
     cluster = Cluster(real_span(pencil, found.vectors[:, :size]), float(found.values[:size].real.mean()))
     return pencil, measure(pencil, cluster)
 

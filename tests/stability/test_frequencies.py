@@ -101,7 +101,7 @@ def test_no_pair_is_cut_in_two() -> None:
     solver = Solver(scene, meshes(scene, 146)[0])
     pencils, x = NonsymmetricSolver(solver.equilibria.system), solver.equilibrium(1.75).x
     for number in range(4, 13):
-        found = pencils.at(x).near(number, SHIFT).values
+        found = pencils.at(x).nearest(number, SHIFT).values
         assert number <= len(found) and (found.imag > 0).sum() == (found.imag < 0).sum() >= 2
 
 

@@ -37,7 +37,7 @@ def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
         assessor(x, method, 2)
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
     vibration = NonsymmetricSolver(system).at(x)
-    vibration.near(2, 0.0)
+    vibration.nearest(2, 0.0)
     assert options.getAll() == before
 
 
@@ -77,9 +77,9 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
 def test_reduced_pencil(options: PETSc.Options) -> None:
     system, x = cord()
     reduction = ReducedPencil(Coordinates(system).assemble(x))
-    expected = reduction.near(3, -30.0).values
+    expected = reduction.nearest(3, -30.0).values
     options["rodfem_eps_tol"] = 1e-11
-    np.testing.assert_allclose(reduction.near(3, -30.0).values, expected, rtol=1e-9)
+    np.testing.assert_allclose(reduction.nearest(3, -30.0).values, expected, rtol=1e-9)
     options["rodfem_eps_ncv"] = 3
     with pytest.raises(ConvergenceError, match="ncv"):
-        reduction.near(3, -30.0)
+        reduction.nearest(3, -30.0)
